@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from design.program import (
     expressions,
 )
 from design.servo import Compensation, Servo, servo_law, servo_memory
-from design.servo_kernels import PID_LAW, Law, Memory, servo_step
+from design.servo_kernels import PID_LAW, SCHEDULED_LAW, Law, Memory, servo_step
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.karnopp import NAMES
@@ -57,6 +57,8 @@ LAW_TABLES = {
     "a_e": ("a_e", "denominator of the same"),
     "b_c": ("b_c", "F_compf: filter C of the compensator's force"),
     "a_c": ("a_c", "denominator of the same"),
+    "knots": ("points", "of what the schedule goes over"),
+    "rows": ("schedule", "at each point F_cp, F_cn, F_vp, F_vn, R(1), T', R', S'[1..]"),
 }
 OF_FEED_FORWARD = {
     "b_v": ("b_v", "velocity of the reference"),
@@ -70,12 +72,18 @@ STATE_ARRAYS: Mapping[str, tuple[str, str]] = {
     "z_v": ("z_v", "state of filter A and the slope (5)"),
     "z_e": ("z_e", "state of filter B"),
     "z_c": ("z_c", "state of filter C"),
+    "now": ("now", "row of the schedule in force"),
 }
 STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "pid": (
         ("pid_sum", "sum of the error over T_i"),
         ("pid_slope", "filtered slope of the error times T_d"),
         ("pid_error", "error of the sample before"),
+    ),
+    "pid of a schedule": (
+        ("u_base", "what was asked for before, as far as it was carried out"),
+        ("r_last", "reference of the sample before, as it was moved"),
+        ("y_last", "position of the sample before"),
     ),
     "last": (
         ("F_ref", "what the position controller asks for"),
@@ -95,6 +103,9 @@ STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("u_before", "command of the sample before, of which the motor's force is known"),
         ("r_step", "what the reference moved in the sample before"),
         ("r_before", "reference of the sample before, as it was given"),
+        ("r_pace", "what that moved in its own sample"),
+        ("r_turn", "by how much this had changed"),
+        ("r_goes", "what the reference moves in a sample, where it does so smoothly"),
     ),
     "turn": (("turn", "samples since the position controller had its turn"),),
 }
@@ -122,7 +133,8 @@ def controller_program(
     )
     output = Signal("u", units.command, "command")
     known = _named_law(law, ahead)
-    kept = _named_memory(memory, ahead)
+    kinds = _Kinds(ahead, law.position == SCHEDULED_LAW)
+    kept = _named_memory(memory, kinds)
     taken = {one.name for one in (*known, *kept) if isinstance(one, NamedArray)}
     slots = {slot for one in (*known, *kept) if isinstance(one, NamedArray) for slot in one.slots}
     named = {one.name for one in known if isinstance(one, Constant)}
@@ -151,7 +163,7 @@ def controller_program(
             for one in known
             if isinstance(one, NamedArray) and one.name in names
         ),
-        states=tuple(one for one in _states(memory, ahead) if one.name in names),
+        states=tuple(one for one in _states(memory, kinds) if one.name in names),
         locals=tuple(one for one in reader.locals.values() if one.name != output.name),
         statements=statements,
     )
@@ -187,36 +199,43 @@ def _slotted(name: str, value: Array, slots: tuple[str, ...], meaning: str) -> N
     return NamedArray(name, len(slots), meaning, tuple(value.tolist()), slots)
 
 
-def _state_names(ahead: bool) -> tuple[Mapping[str, tuple[str, str]], str]:
-    """Names of the states that are arrays, and the key of what the last sample left."""
-    if not ahead:
-        return STATE_ARRAYS, "last"
-    return {**STATE_ARRAYS, **OF_FEED_FORWARD}, "last of a feed-forward"
+class _Kinds(NamedTuple):
+    """Whether a program has a feed-forward, and a schedule: its states then mean other things."""
+
+    ahead: bool
+    scheduled: bool
+
+    @property
+    def arrays(self) -> Mapping[str, tuple[str, str]]:
+        """Names and meanings of the states that are arrays."""
+        return {**STATE_ARRAYS, **OF_FEED_FORWARD} if self.ahead else STATE_ARRAYS
+
+    def slots(self, field: str) -> tuple[tuple[str, str], ...]:
+        """Names and meanings of the entries of another state."""
+        own = {"last": "last of a feed-forward"} if self.ahead else {}
+        own |= {"pid": "pid of a schedule"} if self.scheduled else {}
+        return STATE_SLOTS.get(own.get(field, field), ())
 
 
-def _named_memory(memory: Memory, ahead: bool) -> list[Any]:
-    arrays, last = _state_names(ahead)
+def _named_memory(memory: Memory, kinds: _Kinds) -> list[Any]:
     found: list[Any] = []
     for field, value in memory._asdict().items():
-        if field in arrays:
-            name, meaning = arrays[field]
+        if field in kinds.arrays:
+            name, meaning = kinds.arrays[field]
             found.append(NamedArray(name, len(value), meaning))
         else:
-            key = last if field == "last" else field
-            slots = tuple(name for name, _ in STATE_SLOTS.get(key, ()))
+            slots = tuple(name for name, _ in kinds.slots(field))
             found.append(NamedArray(field, len(value), "", (), slots, field == "turn"))
     return found
 
 
-def _states(memory: Memory, ahead: bool) -> Iterator[State]:
+def _states(memory: Memory, kinds: _Kinds) -> Iterator[State]:
     """The states that a program may have, at rest at position 1."""
-    arrays, last = _state_names(ahead)
     for field, value in memory._asdict().items():
-        if field in arrays:
-            name, meaning = arrays[field]
+        if field in kinds.arrays:
+            name, meaning = kinds.arrays[field]
             yield State(name, "real", tuple(value.tolist()), True, meaning)
-        key = last if field == "last" else field
-        for at, (name, meaning) in enumerate(STATE_SLOTS.get(key, ())):
+        for at, (name, meaning) in enumerate(kinds.slots(field)):
             whole = np.issubdtype(value.dtype, np.integer)
             kind: Kind = "integer" if whole else "real"
             yield State(name, kind, (float(value[at]),), False, meaning)
@@ -257,4 +276,6 @@ def _constant_meanings(units: ProgramUnits) -> Mapping[str, tuple[str, str]]:
         "m": (f"{force} s^2/{units.position}", "mass that is fed forward"),
         "F_most": (force, "most that is fed forward"),
         "h": ("s", "period of the position controller"),
+        "decay": ("1", "of what was not carried out, a sample later"),
+        "span": (units.position, "step of the reference from which its direction is told"),
     }

@@ -14,14 +14,17 @@ FF_CP, FF_CN, FF_VP, FF_VN, FF_BAND, FF_M, FF_MOST = range(7)
 
 
 @compiled_exact
-def feed_forward_force(law: Array, v: float, a: float) -> float:
-    """Force [N] of the feed-forward `law` (7,) at a reference of v [m/s] and a [m/s^2]."""
+def feed_forward_force(law: Array, friction: Array, v: float, a: float) -> float:
+    """Force [N] of the feed-forward `law` (7,) at a reference of v [m/s] and a [m/s^2].
+
+    friction: the law itself, or a row that begins with F_cp, F_cn, F_vp, F_vn in its place.
+    """
     share = min(max(v / law[FF_BAND], -1.0), 1.0)
     if v >= 0.0:
-        friction = law[FF_CP] * share + law[FF_VP] * v
+        slides = friction[FF_CP] * share + friction[FF_VP] * v
     else:
-        friction = law[FF_CN] * share + law[FF_VN] * v
-    whole = friction + law[FF_M] * a
+        slides = friction[FF_CN] * share + friction[FF_VN] * v
+    whole = slides + law[FF_M] * a
     return float(min(max(whole, -law[FF_MOST]), law[FF_MOST]))
 
 

@@ -17,6 +17,7 @@ from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, observer_form, pre
 from design.loop_signals import Signals, command_delay, effect_signals
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST
+from design.schedule import OVERS, Schedule
 from design.servo_kernels import (
     COMPENSATOR,
     DISTURBANCE,
@@ -25,6 +26,7 @@ from design.servo_kernels import (
     NO_COUNTERMEASURE,
     PID_LAW,
     RST_LAW,
+    SCHEDULED_LAW,
     Law,
     Memory,
     friction_force,
@@ -106,6 +108,7 @@ class Servo:
     rate: float | None = None
     direct: bool = False
     acceleration: float | None = None
+    schedule: Schedule | None = None
 
     def __post_init__(self) -> None:
         if self.acceleration is not None and (self.rate is None or not self.acceleration > 0):
@@ -114,6 +117,8 @@ class Servo:
             raise BadModel(
                 "a command without a force loop takes no force of a loop or a countermeasure"
             )
+        if self.schedule is not None and not isinstance(self.position, RST):
+            raise BadModel("a gain schedule stands in the place of an RST")
 
     @property
     def linear(self) -> RST:
@@ -249,6 +254,7 @@ def friction_law(what: Countermeasure | None, h: float) -> Law:
         friction=kind, law=law, b_v=first.b, a_v=first.a, b_e=second.b, a_e=second.a,
         b_c=third.b, a_c=third.a, kalman=kalman, h=h, k_i=0.0, k_int=0.0, k_a=0.0,
         limit=math.inf, force_limit=math.inf, rate=math.inf, acceleration=math.inf, ratio=1,
+        over=0, knots=none, rows=none, decay=0.0, span=1.0,
     )  # fmt: skip
 
 
@@ -264,7 +270,8 @@ def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
         x=np.zeros(1), pid=np.zeros(3), z_r=settled(Sampled(law.b_r, law.a_r), y_0),
         z_v=settled(Sampled(law.b_v, law.a_v), first), z_e=settled(Sampled(law.b_e, law.a_e), y_0),
         z_c=np.zeros(law.b_c.size), kalman=kalman, last=np.zeros(4),
-        held=np.array([y_0, 0.0, 0.0, 0.0, y_0]), turn=np.zeros(1, dtype=np.int64),
+        held=np.array([y_0, 0.0, 0.0, 0.0, y_0, 0.0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
+        now=np.zeros(1),
     )  # fmt: skip
 
 
@@ -280,6 +287,12 @@ def servo_law(servo: Servo, h: float, k_a: float = 0.0) -> Law:
         k_i=k_i, k_int=k_i * h / T_i, k_a=k_a, limit=limit, force_limit=force_limit,
         rate=rate * h, acceleration=acceleration * h * h, ratio=ratio,
     )  # fmt: skip
+    if servo.schedule is not None:
+        what, period = servo.schedule, ratio * h
+        return law._replace(
+            position=SCHEDULED_LAW, over=OVERS.index(what.over), knots=np.array(what.at),
+            rows=what.rows.ravel(), decay=what.decay(period), span=what.span * period,
+        )  # fmt: skip
     if isinstance(servo.position, RST):
         R, S, _ = observer_form(servo.position, 0.0)
         b_r, a_r = _reference_filter(servo.position)
@@ -293,6 +306,10 @@ def servo_law(servo: Servo, h: float, k_a: float = 0.0) -> Law:
 
 def servo_memory(servo: Servo, law: Law, y_0: float, F_0: float) -> Memory:
     """The state of the servo that has stood at y_0 [m] under F_0 [N]."""
+    if servo.schedule is not None:
+        rest, now = np.array([0.0, y_0, y_0]), servo.schedule.rows[0].copy()
+        x = np.zeros(servo.schedule.size)
+        return friction_memory(law, y_0, F_0)._replace(x=x, pid=rest, now=0.0 * now)
     _, _, x = observer_form(servo.linear, y_0)
     return friction_memory(law, y_0, F_0)._replace(x=x)
 

@@ -17,20 +17,23 @@ from design.loop_kernels import force_command, shift
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled, compiled_exact
 
-RST_LAW, PID_LAW = range(2)
+RST_LAW, PID_LAW, SCHEDULED_LAW = range(3)
 NO_COUNTERMEASURE, COMPENSATOR, DISTURBANCE, KALMAN, FEED_FORWARD = range(5)
 PLAIN_INTEGRAL, DEAD_ZONE, RESET = range(3)
 # A PID's constants, and its memory.
 K_R, PER_SUM, PER_DIFFERENCE, POLE, ZONE, RULE = range(6)
 SUM, SLOPE, ERROR = range(3)
+# A scheduled law's memory in the place of a PID's, and over what it is scheduled.
+BASE, R_LAST, Y_LAST = range(3)
+OVER_PLACE, OVER_LOAD, OVER_DIRECTION = range(3)
 # Constants of the Kalman filter, and its memory: y, v, F_f, then the covariance by rows.
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
 # What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
-# A reference within so many times its speed is a path, and no step; one that got ahead is caught
-# up with by so many times the acceleration.
-PATH_SPEED, PATH_ACCELERATION = 3.0, 4.0
-R_MOVED, INTEGRAL_SUM, U_BEFORE, R_STEP, R_BEFORE = range(5)
+PATH_ACCELERATION = 4.0  # times the acceleration, up to which a reference is a path and no step,
+PATH_TURN = 0.5  # and by which times that may change from sample to sample
+LEAST_CHASE = 0.25  # of the acceleration, that is left for catching up with one that turns hard
+R_MOVED, INTEGRAL_SUM, U_BEFORE, R_STEP, R_BEFORE, R_PACE, R_TURN, R_GOES = range(8)
 
 
 class Law(NamedTuple):
@@ -48,6 +51,10 @@ class Law(NamedTuple):
     [N]; rate: what the reference may move in a sample [m], acceleration: by how much that may
     change from one to the next, with which goes a finite rate; each may be infinite. ratio: samples
     of the force loop in one of the position controller.
+
+    SCHEDULED_LAW: knots (k,) of what it is scheduled over, rows (k n,) of its table, see
+    `design.schedule`; decay: of what was not carried out, span: step of the reference [m] from
+    which its direction is told.
     """
 
     position: int
@@ -75,13 +82,19 @@ class Law(NamedTuple):
     rate: float
     acceleration: float
     ratio: int
+    over: int
+    knots: Array
+    rows: Array
+    decay: float
+    span: float
 
 
 class Memory(NamedTuple):
     """A servo's state: controller, PID (3,), filters of reference, velocity, error and C, Kalman
     filter (12,), what the last sample left (4,), reference moved, sum of the force error, a motor's
-    command, the reference's last step and the reference itself (5,), the force loop's samples since
-    the position controller's turn (1,)."""
+    command, the reference's last step, the reference itself, its own last step, by how much that
+    changed, and its step where it was smooth (8,), the force loop's samples since the position
+    controller's turn (1,). now: the row of a schedule in force (n,)."""
 
     x: Array
     pid: Array
@@ -93,6 +106,7 @@ class Memory(NamedTuple):
     last: Array
     held: Array
     turn: IntArray
+    now: Array
 
 
 @compiled
@@ -145,7 +159,8 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
     elif c.friction == FEED_FORWARD:
         last[SPEED] = filtered(c.b_v, c.a_v, s.z_v, r)
         last[RAW] = filtered(c.b_e, c.a_e, s.z_e, r)
-        last[ADDED] = feed_forward_force(c.law, last[SPEED], last[RAW])
+        friction = s.now if c.position == SCHEDULED_LAW else c.law
+        last[ADDED] = feed_forward_force(c.law, friction, last[SPEED], last[RAW])
     return float(last[ADDED])
 
 
@@ -153,30 +168,69 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
 def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
     """The reference [m] moved towards r within its speed and acceleration, so that it stops there.
 
-    One that goes on as a path, within some times of the speed, is taken as it is; one that has got
-    ahead is caught up with. From a speed v the way to a stop is v^2/(2 a) at most.
+    One whose acceleration does not leap is a path and taken as it is, however fast; after a step
+    or a kink it is caught up with, speed and acceleration being relative to what it goes on with.
+    From a speed v the way to a stop is v^2/(2 a) at most.
     """
     left, step = r - held[R_MOVED], held[R_STEP]
     behind, pace = held[R_BEFORE] - held[R_MOVED], r - held[R_BEFORE]
-    held[R_BEFORE] = r
-    most, change = PATH_SPEED * rate, PATH_ACCELERATION * acceleration
-    path = behind == 0.0 and abs(pace) <= most
-    if pace == 0.0 or abs(pace) > most:  # it rests, perhaps after a step
-        pace, most, change = 0.0, rate, acceleration
-    if path or (abs(left) <= most and abs(left - step) <= change):
+    turn = pace - held[R_PACE]
+    smooth = abs(turn - held[R_TURN]) <= PATH_TURN * acceleration
+    smooth = smooth and abs(turn) <= PATH_ACCELERATION * acceleration
+    held[R_BEFORE], held[R_PACE], held[R_TURN] = r, pace, turn
+    change = acceleration
+    if smooth:
+        held[R_GOES] = pace
+        step += turn  # it turns with the path
+        change = max(acceleration - abs(turn), LEAST_CHASE * acceleration)
+    goes = held[R_GOES]
+    most = abs(goes) + rate
+    path = smooth and behind == 0.0
+    gap = left - goes  # to where the reference goes on, at what it goes on with
+    near = abs(left - step) <= change and abs(gap) <= change
+    if path or (near and abs(left) <= most):
         held[R_STEP] = left
         held[R_MOVED] = r
     else:
-        way = 1.0 if left >= 0.0 else -1.0
-        ahead, speed = abs(left), way * (step - pace)
+        way = 1.0 if gap >= 0.0 else -1.0
+        ahead, speed = abs(gap), way * (step - goes)
         faster = speed + change
-        if faster > 0.0 and ahead - faster < faster * faster / (2.0 * change):
+        if faster > 0.0 and ahead - faster < faster * (faster - change) / (2.0 * change):
             faster = speed
-            if speed > 0.0 and ahead - speed < speed * speed / (2.0 * change):
+            if speed > 0.0 and ahead - speed < speed * (speed - change) / (2.0 * change):
                 faster = speed - change
-        held[R_STEP] = min(max(pace + way * faster, -most), most)
+        held[R_STEP] = min(max(goes + way * faster, -most), most)
         held[R_MOVED] += held[R_STEP]
     return float(held[R_MOVED])
+
+
+@compiled_exact
+def look_up(c: Law, s: Memory, aim: float, force: float) -> None:
+    """Puts the row of the schedule in force, straight between its knots and held beyond them."""
+    at = aim
+    if c.over == OVER_LOAD:
+        at = abs(force)
+    elif c.over == OVER_DIRECTION:
+        at = (aim - s.pid[R_LAST]) / c.span
+    for j in range(len(s.now)):
+        s.now[j] = c.rows[j]
+    for k in range(len(c.knots) - 1):
+        share = min(max((at - c.knots[k]) / (c.knots[k + 1] - c.knots[k]), 0.0), 1.0)
+        for j in range(len(s.now)):
+            s.now[j] += share * (c.rows[(k + 1) * len(s.now) + j] - c.rows[k * len(s.now) + j])
+
+
+@compiled_exact
+def scheduled_force(s: Memory, r: float, y: float) -> float:
+    """What the row in force asks for at r and y: nothing of it depends on where they are from."""
+    n, now = len(s.x), s.now
+    dr, dy = r - s.pid[R_LAST], y - s.pid[Y_LAST]
+    change = now[4] * (r - y) + now[5] * dr - now[5 + n] * dy + s.x[0]
+    for j in range(n - 1):
+        s.x[j] = s.x[j + 1] + now[6 + j] * dr - now[6 + n + j] * dy - now[5 + 2 * n + j] * change
+    s.pid[R_LAST] = r
+    s.pid[Y_LAST] = y
+    return float(s.pid[BASE] + change)
 
 
 @compiled_exact
@@ -185,6 +239,8 @@ def position_force(c: Law, s: Memory, r: float, y: float) -> float:
     if c.position == RST_LAW:
         fed = filtered(c.b_r, c.a_r, s.z_r, r)
         return float(fed - c.R[0] * y + s.x[0])
+    if c.position == SCHEDULED_LAW:
+        return scheduled_force(s, r, y)
     e = r - y
     s.pid[SLOPE] = c.pid[POLE] * s.pid[SLOPE] + c.pid[PER_DIFFERENCE] * (e - s.pid[ERROR])
     if c.pid[RULE] == RESET and e * s.pid[ERROR] < 0.0:
@@ -200,6 +256,9 @@ def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> N
         shift(s.x, c.R, c.S, y, taken)
         for j in range(len(s.x) - 1):
             s.x[j] -= c.W[j + 1] * (asked - taken)
+        return
+    if c.position == SCHEDULED_LAW:
+        s.pid[BASE] = taken + c.decay * (asked - taken)
         return
     e = s.pid[ERROR]
     outward = (asked - taken) * e * c.pid[K_R] > 0.0
@@ -223,6 +282,8 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         aim = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
         s.held[R_MOVED] = aim
     acts = c.ratio == 1 or s.turn[0] == 0
+    if c.position == SCHEDULED_LAW and acts:
+        look_up(c, s, aim, c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F)
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
     if c.friction == FEED_FORWARD:
@@ -248,7 +309,9 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         u = min(max(u + shake, -c.limit), c.limit)
     if acts:
         position_moved(c, s, y, asked, taken)
-    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE and c.friction != FEED_FORWARD:
+    by_friction = c.friction != NO_COUNTERMEASURE and c.friction != FEED_FORWARD
+    by_load = c.position == SCHEDULED_LAW and c.over == OVER_LOAD
+    if c.k_a != 0.0 and (by_friction or by_load):
         s.held[U_BEFORE] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0

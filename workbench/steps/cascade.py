@@ -17,28 +17,33 @@ from design.tune import Goals
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.model.plant import Motor
+from identification.thresholds import LAG_FROM
 from workbench.cards.readable import number
 from workbench.documents.design import Controller, Design, Linear, Recommended, margin_values
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
-from workbench.steps.linear_loop import command_of, swings_of
+from workbench.steps.linear_loop import command_of, delayed, swings_of
 
 FILTER_EARNS = 1.1  # times the bandwidth without it, from which a notch or a low-pass is proposed
 BAND_OF_SPEED = 0.01  # of the fastest speed seen, within which Coulomb friction comes on
 SHARE_OF_FORCE = 0.9  # of the force that friction leaves, which a step may take
 FORCE_BEYOND_LOGS = 2.0  # times the largest force seen, up to which a feed-forward goes
 SPEED_BEYOND_LOGS = 1.5  # times the fastest speed seen, up to which a step is moved
+FORCE_LAG = 1e-3  # s, that a drive takes to make a force (current loops: 0.1 to 1 ms)
 WELL_BELOW = 4.0  # times its poles' frequency, at least, that a resonance lies above them
 
 
 def tuned_cascade(model: Model, plant: Linear, corners: Plants, goals: Goals) -> TunedCascade:
     """The cascade for a model's plant, with a notch or a low-pass where that earns its place.
 
-    corners: plants inside the parameters' intervals. Raises BadSpecification where none is stable.
+    corners: plants inside the parameters' intervals; each counts with the `unseen_lag` too. Raises
+    BadSpecification where none is stable.
     """
     own: tuple[Array, Array] = (np.array(plant.A), np.array(plant.B))
     swings = [f for one in swings_of(model) for f in (one.resonance, one.anti_resonance) if f]
-    plants, m = [own, *corners], model.karnopp.m
+    late = unseen_lag(model) / plant.h
+    plants = [own, *corners]
+    plants, m = [*plants, *((a, delayed(b, late)) for a, b in plants if late)], model.karnopp.m
     goals = replace(goals, effort=effort_of_both(model, own, goals.effort))
     plain = tune_cascade(plants, plant.h, m, goals, swings=swings)
     filters = [one for s in swings_of(model) for one in
@@ -47,6 +52,15 @@ def tuned_cascade(model: Model, plant: Linear, corners: Plants, goals: Goals) ->
         return plain
     filtered = tune_cascade(plants, plant.h, m, goals, filters=filters, swings=swings)
     return better(plain, filtered)
+
+
+def unseen_lag(model: Model) -> float:
+    """By how much the motion may follow what a law asks for, beyond what the model has, without a
+    log to show it [s]: a part of its samples, and of a force that is logged without the command
+    behind it what a drive takes to make one."""
+    told = model.lag is not None or "input_delay" in model.effects
+    sampled = 0.0 if told else LAG_FROM * model.period
+    return sampled + (FORCE_LAG if model.simulated.actuator is None else 0.0)
 
 
 def effort_of_both(model: Model, plant: tuple[Array, Array], effort: float | None) -> float | None:

@@ -21,6 +21,7 @@ from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.controllers import bode_chart
 from workbench.report.design_tables import cascade_lines
+from workbench.steps.cascade import unseen_lag
 from workbench.steps.closed_loop import driven_loop, load_of, run_driven
 from workbench.steps.design import design, usual_structures
 from workbench.steps.elastic import with_resonance, with_response
@@ -120,6 +121,19 @@ def test_the_plant_of_a_resonance_is_that_of_two_masses() -> None:
     assert len(elastic[0][0]) == len(stiff[0][0]) + 2
     assert len(elastic) == 1 + 2 * len(stiff[1:])  # both ends of the resonance too
     assert load_of(plain()) is None
+
+
+def test_a_lag_that_no_log_would_have_shown_is_held_off() -> None:
+    told = plain()
+    motor, force = replace(told, effects={}), replace(told, effects={}, actuator=None)
+    force = replace(force, rig=replace(force.rig, kind="force"))
+    assert unseen_lag(told) == 0.0
+    assert unseen_lag(motor) == pytest.approx(0.4 * motor.period)
+    assert unseen_lag(force) == pytest.approx(0.4 * force.period + 1e-3)
+    slow = replace(motor, log=(replace(motor.log[0], h=8e-3),))
+    quick, careful = (design(one, structures=("p-pi",), period=1e-3).p_pi for one in (motor, slow))
+    assert quick is not None and careful is not None
+    assert quick.dominant[0] > careful.dominant[0]
 
 
 def test_a_cascade_is_designed_where_the_machine_swings() -> None:
