@@ -27,11 +27,12 @@ import pandas as pd
 
 import workbench as wb
 from benchmarks.response_rig import Machine, machine, record
-from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.estimate import Response
 from identification.frequency.modes import Peak
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import UNITS
+from identification.thresholds import COHERENCE_SURE
 from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.steps.response import Responded
 
@@ -100,7 +101,7 @@ def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path 
     by_position = -1.0 / (2.0 * np.pi * found.found.f) ** 2
     points_left, near_left, _ = of_points(found.found.with_friction.times(by_position), one)
     reached, hit, told_right, invented = of_peaks(found, one)
-    sure = found.found.body.seen & (found.found.body.coherence > COHERENCE_SURE)
+    sure = found.found.body.sure
     top = float(np.max(found.found.f[sure], initial=0.0))
     return Judged(
         points, near, inside, reached, hit, told_right, invented,
@@ -130,7 +131,7 @@ def rough(one: Machine, seed: int) -> Model:
 
 def of_points(plant: Response, one: Machine) -> tuple[int, int, int]:
     """Points of a coherence above 0.8: all, near the truth, within the band."""
-    sure = plant.seen & (plant.coherence > COHERENCE_SURE)
+    sure = plant.sure
     off = plant.H[sure] / one.truth(plant.f[sure])
     near = (np.abs(20.0 * np.log10(np.abs(off))) < NEAR_DB) & (
         np.abs(np.degrees(np.angle(off))) < NEAR_DEG

@@ -96,8 +96,26 @@ RESONANCE_APART = 1.02  # times the anti-resonance, from which a resonance shows
 OTHER_WAY = 0.02  # of the windows of sliding, up to which those of a direction are noise
 BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
+# What is seen over frequency: responses, modes, a load behind its motor (response.py, notch.py).
+COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
+COHERENCE_SURE = 0.8  # coherence from which it is relied on
+AVERAGES_NEEDED = 4  # independent averages (stretches of all logs), below which it is none
+APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
+POINTS_NEEDED = 30  # of a response, in which modes are looked for
+MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
+MODE_SHARE = 0.15  # of chi-square, the same
+STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
+DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
+MOST_DAMPING = 0.3  # of what is called a resonance
+UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not identified
+POINTS_AROUND = 3  # points close to a peak on either side, that show it,
+MOSTLY_SEEN = 0.5  # and share of the frequencies there
+RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides behind a motor at rest
+LEAVES_LESS = 0.25  # mean logarithm of what is left, by which such a load has to leave less
+
 # What a log identifies of a parameter, and what drives it (nine_parameters.py, chapters.py,
 # drives.py).
+SLIDES_NEEDED = 8  # windows of sliding in each direction, for an axis test
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share

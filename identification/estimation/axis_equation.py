@@ -25,13 +25,11 @@ from identification.estimation.regression.weighted_rows import (
     spread_of_left_out,
 )
 from identification.log import Log
+from identification.thresholds import EVENTS_NEEDED, SLIDES_NEEDED, WIDEST_SD
 
 COULOMB_LEVELS = ("F_cp", "F_cn")
 COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
-MOST_SPREAD = 0.25  # deviation of mass and viscous friction, of their values, that is told
 SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
-FEWEST_SLIDING = 8  # windows of sliding in each direction
-FEWEST_BREAKAWAYS = 3  # of a direction, from which they tell its limit
 SLOW_QUARTER = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
@@ -66,10 +64,10 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     """
     one = motion_log(log, held=held, by_command=False)
     up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
-    if min(up, down) < FEWEST_SLIDING:
+    if not slides_enough(up, down):
         raise NotIdentifiable(
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
-            f" least {FEWEST_SLIDING} of each needed; log strokes in both directions"
+            f" least {SLIDES_NEEDED} of each needed; log strokes in both directions"
         )
     rows, theta = _settled(one)
     used, theta, each = _discriminated(rows)
@@ -92,6 +90,11 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     )  # fmt: skip
 
 
+def slides_enough(up: int, down: int) -> bool:
+    """Whether so many windows of sliding in either direction tell its friction."""
+    return min(up, down) >= SLIDES_NEEDED
+
+
 def _settled(one: MotionLog) -> tuple[Rows, Array]:
     """The rows, and the parameters of their least squares."""
     theta = NOTHING_KNOWN
@@ -112,7 +115,7 @@ def _discriminated(rows: Rows) -> tuple[list[int], Array, Array]:
         blocks = np.unique(rows.block)
         each = np.array([solve_rows(some, rows.block != block).theta for block in blocks])
         further = [k for k, column in enumerate(used) if rows.names[column] not in COULOMB_LEVELS]
-        wide = spread_of_left_out(each)[further] > MOST_SPREAD * theta[further]
+        wide = spread_of_left_out(each)[further] > WIDEST_SD * theta[further]
         if not np.any(wide):  # nor below 0
             break
     return used, theta, each
@@ -134,9 +137,9 @@ def _breakaway(
     for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
         own = events.direction == way
         count.append(int(np.count_nonzero(own)))
-        if count[-1] >= FEWEST_BREAKAWAYS:
+        if count[-1] >= EVENTS_NEEDED:
             order = np.argsort(np.abs(events.rate[own]), kind="stable")
-            slow = order[: max(FEWEST_BREAKAWAYS, count[-1] // SLOW_QUARTER)]
+            slow = order[: max(EVENTS_NEEDED, count[-1] // SLOW_QUARTER)]
             force, rate = np.abs(events.force[own])[slow], np.abs(events.rate[own])[slow]
             values[name] = float(np.median(force))
             off = float(np.median(np.abs(force - values[name])))

@@ -28,15 +28,17 @@ from scipy.stats import t as student
 
 from identification.arrays import Array, BoolArray
 from identification.frequency.stretches import INDEPENDENT, REACHES, Band, ComplexArray
+from identification.thresholds import (
+    APART_SHARE,
+    AVERAGES_NEEDED,
+    CHANCE_LEVEL,
+    COHERENCE_SEEN,
+    COHERENCE_SURE,
+)
 
-COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
-COHERENCE_SURE = 0.8  # coherence from which it is relied on
-FEWEST_AVERAGES = 4.0
-CHANCE_COHERENCE = 0.01  # that so much coherence is chance, at most
 DEGREE = 2  # of a response over its neighbours
 RIDGE = 1e-12  # of the diagonal, that keeps what is all but singular from being so
 BINS_OF_ONE = 1.5  # bins that Hann's window makes one of
-APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
 NARROW_BAND = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
 
 
@@ -79,9 +81,14 @@ class Response:
     def seen(self) -> BoolArray:
         """Where the logs show it: enough averages, and more coherence than chance gives, (k,)."""
         free = np.maximum(self.averages - 1.0, 1e-9)
-        luck = 1.0 - CHANCE_COHERENCE ** (1.0 / free)
-        enough = self.averages >= FEWEST_AVERAGES
+        luck = 1.0 - CHANCE_LEVEL ** (1.0 / free)
+        enough = self.averages >= AVERAGES_NEEDED
         return np.asarray(enough & (self.coherence >= np.maximum(COHERENCE_SEEN, luck)))
+
+    @property
+    def sure(self) -> BoolArray:
+        """Where it is relied on, (k,)."""
+        return np.asarray(self.seen & (self.coherence > COHERENCE_SURE))
 
     def times(self, factor: NDArray[Any]) -> "Response":
         """The response in series with one that is known, (k,)."""
@@ -181,10 +188,15 @@ def responses_with_reach(
         share = 1.0 / np.maximum(np.real(s.inverse[:, step * j, step * j]) * alone, 1e-300)
         made = np.abs(s.theta[:, step * j, 0]) ** 2 * alone
         coherence = made / np.maximum(made + s.left, 1e-300)
-        apart = alone > APART_SHARE * np.real(s.follows[:, step * j, step * j])
+        apart = is_apart(alone, np.real(s.follows[:, step * j, step * j]))
         averages = np.where(apart, np.maximum(s.rows * share - len(inputs) + 1.0, 0.0), 0.0)
         found.append(Response(f, s.theta[:, step * j, 0], coherence, averages))
     return found
+
+
+def is_apart(alone: Array, power: Array) -> BoolArray:
+    """Whether an input makes enough of its power by itself, (k,)."""
+    return np.asarray(alone > APART_SHARE * power)
 
 
 def joined(parts: Sequence[Response]) -> Response:

@@ -21,23 +21,25 @@ from identification.arrays import Array
 from identification.frequency.estimate import Response
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
+from identification.thresholds import (
+    DEEP,
+    MODE_GAINS,
+    MODE_SHARE,
+    MOST_DAMPING,
+    MOSTLY_SEEN,
+    POINTS_AROUND,
+    POINTS_NEEDED,
+    STANDING_OUT,
+    UNSURE_PEAK,
+)
 
 MOST_MODES = 4
 HERTZ_BEGUN = 48  # frequencies with which a mode's search begins
 DAMPING_BEGUN = (0.01, 0.05)
 SEARCHED_FROM = 3  # of these, the best
 STRUCTURE_ERROR = 0.02  # of the magnitude, that the form itself may be off
-MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
-OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
-STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
-DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
-MOST_DAMPING = 0.3  # of what is called a resonance
-UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not identified
 AROUND_PEAK = 0.1  # of its frequency, within which points on either side show a peak
-POINTS_AROUND = 3  # that many, on either side
-MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
-FEWEST_POINTS = 30
 SHARED = 16.0  # points that are of the same stretches and neighbours, and count as one
 OF_A_BIN = 0.5  # by which windows may shift a peak
 LONGEST_MODE_LAG = 0.05  # s
@@ -83,7 +85,7 @@ class Modes:
 def fit_modes(response: Response) -> Modes | None:
     """The modes that a response (acceleration by force) shows; None where it shows too little."""
     use = response.seen
-    if np.count_nonzero(use) < FEWEST_POINTS:
+    if np.count_nonzero(use) < POINTS_NEEDED:
         return None
     f, H = response.f[use], response.H[use]
     weight = 1.0 / (np.abs(H) * np.hypot(response.sd[use], STRUCTURE_ERROR))
@@ -169,9 +171,14 @@ def _earns(data: _Data, before: Array, after: Array) -> bool:
     """Whether the last mode explains more than chance."""
     was, now = data.chi(before), data.chi(after)
     free = 2 * len(data.f) - 3 - 3 * ((len(after) - 2) // 2)
-    gained = (was - now) / max(now / max(free, 1), 1.0)
     apart = all(_apart(after[-2:], after[k : k + 2]) for k in range(2, len(before), 2))
-    return bool(apart and gained > MODE_GAINS and was - now > OF_WHAT_IS_LEFT * was)
+    return apart and explains_far_more(was, now, free)
+
+
+def explains_far_more(was: float, now: float, free: int) -> bool:
+    """Whether chi-square falls by more than chance; free: points less parameters."""
+    gained = (was - now) / max(now / max(free, 1), 1.0)
+    return gained > MODE_GAINS and was - now > MODE_SHARE * was
 
 
 def _apart(one: Array, other: Array) -> bool:
@@ -184,7 +191,27 @@ def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
     w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
     parts = (_columns(p, np.array([w / (2.0 * np.pi)])) * theta)[0]
     own, rest = abs(parts[1 + k]), abs(np.sum(np.delete(parts, 1 + k)))
-    return bool(z < MOST_DAMPING and own > STANDING_OUT * rest and _shown(data, w / (2.0 * np.pi)))
+    return swings(z) and is_large(own, rest) and _shown(data, w / (2.0 * np.pi))
+
+
+def swings(damping: float) -> bool:
+    """Whether so much damping is that of a resonance."""
+    return bool(abs(damping) < MOST_DAMPING)
+
+
+def is_large(own: float, rest: float) -> bool:
+    """Whether what a mode adds stands out of the rest of the response."""
+    return bool(own > STANDING_OUT * rest)
+
+
+def is_deep(left: float, rigid: float) -> bool:
+    """Whether an anti-resonance leaves little of the rigid body's response."""
+    return bool(left < DEEP * rigid)
+
+
+def is_sharp(one: Peak) -> bool:
+    """Whether the frequency of a peak is told."""
+    return one.frequency.sd < UNSURE_PEAK * one.frequency.value
 
 
 def _shown(data: _Data, f: float) -> bool:
@@ -192,9 +219,14 @@ def _shown(data: _Data, f: float) -> bool:
     for low, high in (((1.0 - AROUND_PEAK) * f, f), (f, (1.0 + AROUND_PEAK) * f)):
         there = np.count_nonzero((data.f >= low) & (data.f <= high))
         might = np.count_nonzero((data.every >= low) & (data.every <= high))
-        if there < max(POINTS_AROUND, MOSTLY_SEEN * might):
+        if not are_there(int(there), int(might)):
             return False
     return True
+
+
+def are_there(there: int, might: int) -> bool:
+    """Whether so many points of those that might be there show a peak."""
+    return there >= max(POINTS_AROUND, MOSTLY_SEEN * might)
 
 
 def _told(data: _Data, p: Array) -> Modes:
@@ -213,7 +245,7 @@ def _told(data: _Data, p: Array) -> Modes:
         where = float(w / (2.0 * np.pi)), float(z)
         peaks.append(_peak(data, "resonance", where, (float(spread[0]), float(spread[1]))))
     peaks += _anti_resonances(data, p, theta, misfit)
-    sure = [one for one in peaks if one.frequency.sd < UNSURE_PEAK * one.frequency.value]
+    sure = [one for one in peaks if is_sharp(one)]
     return Modes(tuple(sorted(sure, key=lambda one: one.frequency.value)), p, theta, misfit)
 
 
@@ -266,8 +298,8 @@ def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list
     for zero in _zeros(p, theta):
         f, damping = abs(zero) / (2.0 * np.pi), -zero.real / abs(zero)
         parts = (_columns(p, np.array([f])) * theta)[0]
-        deep = abs(np.sum(parts)) < DEEP * abs(parts[0])
-        if not (deep and abs(damping) < MOST_DAMPING and _shown(data, f)):
+        deep = is_deep(abs(np.sum(parts)), abs(parts[0]))
+        if not (deep and swings(damping) and _shown(data, f)):
             continue
         near = _zero_spread(data, p, zero, misfit)
         out.append(Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1])))

@@ -16,6 +16,7 @@ from scipy.signal.windows import hann
 
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
+from identification.thresholds import AVERAGES_NEEDED
 
 ComplexArray = NDArray[np.complex128]
 
@@ -30,7 +31,6 @@ HIGHEST_SHARE_SEEN = 0.4  # of the sampling rate
 STRETCH_OVERLAP = 0.5
 # Share of the stretches that count as independent: neighbours under Hann's window share 1/6.
 INDEPENDENT = 1.0 / (1.0 + 2.0 / 36.0)
-FEWEST_STRETCHES = 4  # in all logs, below which no spectrum is an average
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
         length = LEAST_CYCLES_SEEN / lowest
         there = sum(max(0.0, d / length - 1.0) / (1.0 - STRETCH_OVERLAP) + 1.0 for d in durations
                     if d >= length)  # fmt: skip
-        if there < FEWEST_STRETCHES:
+        if there < AVERAGES_NEEDED:
             raise BadSpecification(
                 f"lowest frequency {lowest:g} Hz: stretches of {length:.3g} s needed, {there:.0f}"
-                f" in {whole:.3g} s of logs, at least {FEWEST_STRETCHES} needed; log longer, or ask"
-                f" for at least {LEAST_CYCLES_SEEN * FEWEST_STRETCHES / whole:.2g} Hz"
+                f" in {whole:.3g} s of logs, at least {AVERAGES_NEEDED} needed; log longer, or ask"
+                f" for at least {LEAST_CYCLES_SEEN * AVERAGES_NEEDED / whole:.2g} Hz"
             )
     if length < FEWEST_IN_STRETCH * fastest:
         raise NotIdentifiable(

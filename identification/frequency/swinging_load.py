@@ -37,6 +37,7 @@ from identification.frequency.stretches import (
     hold,
 )
 from identification.model.resonance import load_acceleration
+from identification.thresholds import LEAVES_LESS, RESTS_AT_LEAST
 
 HERTZ_TRIED = 20  # anti-resonances tried, on a scale of ratios
 DAMPING_TRIED = 0.02
@@ -45,8 +46,6 @@ DAMPINGS_TRIED = (0.005, 0.01, 0.04, 0.08)
 FROM_LOWEST = 4.0  # times the lowest frequency, from which on
 BANDS_TRIED = 2  # of the longest stretches
 SAMPLES_TRIED = 150_000  # of the longest runs, after which no further one is
-RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides
-LEAVES_LESS = 0.25  # mean logarithm of what is left, by which a load has to leave less
 SHARE_BOUNDS = (0.02, 0.98)  # of the mass, that is a load
 
 
@@ -77,8 +76,7 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
 
     runs: their `linear` force that of one mass [kg] where they rest.
     """
-    resting = np.mean(np.concatenate([one.where for one in rests]))
-    if resting < RESTS_AT_LEAST:
+    if not rests_enough(float(np.mean(np.concatenate([one.where for one in rests])))):
         return None
     names = ("a", "linear", *instruments_of(runs))
     both = _longest(list(zip(runs, rests, strict=True)))
@@ -105,7 +103,17 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
         best = min(best, _tried(looked_at, f, damping, mass), key=lambda one: one[0])
     left, load = best
     inside = SHARE_BOUNDS[0] < load.share < SHARE_BOUNDS[1]
-    return load if inside and none - left > LEAVES_LESS else None
+    return load if inside and leaves_less(left, none) else None
+
+
+def rests_enough(share: float) -> bool:
+    """Whether a body rests in so large a share of the samples that a load may hide there."""
+    return share >= RESTS_AT_LEAST
+
+
+def leaves_less(left: float, none: float) -> bool:
+    """Whether a load leaves clearly less than none, mean logarithms both."""
+    return none - left > LEAVES_LESS
 
 
 def _longest(both: list[tuple[Recording, Rests]]) -> list[tuple[Recording, Rests]]:

@@ -23,7 +23,9 @@ from identification.drift.reference_model import ReferenceModel
 from identification.drift.single_log import detectable_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
+from identification.errors import BadSpecification
 from identification.estimation import contradicted
+from identification.estimation.axis_equation import slides_enough
 from identification.estimation.estimates import Events, estimates, normal_samples
 from identification.estimation.fit import (
     are_few,
@@ -66,10 +68,24 @@ from identification.estimation.windowed_run.run_errors import mean_loss
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
 from identification.experiment.information import Information
+from identification.frequency.estimate import Response, is_apart
+from identification.frequency.modes import (
+    Peak,
+    are_there,
+    explains_far_more,
+    fit_modes,
+    is_deep,
+    is_large,
+    is_sharp,
+    swings,
+)
+from identification.frequency.stretches import bands
+from identification.frequency.swinging_load import leaves_less, rests_enough
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.model.size import Size
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_random_walk import shows
@@ -936,6 +952,91 @@ def test_nothing_of() -> None:
 def test_smallest_level() -> None:
     """What is left of the force is a share of friction only where something rubs."""
     assert rubs(1.5e-3, 1.0) and not rubs(0.7e-3, 1.0)
+
+
+def response_of(coherence: float, averages: float) -> Response:
+    """A response of one frequency."""
+    one = np.ones(1)
+    return Response(one, one.astype(np.complex128), coherence * one, averages * one)
+
+
+def test_coherence_seen() -> None:
+    assert response_of(0.6, 100.0).seen[0] and not response_of(0.4, 100.0).seen[0]
+
+
+def test_coherence_sure() -> None:
+    assert response_of(0.9, 100.0).sure[0] and not response_of(0.7, 100.0).sure[0]
+
+
+def test_averages_needed() -> None:
+    """Full coherence of few averages is luck; the same number of stretches is asked of the logs."""
+    assert response_of(0.999, 5.0).seen[0] and not response_of(0.999, 3.2).seen[0]
+    assert bands([5.0, 5.0], [1e-3, 1e-3], 3.0)
+    with pytest.raises(BadSpecification, match=r"3 in .* at least 4 needed"):
+        bands([4.0], [1e-3], 3.0)
+
+
+def test_apart_share() -> None:
+    found = is_apart(np.array([0.008, 0.0125]), np.ones(2))
+    assert found.tolist() == [False, True]
+
+
+def test_points_needed() -> None:
+    """A response of fewer points shows no modes, and is no ground to say that there are none."""
+    for points, shown in ((24, False), (38, True)):
+        f = np.linspace(1.0, 20.0, points)
+        one = Response(
+            f, np.ones(points, dtype=np.complex128), np.full(points, 0.99), np.full(points, 50.0)
+        )
+        assert (fit_modes(one) is not None) is shown
+
+
+def test_mode_gains() -> None:
+    """In units of what is left a point: 1 at least."""
+    assert explains_far_more(175.0, 100.0, 200) and not explains_far_more(148.0, 100.0, 200)
+
+
+def test_mode_share() -> None:
+    assert explains_far_more(1e4, 0.8e4, 10_000) and not explains_far_more(1e4, 0.88e4, 10_000)
+
+
+def test_standing_out() -> None:
+    assert is_large(0.31, 1.0) and not is_large(0.2, 1.0)
+
+
+def test_deep() -> None:
+    assert is_deep(0.48, 1.0) and not is_deep(0.75, 1.0)
+
+
+def test_most_damping() -> None:
+    assert swings(0.24) and swings(-0.24) and not swings(0.375)
+
+
+def test_unsure_peak() -> None:
+    """A frequency that is told to 1 %."""
+    for sd, told in ((0.32, True), (0.5, False)):
+        assert is_sharp(Peak("resonance", Size(40.0, sd), Size(0.02, 0.01))) is told
+
+
+def test_points_around() -> None:
+    assert are_there(3, 4) and not are_there(2, 3)
+    assert not are_there(2, 2)
+
+
+def test_mostly_seen() -> None:
+    assert are_there(12, 20) and not are_there(8, 20)
+
+
+def test_rests_at_least() -> None:
+    assert rests_enough(0.0375) and not rests_enough(0.024)
+
+
+def test_leaves_less() -> None:
+    assert leaves_less(-0.32, 0.0) and not leaves_less(-0.2, 0.0)
+
+
+def test_slides_needed() -> None:
+    assert slides_enough(8, 20) and not slides_enough(20, 7)
 
 
 def test_every_threshold_has_a_test() -> None:

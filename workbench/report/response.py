@@ -8,9 +8,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
-from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.estimate import Response
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
+from identification.thresholds import COHERENCE_SURE
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
@@ -137,7 +138,7 @@ def spectra_line(found: Responded) -> str:
 def response_lines(found: Responded) -> list[str]:
     """All that is said of the curves, a line each."""
     body = found.found.body
-    sure = ranges(body.f, body.seen & (body.coherence > COHERENCE_SURE))
+    sure = ranges(body.f, body.sure)
     return [
         loop_line(found),
         friction_line(found),

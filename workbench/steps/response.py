@@ -13,7 +13,7 @@ from identification.arrays import Array, BoolArray
 from identification.errors import BadModel, NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.frequency.body import body_response
-from identification.frequency.estimate import COHERENCE_SURE, Response, in_series
+from identification.frequency.estimate import Response, in_series
 from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
 from identification.frequency.modes import Modes, Peak, fit_modes
 from identification.frequency.stretches import ComplexArray, hold
@@ -236,7 +236,7 @@ def sure_share(response: Response, upto: float) -> float:
     """Share of the octaves up to a frequency [Hz] at which the response is to be relied on."""
     inside = response.f <= upto
     weight = np.gradient(np.log(response.f))
-    sure = response.seen & (response.coherence > COHERENCE_SURE)
+    sure = response.sure
     return float(np.sum(weight[inside & sure]) / np.sum(weight[inside]))
 
 
@@ -275,7 +275,7 @@ def response_document(found: Responded) -> dict[str, Any]:
 
 
 def _seen(response: Response, unit: str) -> dict[str, Any]:
-    sure = response.seen & (response.coherence > COHERENCE_SURE)
+    sure = response.sure
     return {
         "unit": unit,
         "seen_hz": ranges(response.f, response.seen),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.estimate import Response
 from identification.frequency.machine import body_by_force, machine_responses
 from identification.frequency.stretches import hold
 from tests.identification.frequency.linear_loop import H, controller, logged, true_position
@@ -13,7 +13,7 @@ from tests.identification.frequency.linear_loop import H, controller, logged, tr
 
 def off(found: Response, truth: object, low: float = 0.0) -> tuple[float, float, int]:
     """Error [dB, deg] that a twentieth of the sure points exceed, and how many points these are."""
-    sure = found.seen & (found.coherence > COHERENCE_SURE) & (found.f > low)
+    sure = found.sure & (found.f > low)
     error = found.H[sure] / np.asarray(truth)[sure]
     return (
         float(np.quantile(np.abs(20 * np.log10(np.abs(error))), 0.95)),
@@ -58,7 +58,7 @@ def test_noise_round_the_loop_bends_the_curve_without_the_instrument() -> None:
     if np.any(inside):
         error = np.abs(by_reference.H / truth)[inside]
         assert np.median(np.abs(20 * np.log10(error))) < 1.5
-    slow = (f < 10.0) & by_reference.seen & (by_reference.coherence > COHERENCE_SURE)
+    slow = (f < 10.0) & by_reference.sure
     error = np.abs(by_reference.H / truth)[slow]
     assert slow.sum() > 20 and np.median(np.abs(20 * np.log10(error))) < 0.5
 

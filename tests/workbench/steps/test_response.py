@@ -12,7 +12,7 @@ import workbench as wb
 from benchmarks.response_rig import Machine, gains, machine, record
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
-from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.estimate import Response
 from identification.frequency.swinging_load import Rests, swinging_load
 from identification.log import Log
 from identification.model.estimates import Estimate
@@ -83,7 +83,7 @@ def responded(one: Machine, left_in: str | None = None) -> Responded:
 
 def near(found: Response, one: Machine) -> tuple[float, int]:
     """Share of the sure points within 1 dB and 5 degrees of the truth, and how many are sure."""
-    sure = found.seen & (found.coherence > COHERENCE_SURE)
+    sure = found.sure
     off = found.H[sure] / one.truth(found.f[sure])
     good = (np.abs(20 * np.log10(np.abs(off))) < 1) & (np.abs(np.degrees(np.angle(off))) < 5)
     return float(np.mean(good)), int(sure.sum())
