@@ -32,7 +32,8 @@ class Schedule:
     """A law at each point of `at`, and beside it what is fed forward of friction there.
 
     over: "place", the reference's, so that the table is no feedback of its own; "load", the size of
-    the force before; "direction", from -1 to 1. at: (k,) [m, N, -], rising; laws: of one period;
+    the force that was fed forward the sample before, without a feed-forward of the force itself;
+    "direction", from -1 to 1. at: (k,) [m, N, -], rising; laws: of one period;
     friction: F_cp, F_cn [N], F_vp, F_vn [N s/m] of a feed-forward, (k, 4); forget [s]: in which
     time what was not carried out is forgotten; span: speed [m/s] from which a direction counts in
     full.

@@ -283,7 +283,10 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         s.held[R_MOVED] = aim
     acts = c.ratio == 1 or s.turn[0] == 0
     if c.position == SCHEDULED_LAW and acts:
-        look_up(c, s, aim, c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F)
+        if c.friction == FEED_FORWARD:
+            look_up(c, s, aim, s.last[ADDED])
+        else:
+            look_up(c, s, aim, c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F)
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
     if c.friction == FEED_FORWARD:
@@ -311,6 +314,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         position_moved(c, s, y, asked, taken)
     by_friction = c.friction != NO_COUNTERMEASURE and c.friction != FEED_FORWARD
     by_load = c.position == SCHEDULED_LAW and c.over == OVER_LOAD
+    by_load = by_load and c.friction != FEED_FORWARD
     if c.k_a != 0.0 and (by_friction or by_load):
         s.held[U_BEFORE] = u
     if c.ratio > 1:

@@ -38,7 +38,7 @@ ROBUST_ONLY = (
     "draws", "probability", "staircase", "standstill", "tracking", "overshoot", "force", "machine",
     "where", "seed",
 )  # fmt: skip
-NOT_WITH_ROBUST = ("structures", "response_file")
+NOT_WITH_ROBUST = ("structures", "response_file", "over")
 NOT_FOR_VELOCITY = (
     *(name for name in ROBUST_ONLY if name != "overshoot"),
     "robust", "poles", "auxiliary", "source", "card", "effects", *NOT_WITH_ROBUST,
@@ -67,6 +67,10 @@ class DesignOptions:
         " model's own]",
         "--response", metavar="FILE",
     )  # fmt: skip
+    over: Literal["place", "load", "direction"] | None = option(
+        "Also PID and P-PI as a table over this, where the model's friction changes with it.",
+        "--schedule",
+    )
     source: Literal["physical", "arx"] | None = option(
         "Plant to design on.  [default: physical where the mass is identified]", "--from"
     )
@@ -147,6 +151,7 @@ def _nominal(given: DesignOptions, model: "Model", asked: "Asked") -> int:
     from workbench.report.reports import design_view
     from workbench.report.view import show
     from workbench.steps.design import design, effort_limit
+    from workbench.steps.schedule import scheduled
 
     goals = Goals(given.modulus, given.delay, effort_limit(model))
     with results("design", given.out, without_design(model, given.card)) as folder:
@@ -155,6 +160,8 @@ def _nominal(given: DesignOptions, model: "Model", asked: "Asked") -> int:
                 model, asked, goals=goals, source=given.source, period=given.design_period,
                 structures=given.structures or None,
             )  # fmt: skip
+            if given.over:
+                found = scheduled(model, found, given.over, asked, goals)
         view = design_view(found, model.rotary)
         view.write(folder)
     then = after_design(found, given.model_file, asked.dominant is not None, _kept(given))
@@ -244,6 +251,7 @@ def _kept(given: DesignOptions) -> tuple[str, ...]:
     period = given.design_period
     return (
         *(word for one in given.structures for word in ("--structure", one)),
+        *(("--schedule", given.over) if given.over else ()),
         *(("--response", str(given.response_file)) if given.response_file else ()),
         *(() if given.integrator else ("--no-integrator",)),
         *(("--from", given.source) if given.source else ()),

@@ -55,6 +55,10 @@ class ExportOptions:
         " without]",
         "--compensator/--no-compensator", default=None,
     )  # fmt: skip
+    schedule: bool | None = option(
+        "With its gain schedule.  [default: where the design recommends it]",
+        "--schedule/--no-schedule", default=None,
+    )  # fmt: skip
     precision: Literal["double", "single"] = option(
         f"Of the numbers ({', '.join(SINGLE)}).", default="double"
     )
@@ -103,7 +107,7 @@ def command(given: ExportOptions) -> int:
     units; what a table cannot hold is said in newtons.
     """
     if _is_of_model(given.file, given.targets):
-        refuse_given(NO_MEANING, "controller", "compensator", "precision")
+        refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
         return _tables(given)
     refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
     from workbench.documents.design_read import read_design
@@ -117,7 +121,8 @@ def command(given: ExportOptions) -> int:
         raise click.UsageError(f"--precision single is for {', '.join(SINGLE)}, not {wide[0]}.")
     found = read_design(given.file)
     what = exported(
-        found, given.controller, compensated=given.compensator, precision=precision,
+        found, given.controller, compensated=given.compensator, scheduled=given.schedule,
+        precision=precision,
         name=given.name,
     )  # fmt: skip
     checked = validation_line(found, given.file)

@@ -20,6 +20,7 @@ from design.loop_frequencies import LoopFrequencies
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
+from design.schedule import Over, Schedule
 from design.series_filters import SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
@@ -32,6 +33,7 @@ From = Literal["physical", "arx"]
 Structure = Literal["rst", "pid", "p-pi"]
 DESIGNED_STRUCTURES: tuple[Structure, ...] = ("rst", "pid", "p-pi")
 Recommended = Literal["rst", "pid", "p-pi", "none"]
+LEAST_SPAN = 1e-3  # m/s, from which a direction counts in full where no feed-forward says
 
 
 @dataclass(frozen=True)
@@ -170,13 +172,42 @@ class Recommendation:
 
 
 @dataclass(frozen=True)
+class ScheduledController:
+    """A controller at each point of a schedule; recommended: whether it clearly wins over the fixed
+    one, and why, in one line with numbers."""
+
+    points: tuple[Controller, ...]
+    recommended: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class GainSchedule:
+    """Controllers over the place [m], the load [N] or the direction: at (k,), and the friction
+    there, F_cp, F_cn [N], F_vp, F_vn [N s/m], (k, 4), that a P-PI feeds forward."""
+
+    over: Over
+    at: tuple[float, ...]
+    friction: tuple[tuple[float, float, float, float], ...]
+    controllers: Mapping[Structure, ScheduledController]
+
+    def of(self, name: Structure, fixed: Controller, command: Command) -> Schedule:
+        """The schedule of a controller as its drive runs it; fixed: the one without."""
+        laws = tuple(one.law(command) for one in self.controllers[name].points)
+        forget = fixed.cascade.T_n if fixed.cascade else 1.0 / fixed.dominant[0]
+        ahead = fixed.feed_forward
+        span = ahead.band if ahead else LEAST_SPAN
+        return Schedule(self.over, self.at, laws, self.friction, forget, span)
+
+
+@dataclass(frozen=True)
 class Design:
     """Controllers of one machine; one may be None with its reason in `refused`.
 
     recommended: the controller that keeps every goal, "none" where none does. command: what the
     drive takes, present: the controller that it has now, recommendation: the same with its reason;
     None in older files. read: what to say of its file, a line for each value in another unit than
-    ours.
+    ours. schedule: the controllers over place, load or direction, where that was asked for.
     """
 
     card: str
@@ -195,6 +226,7 @@ class Design:
     recommendation: Recommendation | None = None
     read: tuple[str, ...] = field(default=(), compare=False)
     p_pi: Controller | None = None
+    schedule: GainSchedule | None = None
 
     @property
     def controllers(self) -> dict[str, Controller]:

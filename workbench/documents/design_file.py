@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from design.cascade import CascadeGains
 from design.pid import PIDGains
+from design.schedule import Over
 from design.series_filters import FilterKind, SeriesFilter
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import friction_units, shown
@@ -16,9 +17,11 @@ from workbench.documents.design import (
     Controller,
     Design,
     From,
+    GainSchedule,
     MarginValues,
     Recommendation,
     Recommended,
+    Structure,
 )
 from workbench.documents.drive import (
     Command,
@@ -130,6 +133,36 @@ class ControllerFile:
 
 
 @dataclass(frozen=True)
+class ScheduledFile:
+    """`ScheduledController` as a result has it."""
+
+    points: tuple[ControllerFile, ...]
+    recommended: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class SchedulePoint:
+    """Where a row of a schedule holds, and the friction that a P-PI feeds forward there."""
+
+    at: Estimate
+    F_cp: Estimate
+    F_cn: Estimate
+    F_vp: Estimate
+    F_vn: Estimate
+
+
+@dataclass(frozen=True)
+class ScheduleFile:
+    """`GainSchedule` as a result has it."""
+
+    over: Over
+    points: tuple[SchedulePoint, ...]
+    pid: ScheduledFile | None = None
+    p_pi: ScheduledFile | None = None
+
+
+@dataclass(frozen=True)
 class _CompensatorFile:
     N_c: Estimate
     e_T: Estimate
@@ -157,6 +190,7 @@ class DesignFile:
     present: PresentFile | None = None
     recommendation: Recommendation | None = None
     p_pi: ControllerFile | None = None
+    schedule: ScheduleFile | None = None
     schema: Literal["design/2"] = "design/2"
 
 
@@ -222,7 +256,34 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
         command=None if found.command is None else command_file(found.command, drive),
         present=None if found.present is None else present_file(found.present, limit, drive),
         recommendation=found.recommendation,
+        schedule=None if found.schedule is None else _schedule_file(found, found.schedule, units),
     )
+
+
+def _schedule_file(found: Design, table: GainSchedule, units: FileUnits) -> ScheduleFile:
+    names = schedule_units(table.over, units)
+    rows = [(at, *friction) for at, friction in zip(table.at, table.friction, strict=True)]
+
+    def of(name: Structure) -> ScheduledFile | None:
+        one = table.controllers.get(name)
+        if one is None:
+            return None
+        points = [_controller_file(p, found.command, found.output, units) for p in one.points]
+        return ScheduledFile(tuple(points), one.recommended, one.why)
+
+    points = tuple(
+        SchedulePoint(*(Estimate(v, unit) for v, (_, unit) in zip(row, names, strict=True)))
+        for row in rows
+    )
+    return ScheduleFile(table.over, points, of("pid"), of("p-pi"))
+
+
+def schedule_units(over: Over, units: FileUnits) -> list[tuple[str, str]]:
+    """Names and units of a schedule's row."""
+    force, friction = units.drive.force, units.friction
+    at = {"place": units.length, "load": force, "direction": "1"}[over]
+    viscous = [(name, friction[name]) for name in ("F_vp", "F_vn")]
+    return [("at", at), ("F_cp", force), ("F_cn", force), *viscous]
 
 
 def _gains_file(gains: PIDGains, units: FileUnits) -> GainsFile:

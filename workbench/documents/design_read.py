@@ -14,7 +14,15 @@ from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import converted, in_unit
 from workbench.documents.contradictions import refuse_apart, refuse_unequal
-from workbench.documents.design import CompensatorValues, Controller, Design, Linear, Structure
+from workbench.documents.design import (
+    CompensatorValues,
+    Controller,
+    Design,
+    GainSchedule,
+    Linear,
+    ScheduledController,
+    Structure,
+)
 from workbench.documents.design_file import (
     DESIGN_SCHEMA,
     CascadeFile,
@@ -23,11 +31,13 @@ from workbench.documents.design_file import (
     FeedForwardFile,
     FileUnits,
     GainsFile,
+    ScheduleFile,
     SeriesFile,
     as_file,
     cascade_units,
     feed_forward_units,
     gain_units,
+    schedule_units,
     units_of,
 )
 from workbench.documents.drive import (
@@ -151,7 +161,33 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
         command=None if found.command is None else command_of(found.command, found.motion),
         present=None if found.present is None else present_of(found.present, drive, "present"),
         recommendation=found.recommendation,
+        schedule=None if found.schedule is None else _schedule(found.schedule, units),
     )
+
+
+def _schedule(found: ScheduleFile, units: FileUnits) -> GainSchedule:
+    """The schedule; raises BadModel where a controller has not one at every point."""
+    names = schedule_units(found.over, units)
+    rows = [
+        [number(getattr(one, name), unit, f"schedule.points[{k}].{name}") for name, unit in names]
+        for k, one in enumerate(found.points)
+    ]
+    controllers = dict[Structure, ScheduledController]()
+    for name, written in (("pid", found.pid), ("p-pi", found.p_pi)):
+        if written is None:
+            continue
+        if len(written.points) != len(rows):
+            raise BadModel(
+                f"[schedule.{name}] {len(written.points)} controllers at {len(rows)} points; run"
+                " 'workbench design' again"
+            )
+        points = [_controller(one, units, f"schedule.{name}") for one in written.points]
+        structure: Structure = "pid" if name == "pid" else "p-pi"
+        controllers[structure] = ScheduledController(
+            tuple(points), written.recommended, written.why
+        )
+    friction = tuple((row[1], row[2], row[3], row[4]) for row in rows)
+    return GainSchedule(found.over, tuple(row[0] for row in rows), friction, controllers)
 
 
 def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller:

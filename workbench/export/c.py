@@ -76,6 +76,7 @@ def c_files(what: Exported) -> dict[str, str]:
         "samples": len(test.outputs),
         "states": [_declared_state(one, program.name) for one in program.states],
     }
+    reset = [line for one in program.states for line in _reset(one, c)]
     source = filled(
         "controller.c",
         **common,
@@ -91,7 +92,8 @@ def c_files(what: Exported) -> dict[str, str]:
             if one.array and any(one.at_rest)
         ],
         helpers=list(_helpers(what, c)),
-        reset=[line for one in program.states for line in _reset(one, c)],
+        reset=reset,
+        loops=any(line.startswith("for (j ") for line in reset),
         locals=_declared_locals((*program.locals, Variable(program.output.name)), c),
         step=c.lines(program.statements),
         test_inputs=rows(

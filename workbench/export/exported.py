@@ -16,7 +16,7 @@ from design.program_run import SelfTest, self_test
 from design.servo import Compensation
 from identification.errors import BadModel
 from workbench.cards.parameter_units import shown
-from workbench.documents.design import Design
+from workbench.documents.design import Design, Structure
 from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop
 
@@ -53,23 +53,25 @@ def exported(
     controller: str | None = None,
     *,
     compensated: bool | None = None,
+    scheduled: bool | None = None,
     precision: Precision = "double",
     name: str | None = None,
 ) -> Exported:
     """The controller of the design, by default the recommended one, as a program.
 
     controller: "rst", "pid", "p-pi" or "present". compensated: with the friction compensator, by
-    default as recommended, and beside all others but the present one and a P-PI. Raises BadModel
-    where the design has no such controller, recommends none, or is of a version that does not say
-    what the drive runs.
+    default as recommended, and beside all others but the present one and a P-PI. scheduled: with
+    its gain schedule, by default where that is recommended. Raises BadModel where the design has no
+    such controller or schedule, recommends none, or is of a version that does not say what the
+    drive runs.
     """
     chosen = controller or found.recommended
     if chosen == "none":
         have = ", ".join(found.controllers)
         raise BadModel(f"the design recommends no controller; choose one by --controller ({have})")
-    loop = _loop_of(found, chosen)
+    loop = _with_schedule(found, chosen, _loop_of(found, chosen), scheduled)
     if compensated is None:
-        compensated = _compensated(found, chosen)
+        compensated = _compensated(found, chosen) and loop.schedule is None
     if compensated and isinstance(loop.compensation, FeedForward):
         raise BadModel("a P-PI cascade feeds friction forward, and takes no compensator beside it")
     if compensated:
@@ -87,6 +89,24 @@ def exported(
         loop.k_a or 0.0,
     )
     return Exported(program, loop, found, chosen, _remarks(found, chosen, loop), precision)
+
+
+def _with_schedule(
+    found: Design, chosen: str, loop: DrivenLoop, scheduled: bool | None
+) -> DrivenLoop:
+    """The loop with the gain schedule of its controller, where that is asked or recommended."""
+    table, one = found.schedule, found.controllers.get(chosen)
+    own = next((s for n, s in table.controllers.items() if n == chosen), None) if table else None
+    if scheduled is None:
+        scheduled = own is not None and own.recommended
+    if not scheduled:
+        return loop
+    if table is None or own is None or one is None or found.command is None:
+        raise BadModel(
+            f"the design has no gain schedule of {chosen!r}: workbench design MODEL --schedule"
+        )
+    structure: Structure = "pid" if chosen == "pid" else "p-pi"
+    return replace(loop, schedule=table.of(structure, one, found.command))
 
 
 def _compensated(found: Design, chosen: str) -> bool:
@@ -137,6 +157,10 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
         out.append(
             "compensator: F_sp and F_sn are what breakaway needs beyond sliding, F_cp, F_cn 0"
         )
+    if loop.schedule is not None and found.schedule is not None:
+        own_of = {str(name): one for name, one in found.schedule.controllers.items()}
+        over = f"scheduled over the {loop.schedule.over}, {len(loop.schedule.at)} points"
+        out.append(f"{over}: {own_of[chosen].why}")
     if found.command.limit is None:
         out.append("no limit of the command is known: it is not clipped")
     if beside and found.compensator.assumed:

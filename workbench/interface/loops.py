@@ -18,6 +18,7 @@ from workbench.steps.validate import Validation
 if TYPE_CHECKING:
     import pandas as pd
 
+    from design.schedule import Over
     from workbench.report.view import View
 
 
@@ -57,6 +58,16 @@ class DesignResult(Result):
         plant = self.design.plant
         feedback, forward = controller_to_control(there[wanted].rst)
         return ControlLoop(to_control(plant.A, plant.B, plant.h), feedback, forward)
+
+    def scheduled(self, over: "Over") -> "DesignResult":
+        """The same with a gain schedule of its PID and P-PI over "place", "load" or "direction", as
+        `workbench design --schedule`.
+
+        Raises BadModel where the model's friction does not change over it.
+        """
+        from workbench.steps.schedule import scheduled
+
+        return DesignResult(scheduled(self.model, self.design, over), self.model)
 
     def _made(self) -> "View":
         from workbench.report.reports import design_view

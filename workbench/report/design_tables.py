@@ -81,6 +81,7 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     p = found.plant
     others = other_lines(found)
     lines = [*others, MARGINS_SAID, f"plant: {p.source}, {p.why}", *loop_lines(found, rotary)]
+    lines += [*schedule_lines(found, rotary), *schedule_rows(found, rotary)]
     lines += [*refused_lines(found), *missed_lines(found), *set_point_lines(found)]
     return [*lines, *(f"note: {line}" for line in found.remarks)]
 
@@ -148,6 +149,48 @@ def cascade_lines(found: Design, rotary: bool = False) -> list[str]:
             f" {number(one.acceleration or 0.0)} {units.position}/s^2"
         )
     return lines
+
+
+def schedule_lines(found: Design, rotary: bool = False) -> list[str]:
+    """Of each controller with a gain schedule whether to take it, and why."""
+    table = found.schedule
+    if table is None:
+        return []
+    unit = _unit_over(table.over, rotary)
+    span = f"{len(table.at)} points from {number(table.at[0])} to {number(table.at[-1])}{unit}"
+    return [
+        f"{name.upper()} over {table.over}, {span}: {one.why}"
+        for name, one in table.controllers.items()
+    ]
+
+
+def schedule_rows(found: Design, rotary: bool = False) -> list[str]:
+    """The gains and the friction at each point of a schedule."""
+    table, out = found.schedule, list[str]()
+    if table is None:
+        return out
+    units, over = shown(rotary), _unit_over(table.over, rotary)
+    for name, one in table.controllers.items():
+        for at, point, friction in zip(table.at, one.points, table.friction, strict=True):
+            said = ""
+            if (c := point.cascade) is not None:
+                said = (
+                    f"Kv = {number(c.k_v)} 1/s, Kp = {number(c.k_p)} {units.force} s/"
+                    f"{units.position}, Tn = {number(1e3 * c.T_n)} ms, friction"
+                    f" {number(friction[0])} and {number(friction[1])} {units.force}"
+                )
+            elif (g := point.gains) is not None:
+                said = (
+                    f"k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s"
+                )
+            out.append(f"{name.upper()} at {number(at)}{over}: {said or 'R, S, T in design.json'}")
+    return out
+
+
+def _unit_over(over: str, rotary: bool) -> str:
+    """The unit of what a schedule goes over, with a space before it."""
+    units = shown(rotary)
+    return {"place": f" {units.position}", "load": f" {units.force}"}.get(over, "")
 
 
 def refused_lines(found: Design) -> list[str]:
@@ -251,6 +294,8 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         listed(other_lines(found)),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),
+        listed(schedule_lines(found, rotary)),
+        *map(more, schedule_rows(found, rotary)),
         listed(refused_lines(found)),
         listed(missed_lines(found)),
         instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),

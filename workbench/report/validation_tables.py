@@ -5,7 +5,7 @@ from workbench.cards.readable import length
 from workbench.output import Row
 from workbench.report.notes import notes
 from workbench.screen import Part, listed, more, tabled
-from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures
 from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
 from workbench.steps.validate import Validation
 
@@ -50,6 +50,8 @@ def _shown(name: str) -> str:
     alone = name.removesuffix(COMPENSATED)
     if alone == PRESENT:
         return PRESENT
+    if name.endswith(SCHEDULED):
+        return f"{name.removesuffix(SCHEDULED).upper()}+table"
     return alone.upper() if alone == name else f"{alone.upper()}+comp"
 
 

@@ -10,13 +10,14 @@ from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
+from design.schedule import Schedule
 from design.servo import Compensation, SecondMass, Servo, ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.plant import Actuator, Motor, Plant
-from workbench.documents.design import Controller, Design
+from workbench.documents.design import Controller, Design, Structure
 from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import command_of
@@ -40,6 +41,7 @@ class DrivenLoop:
     k_a: float | None = None
     direct: bool = False
     acceleration: float | None = None
+    schedule: Schedule | None = None
 
     @property
     def h(self) -> float:
@@ -59,6 +61,7 @@ class DrivenLoop:
             direct=self.direct,
             rate=self.rate,
             acceleration=self.acceleration,
+            schedule=self.schedule,
         )
 
 
@@ -78,6 +81,15 @@ def driven_loop(
         k_a=command.force_per_command,
         acceleration=one.acceleration,
     )
+
+
+def scheduled_loop(model: Model, found: Design, name: Structure) -> DrivenLoop:
+    """A controller of a design with its schedule, as its drive runs it."""
+    assert found.schedule is not None
+    one = found.controllers[name]
+    command = found.command or command_of(model, found.force)
+    table = found.schedule.of(name, one, command)
+    return replace(driven_loop(model, found, one), schedule=table)
 
 
 def present_loop(machine: Model, now: Present) -> DrivenLoop:
@@ -120,7 +132,7 @@ def run_driven(
     nothing for it to drive, or the other way round.
     """
     plant = replace(machine.simulated, effects=in_the_loop(machine))
-    return run_plant(machine, plant, loop, r, _noise(machine, len(r), rng))
+    return run_plant(machine, plant, loop, r, noise_of(machine, len(r), rng))
 
 
 def run_plant(
@@ -192,7 +204,8 @@ def limit_on(machine: Model, loop: DrivenLoop) -> float | None:
     return min((one for one in (loop.limit, own) if one is not None), default=None)
 
 
-def _noise(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise | None:
+def noise_of(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise | None:
+    """The noise of a machine's sensors, (n,) each; None without a generator."""
     if rng is None:
         return None
     return LoopNoise.draw(n, machine.fit.noise_y, machine.fit.noise_F, rng)

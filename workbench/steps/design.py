@@ -44,6 +44,7 @@ from workbench.steps.linear_loop import (
     swings_of,
     unknown_viscous,
 )
+from workbench.steps.local_friction import asked_for
 from workbench.steps.recommend import recommended
 
 FINEST = 20  # times faster than its logs that a controller may be designed
@@ -380,6 +381,11 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
         out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.rotary))
     if not model.fit.adequate:
         out.append("the model leaves more than noise; check the loop on the machine with care")
+    if asks := [over for over in asked_for(model) if over != "direction"]:
+        what = " and ".join(asks)
+        out.append(
+            Aside(f"friction changes with {what}: --schedule {asks[0]} tries a table of gains")
+        )
     if model.resonance is not None:
         out += beside_resonance(model, found, chosen.controller)
     return out

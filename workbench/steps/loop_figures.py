@@ -36,6 +36,7 @@ LAST_DWELL = 10.0  # s
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
 STANDSTILL_SECONDS = 2.0  # s at rest over which the noise in the command is taken
 COMPENSATED = " + compensator"  # behind a controller's name
+SCHEDULED = " + schedule"  # the same
 PRESENT = "present"  # the controller that the machine has now
 ALMOST = 0.9  # of a limit, from which a loop is reported to come near it
 

@@ -9,7 +9,8 @@ from identification.errors import BadModel
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import driven_loop
+from workbench.steps.clear_win import contest
+from workbench.steps.closed_loop import driven_loop, present_loop
 from workbench.steps.loop_figures import (
     COMPENSATED,
     PRESENT,
@@ -33,7 +34,9 @@ def recommended(model: Model, found: Design) -> Recommendation:
     Of those that keep every goal: one whose loop keeps the limits of `validate` and comes to rest,
     where there is one, and of these the one that is better in the mean of standstill error,
     settling time, peak force and error along the smooth reference; where they are as good, the one
-    with the larger modulus margin. The compensator only where it is clearly better with it.
+    with the larger modulus margin. The compensator only where it is clearly better with it. The
+    present controller is to be kept where it is as good, or where the one that is taken does not
+    clearly win over it on the machines that the model's errors allow.
     """
     kept = [
         name
@@ -55,8 +58,25 @@ def recommended(model: Model, found: Design) -> Recommendation:
     taken = both[1] if better else alone
     keep = _present_as_good(taken, figures)
     kept_said = "; the present controller is as good, keep it" if keep else ""
+    if not keep and (unclear := _no_clear_win(model, found, alone, better)):
+        keep, kept_said = True, f"; {unclear}: no clear win over the present controller, keep it"
     why = f"{said}: {_decisive(alone, found, figures)}{kept_said}"
     return Recommendation(alone, better, why, keep)
+
+
+def _no_clear_win(model: Model, found: Design, name: Structure, compensated: bool) -> str:
+    """Why a controller does not clearly win over the present one, "" where it does or there is
+    none that can be simulated."""
+    if model.present is None:
+        return ""
+    beside = found.compensator.value if compensated else None
+    try:
+        now = present_loop(model, model.present)
+        loop = driven_loop(model, found, found.controllers[name], beside)
+        against = contest(model, found.force, loop, now)
+    except BadModel:  # `validate` says why
+        return ""
+    return "" if against.clear else against.words
 
 
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:

@@ -13,12 +13,13 @@ from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.versions import versions
-from workbench.steps.closed_loop import driven_loop, effects_left_out
+from workbench.steps.closed_loop import DrivenLoop, driven_loop, effects_left_out, scheduled_loop
 from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (
     ALMOST,
     COMPENSATED,
     PRESENT,
+    SCHEDULED,
     WEAK,
     Limits,
     LoopFigures,
@@ -37,9 +38,9 @@ from workbench.steps.recommend import in_thousandths, reasons
 class Validation:
     """Every controller on every plant (by names like "rst", then "model", "plant").
 
-    The loop that decides is without the compensator; "rst + compensator" is the same with it,
-    "present" the controller that the machine has now. why: what speaks for the tested one. design:
-    digest of the design.
+    The loop that decides is without the compensator; "rst + compensator" is the same with it, "pid
+    + schedule" with its gain schedule, "present" the controller that the machine has now. why: what
+    speaks for the tested one. design: digest of the design.
     """
 
     card: str
@@ -82,19 +83,20 @@ def validate(
             continue
         if now is not None:
             figures.setdefault(PRESENT, {})[place], traces[PRESENT, place] = now
-    arx = found.plant.source == "arx"
+    arx, loops = found.plant.source == "arx", dict[str, DrivenLoop]()
     for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
         for name, controller in found.controllers.items():
             if compensator is not None and not takes_compensator(found, name):
                 continue
-            loop = driven_loop(model, found, controller, compensator)
-            reference = references(model, found, loop.h)
-            figures[name + suffix] = {}
-            for place, machine in plants.items():
-                run = loop_runs(machine, loop, reference, rng)
-                traces[name + suffix, place] = run
-                one = loop_figures(machine, loop, run, limits, arx=arx)
-                figures[name + suffix][place] = one
+            loops[name + suffix] = driven_loop(model, found, controller, compensator)
+    for each in found.schedule.controllers if found.schedule else ():
+        loops[each + SCHEDULED] = scheduled_loop(model, found, each)
+    for name, loop in loops.items():
+        reference = references(model, found, loop.h)
+        figures[name] = {}
+        for place, machine in plants.items():
+            traces[name, place] = run = loop_runs(machine, loop, reference, rng)
+            figures[name][place] = loop_figures(machine, loop, run, limits, arx=arx)
     judged = tested_of(found)
     first = {name: places["model"] for name, places in figures.items()}
     with_it = found.recommendation is not None and found.recommendation.compensator
@@ -150,7 +152,7 @@ def _remarks(
     taken = judged + (COMPENSATED if with_it else "")
     for name, places in figures.items():
         for place, one in places.items():
-            alone = name.removesuffix(COMPENSATED)
+            alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
             called = name if name == PRESENT else name.replace(alone, alone.upper(), 1)
             seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
             told = (f"{called} on the {place}: {line}" for line in seen)

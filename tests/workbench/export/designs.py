@@ -8,14 +8,18 @@ import numpy as np
 from design.loop import LoopNoise
 from design.servo import ServoRun, simulate_servo
 from identification.arrays import Array
+from identification.model.estimates import Estimate
+from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.export.exported import Exported
 from workbench.steps.design import design
+from workbench.steps.schedule import scheduled
 
 ACTUATOR = Actuator(19530.0, 10405.0)
+RUBS = Karnopp(4.0, 15.0, 16.0, 40.0, 42.0, 3e-3, -3e-3, 18.0, -19.0)
 START = 0.03  # m, where the simulated machine stands before its first sample
 
 
@@ -30,7 +34,20 @@ class Case:
 @cache
 def case(name: str) -> Case:
     """The design of a machine: "paper_table1" to 3 above a force loop (two-rate), "limited" with a
-    limit of its command, "emps" with a motor, "cascade" a P-PI for the same."""
+    limit of its command, "emps" with a motor, "cascade" a P-PI for the same, "schedule" PID and
+    P-PI over the place, where its friction grows along the travel."""
+    if name == "schedule":
+        grows = {"position_dependent_friction": {
+            "c1": Estimate(100.0, "N/m", 1.0, 98.0, 102.0), "period": Estimate(0.05, "m"),
+        }}  # fmt: skip
+        model = model_of(RUBS, k_a=20.0)
+        model = replace(
+            model, effects=grows, fit=replace(model.fit, noise_y=3e-7),
+            rig=replace(model.rig, control_limit=10.0),
+            log=(replace(model.log[0], speed=0.3, force_peak=90.0),),
+        )  # fmt: skip
+        found = design(model, structures=("pid", "p-pi"))
+        return Case(model, scheduled(model, found, "place"))
     if name == "cascade":
         model = case("emps").model
         return Case(model, design(model, structures=("p-pi",)))

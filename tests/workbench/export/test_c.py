@@ -164,3 +164,17 @@ def test_the_code_of_a_cascade_gives_the_simulation_in_every_bit(
     code = library(what, tmp_path, build)
     assert code.tested() == 0
     assert np.array_equal(driven(code, inputs), run.u)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("build", list(BUILDS))
+@pytest.mark.parametrize("controller", ["pid", "p-pi"])
+def test_the_code_of_a_schedule_gives_the_simulation_in_every_bit(
+    build: str, controller: str, tmp_path: Path
+) -> None:
+    one = case("schedule")
+    what = exported(one.design, controller, scheduled=True)
+    run, inputs = simulated(one, what, FEWER)
+    code = library(what, tmp_path, build)
+    np.testing.assert_array_equal(driven(code, inputs), run.u)
+    assert code.tested() == 0

@@ -86,3 +86,18 @@ def test_the_block_of_a_cascade_gives_what_the_simulation_gave() -> None:
         block(r_ref=r, y=y)
         found.append(block.values["u"])
     assert np.max(np.abs(np.array(found) - run.u)) < 1e-9 * np.max(np.abs(run.u))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["pid", "p-pi"])
+def test_the_block_of_a_schedule_gives_what_the_simulation_gave(controller: str) -> None:
+    one = case("schedule")
+    what = exported(one.design, controller, scheduled=True)
+    run, inputs = simulated(one, what, 4000)
+    (source,) = st_file(what).values()
+    block = Blocks(source).made(f"FB_{what.program.name}")
+    found = []
+    for r, y in inputs.tolist():
+        block(r_ref=r, y=y)
+        found.append(block.values["u"])
+    assert np.max(np.abs(np.array(found) - run.u)) < 1e-9 * np.max(np.abs(run.u))
