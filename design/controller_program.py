@@ -277,5 +277,5 @@ def _constant_meanings(units: ProgramUnits) -> Mapping[str, tuple[str, str]]:
         "F_most": (force, "most that is fed forward"),
         "h": ("s", "period of the position controller"),
         "decay": ("1", "of what was not carried out, a sample later"),
-        "span": (units.position, "step of the reference from which its direction is told"),
+        "span": (units.position, "step of the reference from which its direction is known"),
     }
