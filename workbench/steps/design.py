@@ -384,7 +384,9 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
     if asks := [over for over in asked_for(model) if over != "direction"]:
         what = " and ".join(asks)
         out.append(
-            Aside(f"friction changes with {what}: --schedule {asks[0]} tries a table of gains")
+            MinorRemark(
+                f"friction changes with {what}: --schedule {asks[0]} tries a table of gains"
+            )
         )
     if model.resonance is not None:
         out += beside_resonance(model, found, chosen.controller)
