@@ -31,13 +31,13 @@ class Machine:
     whole: a fit follows its runs as a whole."""
 
     run: Callable[[Array], LoopRun]
-    told: Callable[[LoopRun], Information]
+    information: Callable[[LoopRun], Information]
     whole: bool
 
-    def chance_penalty(self, told: Information) -> float:
+    def chance_penalty(self, information: Information) -> float:
         """What it costs that a part of a run is sensitive to chance."""
         return PER_CHAOTIC * max(
-            told.loose - (CHAOTIC_WHOLE if self.whole else CHAOTIC_WINDOWS), 0.0
+            information.loose - (CHAOTIC_WHOLE if self.whole else CHAOTIC_WINDOWS), 0.0
         )
 
 
@@ -47,18 +47,18 @@ def evaluated(
     """Extremes over all machines along r [m], (n,), what each run identifies, and what happens in
     it; None where one cannot be followed."""
     worst: Peaks | None = None
-    told, events = [], []
+    information, events = [], []
     try:
         for one in machines:
             run = one.run(r)
             own = peaks(run)
             worst = own if worst is None else worst.or_more(own)
-            told.append(one.told(run))
+            information.append(one.information(run))
             events.append(events_of([run.mode], [run.v]))
     except UserError:
         return None
     assert worst is not None
-    return worst, told, events
+    return worst, information, events
 
 
 def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
@@ -70,19 +70,19 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
         found = evaluated(machines, r)
         if found is None:
             return None
-        worst, told, events = found
-        places = _places(told[0], asked)
+        worst, information, events = found
+        places = _places(information[0], asked)
         values = [
             worth(own, places) - one.chance_penalty(own) - PER_EVENT * missing(happens, asked)
-            for one, own, happens in zip(machines, told, events, strict=True)
+            for one, own, happens in zip(machines, information, events, strict=True)
         ]
-        return Evaluated(worst, min(values), told)
+        return Evaluated(worst, min(values), information)
 
     def joint(seen: Sequence[Evaluated]) -> Joint:
-        told = information_by_segment(seen)
-        places = _places(told[0][0], asked)
-        matrices = stacked(told)
-        first = [one[0] for one in told]
+        information = information_by_segment(seen)
+        places = _places(information[0][0], asked)
+        matrices = stacked(information)
+        first = [one[0] for one in information]
 
         def measure(times: Array) -> float:
             sums = [np.tensordot(times, M, 1) for M in matrices]
@@ -114,24 +114,24 @@ def missing(happens: Events, asked: Sequence[str]) -> float:
 
 def information_by_segment(seen: Sequence[Evaluated]) -> list[list[Information]]:
     """The information of each segment, a list a machine."""
-    each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
+    each: list[list[Information]] = [one.information for one in seen]  # type: ignore[misc]
     return [list(one) for one in zip(*each, strict=True)]
 
 
-def stacked(told: Sequence[Sequence[Information]]) -> list[Array]:
+def stacked(information: Sequence[Sequence[Information]]) -> list[Array]:
     """Their matrices, (k, d, d) a machine."""
-    return [np.array([one.matrix for one in own]) for own in told]
+    return [np.array([one.matrix for one in own]) for own in information]
 
 
-def _places(told: Information, asked: Sequence[str]) -> IntArray:
-    return np.array([told.names.index(name) for name in asked], dtype=np.int64)
+def _places(information: Information, asked: Sequence[str]) -> IntArray:
+    return np.array([information.names.index(name) for name in asked], dtype=np.int64)
 
 
-def worth(told: Information, asked: IntArray) -> float:
+def worth(information: Information, asked: IntArray) -> float:
     """How well a run identifies the asked parameters: minus the log of their mean (geometric)
     relative deviation, and of the largest."""
-    mean = 0.5 * log_det(told.matrix, asked) / len(asked)
-    spread = np.sqrt(np.diag(told.covariance)[asked]) / told.unit[asked]
+    mean = 0.5 * log_det(information.matrix, asked) / len(asked)
+    spread = np.sqrt(np.diag(information.covariance)[asked]) / information.unit[asked]
     least = -float(np.log(min(float(np.max(spread)), NO_IDEA)))
     return mean + least
 

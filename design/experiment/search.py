@@ -33,11 +33,11 @@ CHANGE_FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes ampl
 @dataclass(frozen=True, eq=False)
 class Evaluated:
     """What a reference does and its information: extremes over all plants, and a value the larger
-    the better its information; told: whatever the criterion adds up over segments."""
+    the better its information; information: whatever the criterion adds up over segments."""
 
     peaks: Peaks
     value: float
-    told: object = None
+    information: object = None
 
 
 Evaluate = Callable[

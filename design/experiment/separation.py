@@ -25,10 +25,10 @@ class Pair:
     names: tuple[str, str]
 
 
-def pairs_of(told: Information, keys: Sequence[str]) -> tuple[Pair, ...]:
+def pairs_of(information: Information, keys: Sequence[str]) -> tuple[Pair, ...]:
     """Each effect against none, and against each other one, the plant's parameters being free."""
-    own = tuple(i for i, name in enumerate(told.names) if name not in keys)
-    place = {name: told.names.index(name) for name in keys}
+    own = tuple(i for i, name in enumerate(information.names) if name not in keys)
+    place = {name: information.names.index(name) for name in keys}
     out = []
     for one in keys:
         out.append(Pair(place[one], own, (one, NO_EFFECT)))
@@ -47,17 +47,17 @@ def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
         found = evaluated(machines, r)
         if found is None:
             return None
-        worst, told, _ = found
-        pairs = pairs_of(told[0], keys)
+        worst, information, _ = found
+        pairs = pairs_of(information[0], keys)
         values = [
             value_of(own.matrix, pairs) - one.chance_penalty(own)
-            for one, own in zip(machines, told, strict=True)
+            for one, own in zip(machines, information, strict=True)
         ]
-        return Evaluated(worst, min(values), told)
+        return Evaluated(worst, min(values), information)
 
     def joint(seen: Sequence[Evaluated]) -> Joint:
-        told = information_by_segment(seen)
-        pairs, matrices = pairs_of(told[0][0], keys), stacked(told)
+        information = information_by_segment(seen)
+        pairs, matrices = pairs_of(information[0][0], keys), stacked(information)
 
         def measure(times: Array) -> float:
             return value_of(np.tensordot(times, matrices[0], 1), pairs)

@@ -39,7 +39,7 @@ from identification.frequency.stretches import (
 from identification.model.resonance import load_acceleration
 from identification.thresholds import LEAVES_LESS, RESTS_AT_LEAST
 
-HERTZ_TRIED = 20  # anti-resonances tried, on a scale of ratios
+LOAD_HERTZ_TRIED = 20  # anti-resonances tried, on a scale of ratios
 DAMPING_TRIED = 0.02
 FINER, FINER_STEPS = (0.5, 0.25, 0.12), (-1.0, 1.0)  # of their distance, around the best
 DAMPINGS_TRIED = (0.005, 0.01, 0.04, 0.08)
@@ -90,7 +90,7 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
     if not low < high:
         return None
     none = float(np.mean(np.log(np.concatenate([one.left() for one in looked_at]))))
-    every = np.geomspace(low, high, HERTZ_TRIED)
+    every = np.geomspace(low, high, LOAD_HERTZ_TRIED)
     tried = [_tried(looked_at, f, DAMPING_TRIED, mass) for f in every]
     best = min(tried, key=lambda one: one[0])
     step = float(np.log(every[1] / every[0]))

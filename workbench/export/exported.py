@@ -111,9 +111,9 @@ def _with_schedule(
 
 def _compensated(found: Design, chosen: str) -> bool:
     """Whether the controller goes with the compensator where nobody says."""
-    told = found.recommendation
-    if told is not None and told.controller == chosen:
-        return told.compensator
+    choice = found.recommendation
+    if choice is not None and choice.controller == chosen:
+        return choice.compensator
     return chosen not in ("present", "p-pi")
 
 
@@ -145,14 +145,13 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
     assert found.command is not None
     if chosen not in (found.recommended, "present"):
         out.append(f"the design recommends {found.recommended!r}, not this controller")
-    told = found.recommendation
+    choice = found.recommendation
     if (one := found.p_pi) is not None and chosen == "p-pi" and one.series is not None:
         out.append(f"R, S and T hold the {filter_words(one.series)}")
     beside = isinstance(loop.compensation, Compensation)
-    if told is not None and told.controller == chosen and told.compensator != beside:
-        out.append(
-            f"the design recommends it {'with' if told.compensator else 'without'} the compensator"
-        )
+    if choice is not None and choice.controller == chosen and choice.compensator != beside:
+        how = "with" if choice.compensator else "without"
+        out.append(f"the design recommends it {how} the compensator")
     if beside and found.compensator.excess:
         out.append(
             "compensator: F_sp and F_sn are what breakaway needs beyond sliding, F_cp, F_cn 0"

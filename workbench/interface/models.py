@@ -88,13 +88,20 @@ class IdentifyResult(_OfModel):
         An effect's parameters are named as key.name. Attributes: units, verdict, converged.
         Raises BadModel where none was sampled, MissingLibrary without arviz.
         """
-        walk = self.found.walk
-        if walk is None:
+        posterior_samples = self.found.posterior_samples
+        if posterior_samples is None:
             raise BadModel("no posterior was sampled; call identify(..., posterior=True)")
         arviz = _arviz()
-        posterior = {name: walk.chains[:, :, k] for k, name in enumerate(walk.names)}
-        units = {name: self.found.fit.estimates[name].unit for name in walk.names}
-        said = {"units": str(units), "verdict": walk.verdict, "converged": int(walk.converged)}
+        posterior = {
+            name: posterior_samples.chains[:, :, k]
+            for k, name in enumerate(posterior_samples.names)
+        }
+        units = {name: self.found.fit.estimates[name].unit for name in posterior_samples.names}
+        said = {
+            "units": str(units),
+            "verdict": posterior_samples.verdict,
+            "converged": int(posterior_samples.converged),
+        }
         return arviz.from_dict(posterior=posterior, attrs=said)
 
     def _made(self) -> "View":

@@ -94,15 +94,15 @@ def _first_data(lines: Sequence[Sequence[str]], width: int) -> int | None:
 def _is_data(line: Sequence[str], width: int) -> bool:
     if len(line) != width:
         return False
-    told = [field for field in line if field]
-    known = sum(is_number(field) or is_time(field) for field in told)
+    filled = [field for field in line if field]
+    known = sum(is_number(field) or is_time(field) for field in filled)
     first = is_number(line[0]) or is_time(line[0])  # where other lines have a key
-    return first and known > _DATA_SHARE * len(told)
+    return first and known > _DATA_SHARE * len(filled)
 
 
 def _is_units(line: Sequence[str]) -> bool:
-    told = [field for field in line if field]
-    return 2 * len(told) >= len(line) and all(_UNIT_CELL.fullmatch(field) for field in told)
+    filled = [field for field in line if field]
+    return 2 * len(filled) >= len(line) and all(_UNIT_CELL.fullmatch(field) for field in filled)
 
 
 def _scope(

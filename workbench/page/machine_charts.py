@@ -20,12 +20,12 @@ def parameter_charts(logs: Sequence[TestedLog]) -> list[Chart]:
 
     logs: the oldest first.
     """
-    told = [one for one in logs if one.parameters]
-    if len(told) < FEWEST_LOGS:
+    history = [one for one in logs if one.parameters]
+    if len(history) < FEWEST_LOGS:
         return []
-    x, label = _times([one.recorded_at for one in told])
+    x, label = _times([one.recorded_at for one in history])
     found: dict[str, dict[int, Mapping[str, Any]]] = {}
-    for k, one in enumerate(told):
+    for k, one in enumerate(history):
         for parameter in one.parameters:
             found.setdefault(str(parameter["name"]), {})[k] = parameter
     names = sorted(found, key=lambda name: -_moved(found[name]))
@@ -34,14 +34,16 @@ def parameter_charts(logs: Sequence[TestedLog]) -> list[Chart]:
     return [Chart("parameters", "parameters over the last logs", panels, columns=2)]
 
 
-def _panel(name: str, told: Mapping[int, Mapping[str, Any]], x: Array, label: str) -> Panel:
-    at = np.array(sorted(told))
+def _panel(name: str, history: Mapping[int, Mapping[str, Any]], x: Array, label: str) -> Panel:
+    at = np.array(sorted(history))
     place = x[at]
 
     def column(key: str) -> Array:
-        return np.array([np.nan if told[k].get(key) is None else told[k][key] for k in at], float)
+        return np.array(
+            [np.nan if history[k].get(key) is None else history[k][key] for k in at], float
+        )
 
-    unit = str(told[int(at[0])].get("unit", ""))
+    unit = str(history[int(at[0])].get("unit", ""))
     return Panel(
         label, f"{name} [{unit}]",
         [Line("active model", place, column("before"), "reference", "dashed"),
@@ -50,8 +52,8 @@ def _panel(name: str, told: Mapping[int, Mapping[str, Any]], x: Array, label: st
     )  # fmt: skip
 
 
-def _moved(told: Mapping[int, Mapping[str, Any]]) -> float:
-    last = told[max(told)]
+def _moved(history: Mapping[int, Mapping[str, Any]]) -> float:
+    last = history[max(history)]
     change, sd = abs(float(last.get("change") or 0.0)), float(last.get("sd") or 0.0)
     return change / sd if sd > 0.0 else 0.0
 

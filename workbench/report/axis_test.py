@@ -44,20 +44,21 @@ def axis_rows(test: AxisTest) -> list[Row]:
 
 
 def _row(one: Quantity) -> Row:
-    told = one.estimate
-    (unit, factor) = ("%", 100.0) if told.unit == "1" else shown_unit(told.unit)
+    estimate = one.estimate
+    (unit, factor) = ("%", 100.0) if estimate.unit == "1" else shown_unit(estimate.unit)
     limits = "-"
     if one.allowed is not None:
         low, high = (number(factor * x, 4) for x in (one.allowed.low, one.allowed.high))
         limits = f"{low} to {high} ({SOURCE_OF_LIMITS[one.allowed.source]})"
-    if told.value is None:
-        why = (told.reason or "not identifiable").partition(";")[0]
+    if estimate.value is None:
+        why = (estimate.reason or "not identifiable").partition(";")[0]
         return one.meaning, "-", unit, why, limits, LAMPS[one.light]
-    if told.low is None or told.high is None:
-        return one.meaning, number(factor * told.value, 4), unit, "", limits, LAMPS[one.light]
-    spread = 0.25 * (told.high - told.low)
+    if estimate.low is None or estimate.high is None:
+        return one.meaning, number(factor * estimate.value, 4), unit, "", limits, LAMPS[one.light]
+    spread = 0.25 * (estimate.high - estimate.low)
     value, low, high = in_digits(
-        [factor * x for x in (told.value, told.low, told.high)], factor * told.value,
+        [factor * x for x in (estimate.value, estimate.low, estimate.high)],
+        factor * estimate.value,
         factor * spread,
     )  # fmt: skip
     return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]

@@ -37,8 +37,8 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     lines += _labelled("clock", [_clock(found.clock)])
     lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
     bad = [one.line for one in found.bad]
-    told = bad if most is None else printed_once(bad, [found.file])
-    lines += _labelled("samples", [_plain(found, one) for one in told])
+    shortened = bad if most is None else printed_once(bad, [found.file])
+    lines += _labelled("samples", [_plain(found, one) for one in shortened])
     lines += _labelled("delay", [_delay(one) for one in found.delays])
     if found.ways is not None:
         ways = found.ways
@@ -152,15 +152,15 @@ def _way(found: Examined, one: Way) -> str:
     )
 
 
-def _not_identifiable(told: Iterable[Identifiable]) -> list[str]:
+def _not_identifiable(parameters: Iterable[Identifiable]) -> list[str]:
     """The reasons, each with the parameters that it holds for."""
-    return _together((one.why, one.name) for one in told if not (one.can or one.only_if))
+    return _together((one.why, one.name) for one in parameters if not (one.can or one.only_if))
 
 
-def _open(told: Iterable[Identifiable]) -> list[str]:
+def _open(parameters: Iterable[Identifiable]) -> list[str]:
     """On what it depends whether others are identifiable, each with the parameters that it holds
     for."""
-    return _together((one.only_if, one.name) for one in told if one.only_if)
+    return _together((one.only_if, one.name) for one in parameters if one.only_if)
 
 
 def _together(said: Iterable[tuple[str, str]]) -> list[str]:

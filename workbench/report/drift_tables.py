@@ -130,9 +130,9 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
 def _shift_row(shift: Shift) -> Row:
     interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
     pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
-    told = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
+    values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
     unit, factor = shown_unit(shift.unit)
-    before, after = ("-" if value is None else number(factor * value, 5) for value in told)
+    before, after = ("-" if value is None else number(factor * value, 5) for value in values)
     return (shift.name, before, after, unit, signed_percent(shift.change), interval)
 
 
@@ -198,8 +198,8 @@ def drift_parts(found: Drifted) -> list[Part | str]:
     logs = logs_of_drift(found)
     legend, seen = what_the_columns_say(found), detectable_lines(found)
     # What is inconclusive, and why, stands in the table too.
-    told = printed_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
-    short = [line for line in told if line not in drift_sentence(found)]
+    once = printed_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
+    short = [line for line in once if line not in drift_sentence(found)]
     return [
         run_table(found),
         shift_table(found.tests[-1], logs),

@@ -56,11 +56,13 @@ def _percent(share: float) -> str:
 
 def experiment_lead(found: Experiment) -> str:
     """What the run is for and what it promises, in a sentence or two."""
-    told = [one for one in found.promise if one.after is not None]
+    identified = [one for one in found.promise if one.after is not None]
     seconds = f"{found.h * (len(found.r) - 1):.3g} s"
-    what = f"{len(told)} of {len(found.promise)} parameters identifiable from a run of {seconds}"
+    what = (
+        f"{len(identified)} of {len(found.promise)} parameters identifiable from a run of {seconds}"
+    )
     worst = max(
-        told, key=lambda one: (one.after or 0.0) / max(abs(one.value), 1e-300), default=None
+        identified, key=lambda one: (one.after or 0.0) / max(abs(one.value), 1e-300), default=None
     )
     if worst is not None and worst.value != 0.0:
         share = (worst.after or 0.0) / abs(worst.value)
@@ -194,9 +196,9 @@ def promise_chart(found: Experiment) -> Chart:
     lines = []
     for key, colour, shift, name in PROMISE_STYLES:
         sizes = [getattr(one, key) for one in found.promise]
-        told = [i for i, one in enumerate(sizes) if one and found.promise[i].value]
-        shares = [100.0 * sizes[i] / abs(found.promise[i].value) for i in told]
-        lines.append(Line(name, np.array(told) + shift, np.array(shares), colour, "dots"))
+        identified = [i for i, one in enumerate(sizes) if one and found.promise[i].value]
+        shares = [100.0 * sizes[i] / abs(found.promise[i].value) for i in identified]
+        lines.append(Line(name, np.array(identified) + shift, np.array(shares), colour, "dots"))
     panel = Panel(
         "", "half interval [% of value]", lines, log_y=True,
         x_range=(-0.5, len(found.promise) - 0.5), names=[one.name for one in found.promise],

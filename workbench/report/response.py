@@ -66,12 +66,13 @@ def peak_table(found: Responded) -> Part:
 
 
 def _cells(one: Size, unit: str) -> tuple[str, str]:
-    told = reported_estimate(one.value, unit, one.sd)
+    estimate = reported_estimate(one.value, unit, one.sd)
     shown_unit = "" if unit == "1" else f" {unit}"
-    if told.low is None or told.high is None:
+    if estimate.low is None or estimate.high is None:
         return f"{number(one.value)}{shown_unit}", "not identifiable"
     return (
-        f"{number(one.value, 4)}{shown_unit}", f"{number(told.low, 4)} to {number(told.high, 4)}"
+        f"{number(one.value, 4)}{shown_unit}",
+        f"{number(estimate.low, 4)} to {number(estimate.high, 4)}",
     )  # fmt: skip
 
 
@@ -173,8 +174,8 @@ def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
         sections.append(Section("Open loop", loop_html(found)))
     if found.found.controller is not None:
         sections.append(Section("Controller", controller_html(found)))
-    told = report_notes(found.remarks, logs)
-    return [*sections, lines_section("Notes", told)] if told else sections
+    lines = report_notes(found.remarks, logs)
+    return [*sections, lines_section("Notes", lines)] if lines else sections
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:

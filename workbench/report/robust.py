@@ -199,8 +199,8 @@ def _varies(found: Robust, name: str) -> bool:
     """Whether any loop has another value than the others' first."""
     values = [_finite(one.found.values[name]) for one in found.promises.values()
               if name in one.found.values]  # fmt: skip
-    told = np.concatenate(values) if values else np.zeros(0)
-    return told.size > 0 and float(np.ptp(told)) > 0.0
+    joined = np.concatenate(values) if values else np.zeros(0)
+    return joined.size > 0 and float(np.ptp(joined)) > 0.0
 
 
 def _finite(values: Array) -> Array:
@@ -230,9 +230,9 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
     )  # fmt: skip
 
 
-def _within(told: Sequence[Array], limit: float | None) -> tuple[float, float] | None:
+def _within(arrays: Sequence[Array], limit: float | None) -> tuple[float, float] | None:
     """The axis to the curves, but not to the far end of one that runs off."""
-    every = np.concatenate([*told, [] if limit is None else [limit]])
+    every = np.concatenate([*arrays, [] if limit is None else [limit]])
     if every.size == 0:
         return None
     low, high = float(np.min(every)), float(np.max(every))

@@ -56,8 +56,8 @@ def _share(part: float) -> str:
 def _verdict_sentence(traced: Traced) -> str:
     found = traced.trace
     names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
-    told = fall_of_error(traced) if found.effects else ""
-    errors = f" {told}" if told else ""
+    error = fall_of_error(traced) if found.effects else ""
+    errors = f" {error}" if error else ""
     changed = ", ".join(_changed(change) for change in found.drift)
     match found.verdict:
         case "unknown" if found.not_tried and not found.effects:
@@ -158,11 +158,11 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
 
 def fall_of_error(traced: Traced) -> str:
     """How the error fell in which the effects show."""
-    told = reported_error(traced)
-    if told is None:
+    error = reported_error(traced)
+    if error is None:
         return ""
-    noise = "" if told.noise is None else f" (sensors' noise {told.write(told.noise)})"
-    return f"{told.name} {told.write(told.before)} -> {told.write(told.after)}{noise}."
+    noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
+    return f"{error.name} {error.write(error.before)} -> {error.write(error.after)}{noise}."
 
 
 def reported_error(traced: Traced) -> ReportedError | None:
@@ -191,12 +191,12 @@ def reported_error(traced: Traced) -> ReportedError | None:
             lambda x: length(x, rotary),
         ),
     )
-    known = [told for told in every if math.isfinite(told.before) and told.before > 0]
+    known = [error for error in every if math.isfinite(error.before) and error.before > 0]
     if not known:
         return None
     if known[0] is every[0] and known[0].after <= LEFT_IN_FORCE * known[0].before:
         return known[0]
-    return min(known, key=lambda told: told.after / told.before)
+    return min(known, key=lambda error: error.after / error.before)
 
 
 def _both(before: Errors, after: Errors, key: str) -> tuple[float, float]:

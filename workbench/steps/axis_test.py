@@ -141,24 +141,24 @@ def axis_test(
     around = surroundings([source.log], sources.rig)
     found = axis_equation(around.taken_out(source.log), held=sources.rig.kind == "motor")
     units = limit_units(sources.rig)
-    told = told_of(found, around, units)
+    estimates = estimates_of(found, around, units)
     if earlier is not None and earlier.estimates is not None:
-        told |= earlier.estimates
+        estimates |= earlier.estimates
     travel = friction_along(found)
-    told["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
+    estimates["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
     allowed = {**_of_past(earlier), **_of_card(sources.card.limits)}
     allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
     runs = len(sources.runs)
     longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
     return AxisTest(
         machine or sources.card.name, source, sources.rig.motion == "rotary",
-        tuple(judged(name, told[name], allowed.get(name)) for name in MEANING_OF),
+        tuple(judged(name, estimates[name], allowed.get(name)) for name in MEANING_OF),
         travel, found.breakaways, earlier,
         (*(earlier.remarks if earlier else ()), *longest, *sources.remarks),
     )  # fmt: skip
 
 
-def told_of(
+def estimates_of(
     found: AxisEquation, around: Surroundings, units: Mapping[str, str]
 ) -> dict[str, Estimate]:
     """Every quantity of the test, by name, as far as the equation of motion identifies it."""
@@ -236,34 +236,36 @@ def _of_past(earlier: Earlier | None) -> dict[str, Allowed]:
     return limits_of({name: [value for _, value in every] for name, every in past.items()})
 
 
-def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
+def judged(name: str, estimate: Estimate, allowed: Allowed | None) -> Quantity:
     """A quantity with its light and, where it is not green, the reason in a sentence."""
     meaning = MEANING_OF[name]
-    if told.value is None and allowed is not None and allowed.source == "card":
-        why = (told.reason or "not identifiable from this log").partition(";")[0]
+    if estimate.value is None and allowed is not None and allowed.source == "card":
+        why = (estimate.reason or "not identifiable from this log").partition(";")[0]
         said = f"{_whole(meaning)} is not identifiable, and the card has limits for it: {why}"
-        return Quantity(name, meaning, told, allowed, "yellow", said)
-    if told.value is None or allowed is None:
-        return Quantity(name, meaning, told, allowed, "", "")
-    low = told.value if told.low is None else told.low
-    high = told.value if told.high is None else told.high
-    light = light_of(told.value, low, high, allowed)
+        return Quantity(name, meaning, estimate, allowed, "yellow", said)
+    if estimate.value is None or allowed is None:
+        return Quantity(name, meaning, estimate, allowed, "", "")
+    low = estimate.value if estimate.low is None else estimate.low
+    high = estimate.value if estimate.high is None else estimate.high
+    light = light_of(estimate.value, low, high, allowed)
     if light in ("green", "red"):
-        said = _said(meaning, told, allowed, "") if light == "red" else ""
-        return Quantity(name, meaning, told, allowed, light, said)
-    outside = not allowed.low <= told.value <= allowed.high
+        said = _said(meaning, estimate, allowed, "") if light == "red" else ""
+        return Quantity(name, meaning, estimate, allowed, light, said)
+    outside = not allowed.low <= estimate.value <= allowed.high
     unsure = ", though not significantly by this log" if outside else " within its interval"
     if allowed.source == "usual":
         unsure = ": something else acts"
-    return Quantity(name, meaning, told, allowed, light, _said(meaning, told, allowed, unsure))
+    return Quantity(
+        name, meaning, estimate, allowed, light, _said(meaning, estimate, allowed, unsure)
+    )
 
 
-def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:
+def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> str:
     """Why a light is not green."""
-    (unit, factor), value = shown_unit(told.unit), told.value or 0.0
+    (unit, factor), value = shown_unit(estimate.unit), estimate.value or 0.0
     above = value > 0.5 * (allowed.low + allowed.high)
     limit = allowed.high if above else allowed.low
-    if told.unit == "1":
+    if estimate.unit == "1":
         unit, factor = "%", 100.0
     side = "above" if above else "below"
     whose = {
@@ -272,7 +274,7 @@ def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:
         "usual": "the usual",
     }
     moved = ""
-    if allowed.mean and told.unit not in ("1", "") and "constant" not in meaning:
+    if allowed.mean and estimate.unit not in ("1", "") and "constant" not in meaning:
         moved = f" ({100 * (value / allowed.mean - 1):+.0f} % of their mean)"
     may = "perhaps " if unsure == " within its interval" else ""
     found, bound = (f"{number(factor * x, 4)} {unit}" for x in (value, limit))
@@ -310,14 +312,14 @@ def axis_document(test: AxisTest) -> dict[str, Any]:
 
 
 def _number(one: Quantity) -> dict[str, Any]:
-    told, allowed = one.estimate, one.allowed
+    estimate, allowed = one.estimate, one.allowed
     return {
-        "value": told.value,
-        "unit": told.unit,
-        "sd": told.sd,
-        "low": told.low,
-        "high": told.high,
-        **({"reason": told.reason} if told.value is None else {}),
+        "value": estimate.value,
+        "unit": estimate.unit,
+        "sd": estimate.sd,
+        "low": estimate.low,
+        "high": estimate.high,
+        **({"reason": estimate.reason} if estimate.value is None else {}),
         "light": one.light or None,
         "limits": None if allowed is None else {
             "low": allowed.low, "high": allowed.high, "source": allowed.source,

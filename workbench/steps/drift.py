@@ -111,34 +111,34 @@ def active_model(model: Model, key: str) -> ReferenceModel:
         every |= model.actuator or {}
     for effect, found in model.effects.items():
         every |= {f"{effect}.{name}": estimate for name, estimate in found.items()}
-    told = {n: e for n, e in every.items() if e.known and e.sd is not None}
+    identified = {n: e for n, e in every.items() if e.known and e.sd is not None}
     why = "it gives no standard deviation"
-    untold = {n: e.reason or why for n, e in every.items() if n not in told}
+    unidentified = {n: e.reason or why for n, e in every.items() if n not in identified}
     return ReferenceModel(
         plant=model.simulated,
-        names=tuple(told),
-        values=np.array([used(e) for e in told.values()]),
-        covariance=_covariance(model, told),
+        names=tuple(identified),
+        values=np.array([used(e) for e in identified.values()]),
+        covariance=_covariance(model, identified),
         rig=model.rig,
         drive=model.fit.drive,
         chi_square=model.fit.chi_square,
         imposed=model.by_equation,
-        untold=untold,
+        untold=unidentified,
         key=key,
         fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),
         own_logs=model.own_logs,
     )
 
 
-def _covariance(model: Model, told: Mapping[str, Estimate]) -> Any:
+def _covariance(model: Model, identified: Mapping[str, Estimate]) -> Any:
     """Covariance (d, d) of the identified parameters by their deviations and the model's
     correlation."""
-    sd = np.array([e.sd or 0.0 for e in told.values()])
-    together = np.eye(len(told))
+    sd = np.array([e.sd or 0.0 for e in identified.values()])
+    together = np.eye(len(identified))
     if model.correlation is not None:
         place = {name: i for i, name in enumerate(model.correlation.names)}
         matrix = np.array(model.correlation.matrix)
-        at = [(i, place[name]) for i, name in enumerate(told) if name in place]
+        at = [(i, place[name]) for i, name in enumerate(identified) if name in place]
         rows, columns = [i for i, _ in at], [k for _, k in at]
         together[np.ix_(rows, rows)] = matrix[np.ix_(columns, columns)]
     return together * np.outer(sd, sd)

@@ -37,7 +37,7 @@ class Identified:
     fit: KarnoppFit
     sources: tuple[Source, ...]
     remarks: tuple[str, ...]
-    walk: "Posterior | None" = None
+    posterior_samples: "Posterior | None" = None
 
 
 def identify_sources(
@@ -73,15 +73,15 @@ def identify_sources(
     now = present_of_card(sources.card, sources.rig, model.period)
     bad = (*sources.bad, *fit.bad)
     model = replace(model, bad_samples=bad, controller=now, identifiability=gate.told)
-    walk = _walk(sources, fit, seed, on_progress) if posterior else None
-    if walk is not None:
-        model = replace(model, posterior=_posterior(walk, fit))
+    posterior_samples = _posterior_samples(sources, fit, seed, on_progress) if posterior else None
+    if posterior_samples is not None:
+        model = replace(model, posterior=_posterior(posterior_samples, fit))
     remarks = (
         *looks_like_velocity(logs, sources.rig, model),
         *surrounding_lines(fit.surroundings, sources.rig),
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip
-    return Identified(model, fit, sources.runs, remarks, walk)
+    return Identified(model, fit, sources.runs, remarks, posterior_samples)
 
 
 def broken_promises(model: Model) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ def broken_promises(model: Model) -> tuple[str, ...]:
     )
 
 
-def _walk(
+def _posterior_samples(
     sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
 ) -> "Posterior":
     from identification.estimation.posterior import sample_posterior
@@ -123,11 +123,11 @@ def _walk(
 def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
     """What the ensembles found, as model.json holds it: no intervals unless they agree."""
     units = {name: fit.estimates[name].unit for name in found.names}
-    told = {name: Estimate(None, unit, reason=found.verdict) for name, unit in units.items()}
+    estimates = {name: Estimate(None, unit, reason=found.verdict) for name, unit in units.items()}
     spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
     bounds = _bounds(fit)
     for name, (low, median, high) in found.interval().items():
-        told[name] = reported_estimate(
+        estimates[name] = reported_estimate(
             median, units[name], spread[name], interval=(low, high), bounds=bounds[name]
         )
     return {
@@ -141,7 +141,7 @@ def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
         "acceptance": found.acceptance,
         "r_hat": dict(found.r_hat),
         "ess": dict(found.ess),
-        "parameters": {name: as_number(one) for name, one in told.items()},
+        "parameters": {name: as_number(one) for name, one in estimates.items()},
     }
 
 

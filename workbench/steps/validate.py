@@ -155,9 +155,9 @@ def _remarks(
             alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
             called = name if name == PRESENT else name.replace(alone, alone.upper(), 1)
             seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
-            told = (f"{called} on the {place}: {line}" for line in seen)
+            lines = (f"{called} on the {place}: {line}" for line in seen)
             # What the table of the loops shows of those that nobody takes is an aside.
-            out += told if name in (judged, taken) else map(MinorRemark, told)
+            out += lines if name in (judged, taken) else map(MinorRemark, lines)
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")
     return out
@@ -177,8 +177,8 @@ def _seen(one: LoopFigures, units: Shown, *, missed: bool) -> Iterator[str]:
             f" {cause}"
         )
     peak, limit = one.command_peak, one.command_limit
-    told = missed and one.limited > 0.0
-    if one.stable and not told and peak is not None and limit and peak >= ALMOST * limit:
+    reported = missed and one.limited > 0.0
+    if one.stable and not reported and peak is not None and limit and peak >= ALMOST * limit:
         force = f", {one.force_peak:.3g} of {one.force_limit or 0.0:.3g} {units.force}"
         yield (
             f"the command reaches {peak:.3g} of {limit:.3g} {one.command_unit}"

@@ -25,7 +25,7 @@ from workbench.output import dumps
 def result(walk: Posterior | None = None) -> IdentifyResult:
     found = identified()
     return IdentifyResult(
-        found.card if hasattr(found, "card") else _card(), replace(found, walk=walk)
+        found.card if hasattr(found, "card") else _card(), replace(found, posterior_samples=walk)
     )
 
 
