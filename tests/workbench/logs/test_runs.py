@@ -2,6 +2,7 @@
 
 import json
 import tempfile
+from hashlib import sha256
 from pathlib import Path
 
 import h5py
@@ -14,7 +15,8 @@ from hypothesis.extra.numpy import arrays
 
 from identification.arrays import Array
 from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv, write_parquet
-from workbench.logs.runs import fingerprint, read_log, read_runs
+from workbench.logs.runs import read_log, read_runs
+from workbench.logs.sources import fingerprints, read_sources
 
 EXACT = sorted({*WRITERS} - {"a.xlsx"})  # whose numbers have 16 digits
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)
@@ -204,11 +206,8 @@ def test_isolated_empty_fields_are_repaired_and_remarked(tmp_path: Path) -> None
     assert prepared.runs[0]["y"][59] == pytest.approx(signals()["y"][59], abs=1e-3)
 
 
-def test_fingerprint_names_bytes_and_rows(tmp_path: Path) -> None:
+def test_a_result_names_bytes_and_rows_of_its_logs(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     write_csv(path, signals())
-    found = fingerprint(path, read_log(path, card(tmp_path)))
-    assert found.file == "a.csv"
-    assert found.rows == 400
-    assert len(found.sha256) == 64
-    assert found.as_json()["rows"] == 400
+    (found,) = fingerprints(read_sources([str(path)], str(card(tmp_path).path)).runs)
+    assert found == {"file": "a.csv", "rows": 400, "sha256": sha256(path.read_bytes()).hexdigest()}
