@@ -11,7 +11,7 @@ from workbench.cards.readable import number, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.page import Section, table_section
 from workbench.report.validation_tables import validation_lines, validation_table
-from workbench.steps.loop_figures import COMPENSATED, PRESENT, Traces
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, Traces
 from workbench.steps.validate import Validation
 
 LOOP_COLOURS: dict[str, Colour] = {
@@ -126,9 +126,10 @@ def _rest(run: LoopRun) -> int:
 
 def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
     """A line of a loop, called and coloured by its controller."""
-    alone = name.removesuffix(COMPENSATED)
+    alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
-    look: LineStyle = "line" if alone == name else "dashed"
+    beside: LineStyle = "dotted" if name.endswith(SCHEDULED) else "dashed"
+    look: LineStyle = "line" if alone == name else beside
     return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], look)
 
 

@@ -55,9 +55,10 @@ class Contest:
     @property
     def words(self) -> str:
         """What came out, in words."""
-        low, high = float(np.min(self.error)), float(np.max(self.error))
+        low, high = f"{np.min(self.error):.2g}", f"{np.max(self.error):.2g}"
+        error = low if low == high else f"{low} to {high}"
         return (
-            f"{low:.2g} to {high:.2g} times its error along strokes and a sine,"
+            f"{error} times its error along strokes and a sine,"
             f" {np.max(self.force):.2g} times its force at most, on {len(self.error)} machines that"
             " the model's errors allow"
         )

@@ -16,6 +16,7 @@ from workbench.documents.model import Model
 from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import schedule_lines, schedule_rows
+from workbench.report.reports import validation_view
 from workbench.steps.clear_win import Contest, contest, strokes, that_may_be
 from workbench.steps.closed_loop import driven_loop, scheduled_loop
 from workbench.steps.local_friction import asked_for, local
@@ -87,7 +88,8 @@ def test_it_is_validated_exported_written_and_read_again(tmp_path: Path) -> None
     file = tmp_path / "design.json"
     file.write_text(dumps(design_document(found)))
     assert read_design(file).schedule == found.schedule
-    result, _ = validate(model, found, np.random.default_rng(0))
+    result, traces = validate(model, found, np.random.default_rng(0))
+    assert "P-PI + schedule" in validation_view(result, traces, model.rotary).page()
     assert {"pid + schedule", "p-pi + schedule"} <= set(result.figures)
     assert result.figures["p-pi + schedule"]["model"].stable
     what = exported(found, "p-pi")  # as it is recommended
@@ -104,7 +106,7 @@ def test_a_loop_does_not_clearly_win_over_itself_nor_the_fixed_one_over_the_sche
     loop, fixed = scheduled_loop(model, found, "p-pi"), driven_loop(model, found, found.p_pi)  # type: ignore[arg-type]
     even = contest(model, None, fixed, fixed)
     np.testing.assert_allclose(even.error, 1.0)
-    assert not even.clear and "1 to 1 times its error" in even.words
+    assert not even.clear and "1 times its error" in even.words
     assert contest(model, None, loop, fixed).clear
     assert not contest(model, None, fixed, loop).clear
 
