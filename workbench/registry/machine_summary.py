@@ -84,7 +84,7 @@ def _parameters(evidence: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     ]
 
 
-def begin_glance(session: Session, machine: str) -> None:
+def begin_summary(session: Session, machine: str) -> None:
     """A machine of which nothing is known yet; one that is there stays as it is."""
     insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
     first = {"machine": machine, "state": "no_log", "logs": 0}
@@ -93,13 +93,13 @@ def begin_glance(session: Session, machine: str) -> None:
     session.execute(insert(MachineTrendRow).values(empty).on_conflict_do_nothing())
 
 
-def glance_heard(session: Session, machine: str, logs: int, now: datetime) -> None:
+def summary_heard(session: Session, machine: str, logs: int, now: datetime) -> None:
     """So many new logs of the machine have come."""
     more = {"heard_at": now, "logs": MachineNowRow.logs + logs}
     session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(more))
 
 
-def glance_judged(
+def summary_tested(
     session: Session, machine: str, verdict: str, evidence: Mapping[str, Any]
 ) -> None:
     """The newest log has its result."""
@@ -113,7 +113,7 @@ def glance_judged(
         row.moved, row.moved_by, row.moved_trend = name, change, dumps(trend.get(name, []))
 
 
-def glance_moved(session: Session, machine: str) -> None:
+def summary_moved(session: Session, machine: str) -> None:
     """Somebody has activated another version: the next log shows how that fits."""
     nothing = dict.fromkeys(("moved", "moved_by", "moved_trend"))
     values = {"state": "not_judged", **nothing}

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.machine_summary import glance_heard, glance_judged
+from workbench.registry.machine_summary import summary_heard, summary_tested
 from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
     active_version,
@@ -84,7 +84,7 @@ class Queue:
                     new.setdefault(log.sha256, log)
             session.add_all(_log_row(machine, log, now) for log in new.values())
             if new:
-                glance_heard(session, machine, len(new), now)
+                summary_heard(session, machine, len(new), now)
             return len(new)
 
     def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
@@ -215,7 +215,7 @@ class Queue:
             )
             session.add(done)
             if newer is None:
-                glance_judged(session, claim.machine, judgement.verdict, judgement.evidence)
+                summary_tested(session, claim.machine, judgement.verdict, judgement.evidence)
             session.flush()
             return _outcome(session, row, done)
 

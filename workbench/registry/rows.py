@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, aliased
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.errors import BadRegistry
-from workbench.registry.machine_summary import begin_glance, glance_moved
+from workbench.registry.machine_summary import begin_summary, summary_moved
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
@@ -43,7 +43,7 @@ def lock_machine(session: Session, name: str, now: datetime) -> None:
     insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
     session.execute(insert(MachineRow).values(values).on_conflict_do_nothing())
     session.scalar(query)
-    begin_glance(session, name)
+    begin_summary(session, name)
 
 
 def need_machine(session: Session, name: str, *, lock: bool = False) -> None:
@@ -142,7 +142,7 @@ def decide(
             pointer.version_id, pointer.decision_id = version.id, row.id
         session.flush()
         if log_id is None:
-            glance_moved(session, version.machine)
+            summary_moved(session, version.machine)
     return row
 
 
