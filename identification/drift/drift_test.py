@@ -103,10 +103,10 @@ def drift_test(
             f" {found.chi_square:.3g}, at most {found.allowed:.3g} allowed); trace it"
         )
         return _silent(log.name, "structure", reason, {}, found, state)
-    return tested_estimate(model, found, log.name, state, settings)
+    return estimate_under_test(model, found, log.name, state, settings)
 
 
-def tested_estimate(
+def estimate_under_test(
     model: ReferenceModel, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""

@@ -8,7 +8,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest
-from identification.drift.drift_test import DriftSettings, drift_test, tested_estimate
+from identification.drift.drift_test import DriftSettings, drift_test, estimate_under_test
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.reference_model import ReferenceModel, in_force
@@ -151,7 +151,7 @@ def test_errors_that_go_together_are_one_accident_and_not_two() -> None:
     settings = DriftSettings(variation=0.001)
     for correlation, verdict in ((0.98, "none"), (0.0, "drift")):
         known, log = two(correlation)
-        found = tested_estimate(known, log, "log", fresh_state("", known.names), settings)
+        found = estimate_under_test(known, log, "log", fresh_state("", known.names), settings)
         assert found.verdict == verdict
 
 
@@ -159,7 +159,7 @@ def test_the_models_own_error_counts() -> None:
     known, log = two(0.0)
     settings = DriftSettings(variation=0.001)
     unsure = replace(known, covariance=np.diag((0.03 * known.values) ** 2))
-    found = tested_estimate(unsure, log, "log", fresh_state("", known.names), settings)
+    found = estimate_under_test(unsure, log, "log", fresh_state("", known.names), settings)
     assert found.verdict == "not_judged"
 
 
@@ -177,7 +177,7 @@ def test_ten_logs_that_could_not_have_seen_a_drift_of_five_percent_do_not_judge(
     state = fresh_state("one", ("m", "F_cp", "F_cn"))
     for k in range(10):
         known, log = coulomb(0.1, 0.005 * (k + 1), "m", "F_cp", "F_cn")
-        found = tested_estimate(known, log, "log", state, DriftSettings())
+        found = estimate_under_test(known, log, "log", state, DriftSettings())
         assert found.verdict == "not_judged" and found.tested
         assert "a change of 5 % is below the minimum detectable change (F_cp " in found.reason
         assert all(size > 0.05 for size in found.could_have_seen.values())
@@ -187,14 +187,16 @@ def test_ten_logs_that_could_not_have_seen_a_drift_of_five_percent_do_not_judge(
 def test_none_needs_both_coulomb_levels_and_no_more() -> None:
     known, log = coulomb(0.002, 0.0, "m", "F_cp", "F_cn")
     assert (
-        tested_estimate(known, log, "log", fresh_state("one", known.names), DriftSettings()).verdict
+        estimate_under_test(
+            known, log, "log", fresh_state("one", known.names), DriftSettings()
+        ).verdict
         == "none"
     )
     for name, verdict in (("m", "none"), ("F_cn", "not_judged")):
         i = known.names.index(name)
         covariance = log.covariance.copy()
         covariance[i, i] *= 60.0**2
-        found = tested_estimate(
+        found = estimate_under_test(
             known, replace(log, covariance=covariance), "log", fresh_state("one", known.names),
             DriftSettings(),
         )  # fmt: skip
@@ -207,12 +209,12 @@ def test_what_is_seen_is_found() -> None:
     """A change as large as the smallest that could have been seen, of one parameter alone."""
     known, quiet = coulomb(0.003, 0.0, "m", "F_cp", "F_cn")
     state = fresh_state("one", known.names)
-    size = tested_estimate(known, quiet, "log", state, DriftSettings()).could_have_seen["F_cp"]
+    size = estimate_under_test(known, quiet, "log", state, DriftSettings()).could_have_seen["F_cp"]
     rng, alarms = np.random.default_rng(1), 0
     for _ in range(100):
         factor = 1.0 + 0.003 * rng.standard_normal(3) + size * np.array([0.0, 1.0, 0.0])
         log = replace(quiet, values=factor * known.values)
-        found = tested_estimate(known, log, "log", state, DriftSettings())
+        found = estimate_under_test(known, log, "log", state, DriftSettings())
         alarms += found.verdict == "drift"
     assert alarms >= 85
 
@@ -223,7 +225,7 @@ def test_of_parameters_that_cannot_be_told_apart_none_is_named() -> None:
         0.05 * known.values, 0.05 * known.values
     )
     log = replace(log, values=known.values * np.array([1.045, 1.045]), covariance=together)
-    found = tested_estimate(known, log, "log", fresh_state("one", known.names), DriftSettings())
+    found = estimate_under_test(known, log, "log", fresh_state("one", known.names), DriftSettings())
     assert found.verdict == "drift"
     assert found.moved == ()
     assert set(found.unsure) == {"F_cp", "F_vp"}

@@ -7,7 +7,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest
-from identification.drift.drift_test import DriftSettings, tested_estimate
+from identification.drift.drift_test import DriftSettings, estimate_under_test
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.own_logs import own_logs_of, with_own_logs
@@ -44,7 +44,7 @@ def model(rng: np.random.Generator, logs: int = 3) -> ReferenceModel:
 
 
 def verdict(known: ReferenceModel, log: LogEstimate) -> DriftTest:
-    return tested_estimate(known, log, "log", fresh_state("", known.names), DriftSettings())
+    return estimate_under_test(known, log, "log", fresh_state("", known.names), DriftSettings())
 
 
 def worn() -> Array:

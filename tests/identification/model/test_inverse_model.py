@@ -136,7 +136,7 @@ def test_one_speed_does_not_tell_coulomb_from_viscous() -> None:
     y: Array = np.tile(np.concatenate([np.linspace(0, 1, 2000), np.linspace(1, 0, 2000)]), 3)
     t = clock(len(y))
     log = Log("triangle", {"t": t, "y": y, "F": np.ones(len(y))})
-    with pytest.raises(NotIdentifiable, match="apart"):
+    with pytest.raises(NotIdentifiable, match="not separable"):
         fit_inverse(log)
 
 
