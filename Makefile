@@ -56,7 +56,7 @@ lint: environment
 	$(BIN)/ruff format --check .
 
 types: environment
-	$(BIN)/mypy --num-workers $(WORKERS)
+	$(BIN)/mypy
 
 floors: environment
 	$(BIN)/lint-imports
