@@ -94,7 +94,7 @@ class Memory(NamedTuple):
     filter (12,), what the last sample left (4,), reference moved, sum of the force error, a motor's
     command, the reference's last step, the reference itself, its own last step, by how much that
     changed, and its step where it was smooth (8,), the force loop's samples since the position
-    controller's turn (1,). now: the row of a schedule in force (n,)."""
+    controller's turn (1,). now: the active row of a schedule (n,)."""
 
     x: Array
     pid: Array
@@ -206,7 +206,7 @@ def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
 
 @compiled_exact
 def look_up(c: Law, s: Memory, aim: float, force: float) -> None:
-    """Puts the row of the schedule in force, straight between its knots and held beyond them."""
+    """Makes the row of the schedule active: straight between its knots, constant beyond them."""
     at = aim
     if c.over == OVER_LOAD:
         at = abs(force)
@@ -222,7 +222,7 @@ def look_up(c: Law, s: Memory, aim: float, force: float) -> None:
 
 @compiled_exact
 def scheduled_force(s: Memory, r: float, y: float) -> float:
-    """What the row in force asks for at r and y: nothing of it depends on where they are from."""
+    """What the active row asks for at r and y: nothing of it depends on where they are from."""
     n, now = len(s.x), s.now
     dr, dy = r - s.pid[R_LAST], y - s.pid[Y_LAST]
     change = now[4] * (r - y) + now[5] * dr - now[5 + n] * dy + s.x[0]

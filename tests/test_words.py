@@ -1,9 +1,8 @@
 """What a user reads is in the field's words, not in a language of this project's own.
 
-It checks texts that the program prints (string literals and templates), the help of its
-commands, the manual, the README and the notebooks. Keys and values of files are of one word, or
-stand
-in backticks or quotes, and stay as they are: other programs read them.
+It checks texts that the program prints (string literals and templates), the help of its commands,
+the manual, the README and the notebooks. Keys and values of files are of one word, or stand in
+backticks or quotes, and stay as they are: other programs read them.
 """
 
 import ast

@@ -23,6 +23,7 @@ from identification.estimation.regression.weighted_rows import (
     Rows,
     solve_rows,
     spread_of_left_out,
+    without_each_block,
 )
 from identification.log import Log
 from identification.thresholds import EVENTS_NEEDED, SLIDES_NEEDED, WIDEST_SD
@@ -112,8 +113,7 @@ def _discriminated(rows: Rows) -> tuple[list[int], Array, Array]:
     for used in COLUMNS_TRIED:
         some = replace(rows, X=rows.X[:, used])
         theta = solve_rows(some).theta
-        blocks = np.unique(rows.block)
-        each = np.array([solve_rows(some, rows.block != block).theta for block in blocks])
+        each = without_each_block(some)
         further = [k for k, column in enumerate(used) if rows.names[column] not in COULOMB_LEVELS]
         wide = spread_of_left_out(each)[further] > WIDEST_SD * theta[further]
         if not np.any(wide):  # nor below 0

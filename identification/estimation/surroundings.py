@@ -32,6 +32,7 @@ from identification.estimation.regression.weighted_rows import (
     solve_rows,
     spread_of_left_out,
     stacked,
+    without_each_block,
 )
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
@@ -154,16 +155,12 @@ def _in_chosen_windows(around: Surroundings, logs: Sequence[Log], held: bool) ->
     if len(rows.b) < FEWEST_WINDOWS:
         return around
     waves = [
-        np.column_stack([one.windows.mean @ np.sin(y), one.windows.mean @ np.cos(y)])
+        np.column_stack([one.windows.mean @ wave(log["y"]) for wave in (np.sin, np.cos)])
         for one, log in zip(made, rest, strict=True)
-        for y in (np.asarray(log["y"]),)
     ]
     rows = replace(rows, X=np.column_stack([rows.X, np.concatenate(waves)]))
     more = solve_rows(rows).theta[-2:]
-    blocks = np.unique(rows.block)
-    spread = spread_of_left_out(
-        np.array([solve_rows(rows, np.asarray(rows.block != k)).theta[-2:] for k in blocks])
-    )
+    spread = spread_of_left_out(without_each_block(rows))[-2:]
     sine, cosine = (
         Size(one.value + float(off), float(sd))
         for one, off, sd in zip((around.sine, around.cosine), more, spread, strict=True)

@@ -75,10 +75,11 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
     found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION]
     if not found:
         return tried[0]
-    found = [made for made in found if _bent_by_noise(made, logs) < OF_EQUATION] or found
-    left = [_share_left([one.rows for one in made]) for made in found]
-    enough = max(NEARLY_LEAST * min(left), min(left) + AS_WELL_LEFT)
-    return next(made for made, share in zip(found, left, strict=True) if share <= enough)
+    fits = [_WidthFit.of(made, logs) for made in found]
+    fits = [one for one in fits if one.bent < OF_EQUATION] or fits
+    least = min(one.share for one in fits)
+    enough = max(NEARLY_LEAST * least, least + AS_WELL_LEFT)
+    return next(one.made for one in fits if one.share <= enough)
 
 
 def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
@@ -109,26 +110,30 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     return MotionRows(Rows(b, X, sd, block, np.abs(over), FIVE), w, v)
 
 
-def _bent_by_noise(made: Sequence[MotionRows], logs: Sequence[MotionLog]) -> float:
-    """Share of the force by which least squares err since the position's noise is in its
-    accelerations, too: they lose as much of the mass as of these is noise.
+@dataclass(frozen=True, eq=False)
+class _WidthFit:
+    """Least squares of rows of one width: the share of the force that they leave, and the share by
+    which they err since the position's noise is in the accelerations, too: they lose as much of the
+    mass as of these is noise.
 
     Source: attenuation by errors in a regressor, Fuller, Measurement Error Models (1987), 1.1.1.
     """
-    square = noise = 0.0
-    for one, log in zip(made, logs, strict=True):
-        second = weights(one.windows.length, log.log.h)[2]
-        square += float(np.sum(one.rows.X[:, 0] ** 2))
-        noise += len(one.rows.b) * log.noise_y**2 * noise_gain(second)
-    every = stacked([one.rows for one in made])
-    mass = float(solve_rows(every).theta[0])
-    inertia = abs(mass) * square**0.5 / max(float(np.linalg.norm(every.b)), 1e-300)
-    return float(inertia * noise / max(square, 1e-300))
 
+    made: list[MotionRows]
+    share: float
+    bent: float
 
-def _share_left(rows: Sequence[Rows]) -> float:
-    """Share of the force that least squares leave."""
-    every = stacked(rows)
-    plain = solve_rows(every)
-    left = plain.residual * every.sd
-    return float(np.linalg.norm(left) / max(float(np.linalg.norm(every.b)), 1e-300))
+    @classmethod
+    def of(cls, made: list[MotionRows], logs: Sequence[MotionLog]) -> "_WidthFit":
+        """The fit of the rows of each log."""
+        every = stacked([one.rows for one in made])
+        plain = solve_rows(every)
+        force = max(float(np.linalg.norm(every.b)), 1e-300)
+        square = max(float(np.sum(every.X[:, 0] ** 2)), 1e-300)
+        noise = sum(
+            len(one.rows.b) * log.noise_y**2 * noise_gain(weights(one.windows.length, log.log.h)[2])
+            for one, log in zip(made, logs, strict=True)
+        )
+        inertia = abs(float(plain.theta[0])) * square**0.5 / force
+        left = float(np.linalg.norm(plain.residual * every.sd))
+        return cls(made, left / force, inertia * noise / square)

@@ -85,6 +85,12 @@ def left_unseen(rows: Rows) -> Array:
     return left
 
 
+def without_each_block(rows: Rows) -> Array:
+    """Parameters (blocks, k) of the least squares without each block in turn."""
+    blocks = np.unique(rows.block)
+    return np.array([solve_rows(rows, np.asarray(rows.block != k)).theta for k in blocks])
+
+
 def spread_of_left_out(each: Array) -> Array:
     """Standard deviations of estimates (k, ...), each made without one of k blocks of the rows.
 

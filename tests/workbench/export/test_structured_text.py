@@ -75,25 +75,20 @@ def test_numbers_are_real_literals(value: float, said: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_block_of_a_cascade_gives_what_the_simulation_gave() -> None:
-    one = case("cascade")
-    what = exported(one.design, "p-pi")
-    run, inputs = simulated(one, what, 3000)
-    (source,) = st_file(what).values()
-    block = Blocks(source).made(f"FB_{what.program.name}")
-    found = []
-    for r, y in inputs.tolist():
-        block(r_ref=r, y=y)
-        found.append(block.values["u"])
-    assert np.max(np.abs(np.array(found) - run.u)) < 1e-9 * np.max(np.abs(run.u))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("controller", ["pid", "p-pi"])
-def test_the_block_of_a_schedule_gives_what_the_simulation_gave(controller: str) -> None:
-    one = case("schedule")
-    what = exported(one.design, controller, scheduled=True)
-    run, inputs = simulated(one, what, 4000)
+@pytest.mark.parametrize(
+    ("machine", "controller", "scheduled", "samples"),
+    [
+        ("cascade", "p-pi", None, 3000),
+        ("schedule", "pid", True, 4000),
+        ("schedule", "p-pi", True, 4000),
+    ],
+)
+def test_the_block_of_a_cascade_or_schedule_gives_what_the_simulation_gave(
+    machine: str, controller: str, scheduled: bool | None, samples: int
+) -> None:
+    one = case(machine)
+    what = exported(one.design, controller, scheduled=scheduled)
+    run, inputs = simulated(one, what, samples)
     (source,) = st_file(what).values()
     block = Blocks(source).made(f"FB_{what.program.name}")
     found = []
