@@ -39,8 +39,8 @@ def loop(
     on = "the identified plant" if place == "model" else "the other plant"
     steps = (
         "The loop with the identified Karnopp friction and the logs' noise, all controllers from"
-        " the moment of the step; dashed: with the compensator, broken grey lines: the command's"
-        " limits."
+        " the moment of the step; dashed: with the compensator, dotted: with the gain schedule,"
+        " broken grey lines: the command's limits."
     )
     quiet = "What is left of the error where it should be none: the smaller, the better."
     return [

@@ -105,11 +105,13 @@ def columns_line(found: Validation, rotary: bool = False) -> str:
     limit = (
         "" if one.command_limit is None else f"; limit {one.command_limit:.4g} {one.command_unit}"
     )
+    table = any(name.endswith(SCHEDULED) for name in found.figures)
+    beside = "+comp: with the compensator" + ("; +table: with the gain schedule" if table else "")
     limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
     return (
         f"steps of {length(one.step, rotary)}; at rest, over (overshoot): error relative to the"
         " step; smooth: to the amplitude of the smooth reference; margin: modulus margin; delay:"
-        f" delay margin in sampling periods; +comp: with the compensator{limit}"
+        f" delay margin in sampling periods; {beside}{limit}"
     )
 
 

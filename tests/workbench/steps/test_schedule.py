@@ -89,7 +89,8 @@ def test_it_is_validated_exported_written_and_read_again(tmp_path: Path) -> None
     file.write_text(dumps(design_document(found)))
     assert read_design(file).schedule == found.schedule
     result, traces = validate(model, found, np.random.default_rng(0))
-    assert "P-PI + schedule" in validation_view(result, traces, model.rotary).page()
+    page = validation_view(result, traces, model.rotary).page()
+    assert "P-PI + schedule" in page and "+table: with the gain schedule" in page
     assert {"pid + schedule", "p-pi + schedule"} <= set(result.figures)
     assert result.figures["p-pi + schedule"]["model"].stable
     what = exported(found, "p-pi")  # as it is recommended
