@@ -7,67 +7,40 @@ is. `benchmarks/ablation.py` shows what each changes on the blind benchmark, off
 decides on either side. A misfit is a mean square in units of the sensors' noise.
 """
 
-# Misfit of a free run in windows, chi-square of whole runs: mean squares in units of the noise
-# (clean and single runs of blind.py, nine_parameters.py; LIKE: drift.py).
+# What is left, as a mean square in units of the noise: of a free run in windows, of whole runs, of
+# an equation's rows, of the test logs (blind.py: clean, single; nine_parameters.py; drift.py).
 COMPLETE = 1.1  # nothing is missing (1: what is left is noise)
-ADEQUATE = 1.5  # hardly more than noise: a fit is adequate, a structure found in the run is taken
-FOLLOWED = 2.0  # a stop lost here or there: the structure still follows the log
+ADEQUATE = 1.5  # hardly more than noise: followed, adequate, predicted
 ASTRAY = 3.0  # something is missing, or a measured force's noise has drifted as far
 NEARLY_FOLLOWED = 8.0  # not followed, but near
+HOPELESS = 25.0  # far more than noise: no run of the body's own, a machine that no model follows
 CHANCE_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
-FORGIVEN_FROM = 4  # windows, of which chance may have spoilt one
-NO_RUN = 50.0  # a run by the measured force is not the body's own motion
-LIKE = 4.0  # times the misfit of the active model, where that leaves more than noise
+INERT = 2.0  # times what is left of the force, below which inertia does not show
 
-# What the equations' rows leave, in units of their noise (blind.py, chapters.py).
-MUCH = 2.0  # root mean square: something is missing from an equation
-MUCH_IS_LEFT = 25.0  # mean square: far more than noise is left
-INERT = 2.0  # times what is left, below which inertia does not show
-
-# Which effects the equations name (blind.py: clean, single; chapters.py).
-PENALTY = 5.0  # criterion (twice a log-likelihood) that each parameter has to gain
-CALLED = 10.0  # the same, of an optional parameter
+# How sure: chances, deviations, twice a log-likelihood (blind.py: clean; real.py).
 CHANCE_LEVEL = 0.01  # chance up to which the largest gain of the library is significant
+BEYOND_CHANCE = 5.0  # deviations from 0 of one size of many tried; squared, of a criterion
+PENALTY = 10.0  # criterion that each parameter of a structure has to gain (about log n: BIC)
 SEARCHED = 2.0  # times the gain of columns at one place, that a search over shapes finds by chance
-MATERIAL = 0.002  # of the Coulomb level (of the spread of dF/dt): the smallest effect spoken of
-LEAST_SHARE = 0.25  # of what is missing, that an effect explains; less is another's shadow
-MOSTLY_EXPLAINED = 0.55  # the same, where much is left in the end
-CARRIES = 0.95  # of the error on stretches left out, that an effect leaves at most there
-ELASTIC = 0.3  # of the motion seen at rest, that a bristle leaves at most
-CHANCE_IN_GAIN = 10.0  # criterion by which two effects that explain equally may differ
 
-# Which effects the free run confirms: shares of a misfit beyond 1 (blind.py: single, removed).
-HELPS = 0.75  # left at most by effects that leave more than noise, or they are useless
-EARNS = 0.8  # left at most by one effect more
-HALF_OF_EXCESS = 0.5  # left at most by an effect that only the run shows
-ALONE = 0.15  # of any rival's, left by one that is taken too where that is near
-UNCONTESTED = 0.1  # left by effects that need no contest
-NEEDLESS = 1.02  # times the misfit, without an effect that is not needed
-DOES_NOTHING = 1.002  # the same, of the plant as it is
-IDLE = 1.0001  # the same, of a single effect that the equations call for, whose size is none
-
-# What is left, and whether it carries over (blind.py: removed; outside.py --strange; chapters.py).
-SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt
+# How much: shares of what was missing before, beyond noise (blind.py: single, removed; real.py).
+EARNS = 0.8  # left at most by whatever joins a model: an effect, gravity, a lag, another level
+HALF_LEFT = 0.5  # left at most by what explains most of it
+FAR_LESS = 0.3  # left at most by another law of the same: two masses for one, a bristle
+ALONE = 0.15  # left at most by what needs no contest with rivals
+SHARE_LEFT = 0.01  # left where effects are there without a doubt
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noise
-IMPOSED_LEFT = 0.3  # the same, with prescribed motion
-# (the next three by what they mean; no bench has chosen them yet)
-SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
-MAIN_EFFECTS_LEAVE = 0.5  # share left at most of what was missing there, by effects reported first
-OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
-HIDES = 0.1  # of the force, left where it is more than friction too: nothing can be said of either
+
+# How large, beside what matters to the machine (blind.py; chapters.py; real.py).
+MATERIAL = 0.01  # of the Coulomb level, a value, an equation's square: the least reported
+OF_ACCOUNT = 0.1  # of a square error, of the force: what explains, or hides, less is not reported
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure
-CARRIED = 2.0  # times the training logs' force error, that the test logs' may be
-LEAST_DEPENDENCE = 0.08  # share of the rest that a signal explains, or it depends on none
 MOST_PLACES = 3  # effects of place in one machine, which rather are pieces of another law
 
-WORSE_PREDICTION = 1.1  # times the plain model's error of the held-out position, with effects
-
-# What differs between the logs: drift (blind.py: drift; chapters.py).
-DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
-DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
-DRIFT_LEAST = 0.01  # of its value, that it changes
-FOLLOWS_AS_WELL = 1.5  # times the usual error of whole runs, up to which one is followed as usual
-LEVELS_LEAVE = 0.8  # of a run's error, left at most by Coulomb levels fitted before it
+# One error beside another, as a factor (blind.py: removed; real.py).
+AS_WELL = 1.02  # up to which one is as good as the other
+WORSE = 1.05  # from which it is clearly worse: than the equation of motion, than the plain model
+CARRIED = 2.0  # of test logs over training logs, up to which a model carries over
 
 # What a test of a new log must be able to see, or it is inconclusive (drift.py: coarse).
 SEEN = 0.05  # of a Coulomb level, the change that it sees
@@ -76,23 +49,9 @@ CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
 LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
 VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
-# What the equation of motion's own least squares are to a fit (real.py).
-WORSE_THAN_EQUATION = 1.05  # times what they leave of the force unseen, that a fit may leave
-CONTRADICTS_EQUATION = 1.3  # the same, from which a run's nearness to the log does not matter
-BEYOND_EQUATION = 0.01  # of the Coulomb level, left beyond it by a run followed to the noise
-RUN_ASTRAY = 0.02  # of the travel, that a run is off by (rms), from which the equation decides
-MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of its numbers holds
-
 # What acts beside the applied force and is taken out first (real.py: rigs and cases).
 LAG_FROM = 0.4  # samples, from which motion and force are not of one instant
-LAG_LEAVES = 0.5  # of the equation's square, left at most by a lag that no run shows
-SURROUNDINGS_LEAVE = 0.8  # of the equation's square, left at most by a lag, or by gravity
-SURE_OF_SURROUNDINGS = 4.0  # deviations from 0, of either
-ORDERS_LEAVE = 0.5  # of the same, left at most by all orders of a turn that repeat with it
-SURE_OF_ORDER = 5.0  # deviations from 0, of each: a hundred are tried
 ORDERS_FROM = 0.5  # turns of motion, in which neighbouring orders differ
-TWO_MASSES_LEAVE = 0.3  # of the square that one body leaves, left at most by two
-RESONANCE_APART = 1.02  # times the anti-resonance, from which a resonance shows a load
 OTHER_WAY = 0.02  # of the windows of sliding, up to which those of a direction are noise
 BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
@@ -118,27 +77,17 @@ LEAVES_LESS = 0.25  # mean logarithm of what is left, by which such a load has t
 SLIDES_NEEDED = 8  # windows of sliding in each direction, for an axis test
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
-SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
-HARDLY_MORE = 1.02  # times the least force left unseen, that fewer terms of friction may leave
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to identify friction of speed alone
 GATE_MARGIN = 3.0  # times the information's deviation, by which a parameter is called identifiable
-LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
-SURE_OF_RANDOM_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
-SURE_OF_SHARE = 6.0  # deviations from 0 of a command's change between the samples of a slow log
-SHARE_GAINS = 0.01  # of the square that the equation leaves, what that change has to explain
-SHARE_BEYOND = 2.0  # deviations by which that change may be larger than of any faster loop
 JITTER_FROM = 0.5  # times the position's noise at rest, that of a jittering clock in fast motion
-ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
-ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well
+ACTUATOR_SHARE = 0.02  # of the force, that an actuator leaves which is no linear one
 
 # Samples excluded from a log (sound_logs.py, bad_samples.py below seed 100); times the noise.
 JUMP_FROM = 10.0  # step of a position beyond its motion, that is a jump
 SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a spike
 RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
 RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
-REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
-RESIDUAL_DRIFTS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
 PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
 SHARE_EXCLUDED = 1e-3  # of its samples, the same

@@ -15,7 +15,7 @@ from identification.estimation.windowed_run.parameters import values_of
 from identification.log import Log
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, FOLLOWED, LIKE
+from identification.thresholds import ASTRAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
             )
         recorded = recorded_logs([log], model.rig, drive)
         found = fit_imposed(recorded, rng, "as the active model")
-        return _of_fit(found, LIKE * max(model.chi_square, 1.0))
+        return _of_fit(found, allowed_misfit(model.chi_square))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
     # Without prescribed motion the force equation alone says that its run is not followed.
     return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
@@ -84,7 +84,7 @@ def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, A
 
 def allowed_misfit(in_force: float) -> float:
     """Misfit up to which a log's run is followed; in_force: what the model left of its own."""
-    return FOLLOWED if in_force <= ADEQUATE else LIKE * in_force
+    return ASTRAY * max(in_force, 1.0)
 
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:

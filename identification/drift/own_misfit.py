@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from identification.arrays import Array
 from identification.drift.reference_model import ReferenceModel
-from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE, LOST_FIT
+from identification.thresholds import ADEQUATE, ASTRAY, CHANCE_LEVEL, LOST_FIT
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class OwnMisfit:
         A fit that leaves more than those of the model's own logs is near to losing its way, or the
         log has something more in it: it says as much less of the parameters.
         """
-        lost = max(1.0, misfit / (LIKE * self.left))
+        lost = max(1.0, misfit / (ASTRAY * self.left))
         return lost * _at_least(self.factor * own, self.scatter)
 
     def of_model(self, in_force: Array) -> Array:

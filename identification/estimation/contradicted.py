@@ -38,9 +38,9 @@ from identification.signals.steps import (
     steps_between,
 )
 from identification.thresholds import (
+    BEYOND_CHANCE,
+    HOPELESS,
     NEARLY_FOLLOWED,
-    NO_RUN,
-    REPLACED_GAINS,
     RUN_JUMP_FROM,
     RUN_SPIKE_FROM,
 )
@@ -84,7 +84,7 @@ def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
     it is at a jump, whose size is known within its noise only.
     misfit: what the plant leaves; of a run that is not followed at all nothing is looked for.
     """
-    if misfit > NO_RUN:
+    if misfit > HOPELESS:
         return Corrected(recorded, (), tuple(range(len(recorded.logs))))
     logs, bad, owner = list[Log](), list[BadSamples](), list[int]()
     for i, one in enumerate(recorded.logs):
@@ -126,7 +126,7 @@ def _of_log(
     states = freed(plant, one, drive, begun, even=True)
     if weighted is None or states is None:
         return one.log, []
-    gains = REPLACED_GAINS * max(1.0, misfit) ** 2
+    gains = BEYOND_CHANCE**2 * max(1.0, misfit) ** 2
     log, found = _without_drive_spikes(_Driven(plant, one, drive, weighted), gains)
     run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
     if run is None or misfit > NEARLY_FOLLOWED:

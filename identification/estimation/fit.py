@@ -57,16 +57,14 @@ from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_driven
 from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
-    ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
-    BEYOND_EQUATION,
     COMPLETE,
-    CONTRADICTS_EQUATION,
-    NO_RUN,
+    HOPELESS,
+    MATERIAL,
+    NEARLY_FOLLOWED,
     PLACES_EXCLUDED,
-    RUN_ASTRAY,
     SHARE_EXCLUDED,
-    WORSE_THAN_EQUATION,
+    WORSE,
 )
 
 IMPOSED_WHY = "prescribed motion: inertia is negligible in the force"
@@ -273,7 +271,7 @@ def finished(
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
     if not (quick or needs_no_search(found, recorded)):
-        found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
+        found = searched(found, recorded, search, report, WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:
@@ -286,7 +284,7 @@ def finished(
         return fit_imposed(recorded, settle, why)
     if quick and not is_adequate(found.misfit):
         left = left_by(found.plant.friction, recorded)
-        if left is not None and contradicts_the_equation(left[0], left[1]):
+        if left is not None and bends_the_equation(left[0], left[1]):
             fit = _by_equation(recorded, other, FLOOR_WHY)
             if fit is not None:
                 return _unless_unexplained(fit, left)
@@ -307,14 +305,10 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generat
     left = left_by(fit.friction, recorded)
     if left is None:
         return fit
-    travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
-    off = max(one.position_rms for one in fit.logs)
-    if fit.adequate:
-        level = max(fit.friction.F_cp, fit.friction.F_cn)
-        wrong = bends_the_equation(left[0], left[1]) and is_material(left[0], left[1], level)
-    else:
-        wrong = goes_astray(off, travel) and bends_the_equation(left[0], left[1])
-        wrong = wrong or contradicts_the_equation(left[0], left[1])
+    level = max(fit.friction.F_cp, fit.friction.F_cn)
+    wrong = bends_the_equation(left[0], left[1])
+    if wrong and fit.adequate:
+        wrong = is_material(left[0], left[1], level)
     if wrong:
         other = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY)
         # A run that is followed to the noise lacks nothing, whatever tells its numbers.
@@ -333,9 +327,10 @@ def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> Ka
 
 
 def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
-    """Whether no search for the plain plant is made: it is followed, or that is hopeless."""
+    """Whether no search for the plain plant is made: it is followed, a motor drives it, whose
+    stops are searched already, or a search is hopeless."""
     open_to_more = found.imposed or found.misfit > COMPLETE
-    return not open_to_more or search_is_hopeless(found, recorded)
+    return recorded.held or not open_to_more or search_is_hopeless(found, recorded)
 
 
 def _told(fit: KarnoppFit) -> int:
@@ -364,27 +359,17 @@ def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> 
 
 def bends_the_equation(left: float, by_equation: float) -> bool:
     """Whether a fit leaves clearly more force than the equation of motion does by itself."""
-    return left > WORSE_THAN_EQUATION * by_equation
-
-
-def contradicts_the_equation(left: float, by_equation: float) -> bool:
-    """Whether a fit leaves so much more force that its run follows something else, however near."""
-    return left > CONTRADICTS_EQUATION * by_equation
+    return left > WORSE * by_equation
 
 
 def is_material(left: float, by_equation: float, coulomb: float) -> bool:
     """Whether what a fit leaves beyond the equation of motion is of account beside friction."""
-    return left**2 - by_equation**2 > (BEYOND_EQUATION * coulomb) ** 2
-
-
-def goes_astray(off: float, travel: float) -> bool:
-    """Whether a run that is off by so much (rms) follows a motion over that travel no more."""
-    return not off <= RUN_ASTRAY * travel
+    return left**2 - by_equation**2 > (MATERIAL * coulomb) ** 2
 
 
 def is_no_run(misfit: float) -> bool:
     """Whether a run by the measured force that leaves so much is not the body's own motion."""
-    return misfit > NO_RUN
+    return misfit > HOPELESS
 
 
 def _with_effects(
@@ -429,4 +414,4 @@ def leaves_much(of_force: float, of_noise: float) -> bool:
 
     of_force, of_noise: root mean square that it leaves, over the force's own and the sensors'.
     """
-    return of_force > ACTUATOR_SHARE and of_noise > ACTUATOR_MISFIT
+    return of_force > ACTUATOR_SHARE and of_noise**2 > NEARLY_FOLLOWED

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.progress import Halted
-from identification.thresholds import FOLLOWED
+from identification.thresholds import ADEQUATE
 
 WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
 # Near it: what tells the scale common to masses and forces is a small difference of large columns.
@@ -30,7 +30,7 @@ class Minimum:
     @property
     def followed(self) -> bool:
         """Whether hardly more than noise is left."""
-        return self.mean < FOLLOWED
+        return self.mean < ADEQUATE
 
     def covariance(self, cluster: IntArray | None = None) -> Array:
         """Of x, (k, k), for residuals that are noise of this mean square.
@@ -83,7 +83,7 @@ def gauss_newton(
         x, r, gained, damping = found
         cost -= gained
         # What is left of much more than noise need not be known to its last digits.
-        ends = LAST_STEP if cost < FOLLOWED * len(r) else LITTLE
+        ends = LAST_STEP if cost < ADEQUATE * len(r) else LITTLE
         if gained < max(ends, little) * cost:
             break
     return Minimum(fun, x, cost / len(r))

@@ -25,7 +25,7 @@ from identification.log import Log, Rig
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
-from identification.thresholds import FOLLOWED
+from identification.thresholds import ADEQUATE
 
 SLOW_LOG = 6e-3  # s between samples, from which the equation's windows are too long to tell a lag
 DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
@@ -61,7 +61,7 @@ def what_acts_beside(
     def follows(samples: float) -> bool:
         """Whether a run follows with that lag where it does not without."""
         without, with_it = left(0.0), left(samples)
-        if without <= FOLLOWED or not np.isfinite(with_it):
+        if without <= ADEQUATE or not np.isfinite(with_it):
             return False
         return explains(without - 1.0, with_it - 1.0)
 
@@ -69,7 +69,7 @@ def what_acts_beside(
         """Whether a run bears the equation's lag out, or does well with one that explains most of
         what the equation leaves."""
         without, with_it = lag_explains(logs, rig, found)
-        if explains_most(without**2, with_it**2) and left(samples) <= FOLLOWED:
+        if explains_most(without**2, with_it**2) and left(samples) <= ADEQUATE:
             return True
         return follows(samples)
 
@@ -87,7 +87,7 @@ def what_acts_beside(
 def _best_lag(left: Callable[[float], float], halt: Halt) -> float:
     """The lag in samples, by halves, that leaves least; 0 where the run is followed without one."""
     best = 0.0
-    if left(best) <= FOLLOWED:
+    if left(best) <= ADEQUATE:
         return best
     for samples in DOUBLED:
         if not halt.reached():  # a lag near by, but not the right one, may leave more than none

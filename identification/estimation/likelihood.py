@@ -30,7 +30,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, FOLLOWED
+from identification.thresholds import ADEQUATE
 
 LOOKED_FOR = 3  # rounds in which a fit's bad samples are looked for again, as in the fit
 ROOM = 4.0  # times the search's box, in which parameters of a whole run may lie
@@ -70,7 +70,7 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
         recorded = corrected(plant, recorded, left).recorded
         left = misfit(plant, recorded.logs, recorded.drive)
     walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
-    if recorded.drive == "command" and not plant.effects and not walking and left <= FOLLOWED:
+    if recorded.drive == "command" and not plant.effects and not walking and left <= ADEQUATE:
         found = _over_whole_runs(plant, recorded)
         if found is not None:
             return found

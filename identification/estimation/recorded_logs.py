@@ -29,7 +29,7 @@ from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import LINEAR_ACTUATOR
+from identification.thresholds import WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +212,7 @@ def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:
         raise BadLog(f"{name}: drive by command asked for, but no command u is logged")
     if drive is not None:
         return drive
-    return "command" if logged and left_by_actuator(logs) <= LINEAR_ACTUATOR else "force"
+    return "command" if logged and left_by_actuator(logs) * WORSE <= 1.0 else "force"
 
 
 def commanded(logs: Sequence[Log]) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.effects._base import AT_REST, Acting, Effect
+from identification.effects._base import AT_REST, Effect
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_columns import Values, in_columns
 from identification.estimation.regression.effect_rows import EffectRows
@@ -14,14 +14,13 @@ from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAW
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
 from identification.estimation.regression.weighted_rows import OVERLAP
-from identification.estimation.windowed_run.nudged_search import STICK_PER_COULOMB
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import INERT
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
+MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
 SHAPE = 0.03  # relative trust in a searched parameter
-EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
@@ -100,7 +99,7 @@ def lost(sd: float | None, value: float, typical: float) -> bool:
 
 def _limit(coulomb: float, held: float) -> float:
     """A stick limit [N] to begin from; a body at rest against a stop bears more than any."""
-    return min(max(USUAL_STICK * coulomb, held), STICK_PER_COULOMB[2] * coulomb)
+    return min(max(USUAL_STICK * coulomb, held), MOST_STICK * coulomb)
 
 
 def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:
@@ -118,21 +117,6 @@ def inertia_is_lost(o: RowFit) -> bool:
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
     return inertia < INERT * left
-
-
-def left_open(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, float]:
-    """How far sliding, which these effects explain, leaves mass, friction and sizes open, by name.
-
-    Nothing is known so well of a plant without effects, or where one is told by more than sliding.
-    """
-    if not effects or not all(
-        in_columns(a.effect) and not a.effect.place.in_stops for a in effects
-    ):
-        return {}
-    sizes = (f"{a.key}.{name}" for a in effects for name in a.effect.linear)
-    return {
-        name: EQUATION_DEVIATIONS * sd[name] for name in (*FIVE, *sizes) if sd.get(name, 0.0) > 0.0
-    }
 
 
 def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:

@@ -53,7 +53,7 @@ from identification.remarks import MinorRemark
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
-from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED
+from identification.thresholds import ADEQUATE, COMPLETE
 
 # Relative deviations that the force between its samples adds where it drives the run (where it
 # corrects one, so much less as its gain squared), by name;
@@ -89,7 +89,7 @@ def settled(
     walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
     exact = recorded.drive == "command" and not plant.effects and not walking and not quick
     spread = None
-    if exact and misfit <= FOLLOWED:
+    if exact and misfit <= ADEQUATE:
         spread = _over_whole_runs(plant, recorded, rng, report)
     if spread is None:
         spread = _over_windows(plant, recorded, misfit, rng, refined)
@@ -103,7 +103,7 @@ def _over_whole_runs(
     problem = posed(recorded)
     problem = opened(problem) if problem.hold else problem
     optimum = nearest(problem, plant)
-    if optimum.cost > COMPLETE * problem.count:
+    if optimum.cost > COMPLETE * problem.count and not problem.hold:
         # A stop that turns on less than the noise makes minima beside the right one.
         other = searched_plant(
             recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,

@@ -13,22 +13,18 @@ from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
 from identification.estimation.regressed_plant import (
     RegressedPlant,
     inertia_is_lost,
-    left_open,
     regressed_plant,
 )
-from identification.estimation.regression.effect_columns import Values, by_load
+from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
-    BREAKAWAY,
     MECHANICAL,
     MotionLog,
     shortened,
 )
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.regression.three_step import first_estimate
-from identification.estimation.windowed_run.closest import SEARCHES, SearchLimits, closest
-from identification.estimation.windowed_run.nudged_search import loaded
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import (
     RESCUES,
@@ -44,7 +40,7 @@ from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import Halted, Progress, quiet
-from identification.thresholds import ADEQUATE, COMPLETE, MUCH
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is judged
@@ -86,7 +82,7 @@ def fitted_structure(
     # follows the velocity as the log tells it, so even of the right effect more than noise is left.
     remembers = any(effect.evolve and effect.place.rubs for effect, _ in effects)
     left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
-    missing = max(left) > MUCH**2 and not remembers
+    missing = max(left) > ASTRAY and not remembers
     hopeless = missing and (bool(effects) or rough(outcomes))
     done: Refit | None = None
     try:
@@ -100,36 +96,11 @@ def fitted_structure(
         if smooth and done.misfit > COMPLETE and not hopeless:
             again = replace(onward(done.plant, logs, drive), prior=prior)
             done = again if again.misfit < done.misfit else done
-        if free and done.misfit > followed and not hopeless:
-            banded = BREAKAWAY in outcomes and not missing
-            done = _closest(told, recorded, rng, (near, missing, banded), done)
         return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
         spreads = {**prior, **told.silent}
         return FittedStructure(stage, outcomes, best, spreads, False, least)
-
-
-def _closest(
-    told: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator,
-    known: tuple[Karnopp | None, bool, bool], done: Refit,
-) -> Refit:  # fmt: skip
-    """The plant searched where nothing holds its run to the log's position.
-
-    known: what else to begin from, whether sliding is not explained, whether breakaways are told.
-    """
-    near, missing, banded = known
-    plant = told.plant
-    by_loads = any(by_load(one.effect) for one in plant.effects)
-    begins = [plant, done.plant]
-    if near is not None and by_loads:
-        # What the plain run tells is what the load leaves of it.
-        begins = [loaded(replace(plant, friction=near)), plant]
-    if missing:  # it will not do, however closely it is searched
-        begins = begins[:1]
-    open_to = {} if missing else left_open(plant.effects, dict(told.prior))
-    limits = SearchLimits(0 if missing else SEARCHES, banded and not by_loads, open_to)
-    return closest(begins, recorded.logs, recorded.drive, rng, limits, done)
 
 
 def _best_so_far(

@@ -44,13 +44,7 @@ from identification.model.surroundings import (
     Order,
     Surroundings,
 )
-from identification.thresholds import (
-    BEYOND_FRICTION,
-    LAG_FROM,
-    LAG_LEAVES,
-    SURE_OF_SURROUNDINGS,
-    SURROUNDINGS_LEAVE,
-)
+from identification.thresholds import BEYOND_CHANCE, BEYOND_FRICTION, EARNS, HALF_LEFT, LAG_FROM
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LEAD, LAG = -6.0, 12.0  # samples, between which they are
@@ -267,18 +261,18 @@ def _has_gravity(found: _Squares) -> bool:
 
 def explains(without: float, left: float) -> bool:
     """Whether a term that leaves this of a square, in place of that without it, explains it."""
-    return left <= SURROUNDINGS_LEAVE * without
+    return left <= EARNS * without
 
 
 def explains_most(without: float, left: float) -> bool:
     """Whether a lag that leaves this of a square, in place of that without it, is no noise of a
     loop, which explains less."""
-    return left <= LAG_LEAVES * without
+    return left <= HALF_LEFT * without
 
 
 def stands_out(size: float, sd: float) -> bool:
     """Whether a size is surely not 0."""
-    return abs(size) > SURE_OF_SURROUNDINGS * sd
+    return abs(size) > BEYOND_CHANCE * sd
 
 
 def larger_than_friction(up: float, down: float) -> bool:

@@ -28,12 +28,7 @@ from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Order, Surroundings
 from identification.signals.weak_form import WeakWindows, sliding_windows
-from identification.thresholds import (
-    ORDERS_FROM,
-    ORDERS_LEAVE,
-    SURE_OF_ORDER,
-    SURROUNDINGS_LEAVE,
-)
+from identification.thresholds import BEYOND_CHANCE, EARNS, HALF_LEFT, ORDERS_FROM
 
 HIGHEST = 100  # order that the windows are made short enough for
 MOST_ORDERS = 8
@@ -125,12 +120,12 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
 
 def are_most(without: float, left: float) -> bool:
     """Whether orders that leave this of a square are most of what is left without them."""
-    return left <= ORDERS_LEAVE * without
+    return left <= HALF_LEFT * without
 
 
 def is_sure(size: float, sd: float) -> bool:
     """Whether the size of an order is no luck among all the orders that were tried."""
-    return size > SURE_OF_ORDER * sd
+    return size > BEYOND_CHANCE * sd
 
 
 def turns(angle: float) -> bool:
@@ -150,10 +145,10 @@ def _chosen(found: _Turning) -> tuple[int, ...]:
         best, before = int(np.argmax(explained)), float(left @ left)
         n = int(orders[best])
         after = before - float(explained[best])
-        if n in chosen or after > SURROUNDINGS_LEAVE * before:
+        if n in chosen or after > EARNS * before:
             break
         beside = max(_explained(found.pair(n + off), base, left) for off in BESIDE_ORDER)
-        if before - beside < SURROUNDINGS_LEAVE * after:
+        if before - beside < EARNS * after:
             break  # it repeats with something else than the turn
         chosen.append(n)
         base = np.linalg.qr(np.column_stack([base, pairs[best]]))[0]

@@ -30,7 +30,7 @@ from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
-from identification.thresholds import RESONANCE_APART, SURE_OF_SURROUNDINGS, TWO_MASSES_LEAVE
+from identification.thresholds import AS_WELL, BEYOND_CHANCE, FAR_LESS
 
 RUN_SECONDS = 0.5  # s
 LEAST_CYCLES = 2.0  # of the resonance in a window
@@ -90,12 +90,12 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
 
 def shows_a_load(resonance: float, anti_resonance: float) -> bool:
     """Whether a resonance lies so far above its anti-resonance that a second mass shows."""
-    return resonance > RESONANCE_APART * anti_resonance
+    return resonance > AS_WELL * anti_resonance
 
 
 def are_two(one_body: float, left: float) -> bool:
     """Whether two masses that leave this of a square, in place of one body's, explain it."""
-    return left <= TWO_MASSES_LEAVE * one_body
+    return left <= FAR_LESS * one_body
 
 
 def of_two_masses(fit: KarnoppFit, found: Resonance) -> KarnoppFit:
@@ -135,9 +135,7 @@ def _told(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonan
     sd = spread_of_left_out(np.array(each))
     sizes = [Size(float(value), float(s)) for value, s in zip(whole, sd, strict=True)]
     made = Resonance(*sizes)
-    sure = all(
-        one.value > SURE_OF_SURROUNDINGS * one.sd for one in (made.frequency, made.m_1, made.m_2)
-    )
+    sure = all(one.value > BEYOND_CHANCE * one.sd for one in (made.frequency, made.m_1, made.m_2))
     return made if sure and damping < 1.0 else None
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.thresholds import RESIDUAL_DRIFTS
+from identification.thresholds import BEYOND_CHANCE
 
 SUMMED = (50, 125, 250, 500)  # samples in a sum
 LEAST_SUMS = 6  # sums of a stretch
@@ -23,7 +23,7 @@ def walk_size(residuals: Sequence[Array]) -> float:
     The largest over a few lengths of stretch: root of what the squares of their sums have beyond
     those of noise.
     """
-    largest, size = RESIDUAL_DRIFTS, 0.0
+    largest, size = BEYOND_CHANCE, 0.0
     for length in SUMMED:
         sums = [_sums(r, length) for r in residuals if len(r) >= LEAST_SUMS * length]
         if not sums:

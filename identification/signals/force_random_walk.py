@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from identification.arrays import Array
-from identification.thresholds import SURE_OF_RANDOM_WALK
+from identification.thresholds import BEYOND_CHANCE
 
 # Of the filter, that are tried beside 0: beyond 1 where a step of the walk shows in two samples, as
 # where the command is taken between its samples.
@@ -52,7 +52,7 @@ def force_random_walk(F: Array, y: Array, impulse: Array, h: float, apart: float
 
 def shows(gained: float) -> bool:
     """Whether a walk that gains so much (twice the log-likelihood) is more than chance."""
-    return gained > SURE_OF_RANDOM_WALK
+    return gained > BEYOND_CHANCE**2
 
 
 def _filtered(x: Array, X: Array, gain: float) -> Array:

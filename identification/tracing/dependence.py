@@ -7,7 +7,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.thresholds import LEAST_DEPENDENCE
+from identification.thresholds import OF_ACCOUNT
 from identification.tracing.result import Dependence
 
 BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
@@ -63,7 +63,7 @@ def dependence(
     left out in turn; each: rows that a level of a signal needs; least: share of the residual from
     which a signal is named, None: the usual. Each signal may act otherwise in the two directions.
     """
-    least = LEAST_DEPENDENCE if least is None else least
+    least = OF_ACCOUNT if least is None else least
     best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:

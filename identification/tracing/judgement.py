@@ -9,7 +9,7 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.remarks import MinorRemark
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HIDES
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.levels_refitted import levels_refitted
@@ -32,7 +32,6 @@ from identification.tracing.remaining_structure import (
     remaining_structure,
     strongest,
     too_much,
-    unrepeated,
     unsized,
 )
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
@@ -80,7 +79,7 @@ def judgement(
     if verdict != "unknown" and (doubts or (too_much(choice, after) and not headline)):
         verdict = "unknown"
         # A law of place is told from what the plain model leaves.
-        of_place = PIECES in doubts or LONGER in doubts
+        of_place = PIECES in doubts
         left = NOTHING if of_place else strongest(choice, after, logs, rows.drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             left = remaining_structure(without_effects(chosen.plain, choice), plain, any_size=True)
@@ -110,7 +109,7 @@ def hides_friction(left: Errors, coulomb: float) -> bool:
     size would not show."""
     if left.force_rms is None or left.force_relative is None:
         return False
-    return left.force_rms > coulomb and left.force_relative > HIDES
+    return left.force_rms > coulomb and left.force_relative > OF_ACCOUNT
 
 
 def _not_its_law(key: str) -> str:
@@ -134,7 +133,6 @@ PIECES = (
     "several effects of place together follow what is missing: rather pieces of one law of place"
     " that the library does not have"
 )
-LONGER = "a force periodic over more than the travel: it is confounded with another effect"
 UNSURE = "the size of an effect found is not identifiable from the logs"
 UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
 AS_LARGE_AS_FRICTION = (
@@ -161,7 +159,6 @@ def _doubts(
     pieces = in_pieces(choice) or (apart and places(choice) > 1 and model.misfit > COMPLETE)
     doubts = {
         PIECES: pieces,
-        LONGER: not model.imposed and unrepeated(model),
         STANDS_IN: bool(choice.steps) and not changed and not carried,
         # A machine that changed beside leaves more on the test logs, but no more than before.
         UNDER_HALF: bool(choice.steps)

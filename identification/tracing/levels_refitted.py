@@ -21,7 +21,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
-from identification.thresholds import FOLLOWS_AS_WELL, LEVELS_LEAVE
+from identification.thresholds import CARRIED, EARNS
 from identification.tracing.result import Change
 
 BEGIN = 0.25  # of a test log, on which the levels are fitted
@@ -63,12 +63,12 @@ def levels_refitted(
 
 def follows_worse(error: float, usual: float) -> bool:
     """Whether a run is off by more than it usually is."""
-    return error > FOLLOWS_AS_WELL * usual
+    return error > CARRIED * usual
 
 
 def explains_the_day(was: float, now: float, usual: float) -> bool:
     """Whether other levels take most of an error away, down to what is usual."""
-    return now <= LEVELS_LEAVE * was and not follows_worse(now, usual)
+    return now <= EARNS * was and not follows_worse(now, usual)
 
 
 def _with(plant: Plant, d: Array) -> Plant:

@@ -14,7 +14,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, CARRIED, MUCH, ROUGH_LEFT, SHOWN_FROM
+from identification.thresholds import ADEQUATE, ASTRAY, CARRIED, ROUGH_LEFT
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
@@ -101,9 +101,9 @@ def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
     lacks much comes first: one stop that a run loses by luck is more than all the rest of it. Then
     the run, by its misfit, which knows how far the noise of force and command walks.
     """
-    by_equations = [_equation_share(before, after, noise, least) for least in (MUCH**2, SHOWN_FROM)]
+    by_equations = [_equation_share(before, after, noise, least) for least in (ASTRAY, ADEQUATE)]
     by_run = None
-    if before.misfit is not None and after.misfit is not None and before.misfit > SHOWN_FROM:
+    if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
         by_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
     told = (share for share in (by_equations[0], by_run, by_equations[1]) if share is not None)
     return next(told, 0.0)
@@ -130,7 +130,7 @@ def predicted(left: OnTest, noise: NoiseFloor) -> bool:
 def hardly_predicted(left: OnTest, noise: NoiseFloor) -> bool:
     """Whether a model leaves far more force on the test logs than the sensors do."""
     force = left.errors.force_rms
-    return force is not None and force > MUCH * noise.force_rms
+    return force is not None and force**2 > ASTRAY * noise.force_rms**2
 
 
 def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:

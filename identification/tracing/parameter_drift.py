@@ -18,7 +18,7 @@ from identification.estimation.regression.weighted_rows import OVERLAP, Rows, st
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.log import Rig
 from identification.model.plant import units_of
-from identification.thresholds import DRIFT_GAIN, DRIFT_LEAST, DRIFT_SHARE
+from identification.thresholds import BEYOND_CHANCE, MATERIAL, OF_ACCOUNT
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.stepwise import Step
 from identification.tracing.remaining_structure import FEWEST_ROWS
@@ -94,7 +94,7 @@ def changes(
             break
         left, i, step = min(options, key=lambda x: x[0])
         sure = (now - left) / (noise * OVERLAP)
-        if sure < DRIFT_GAIN or now - left < DRIFT_SHARE * now:
+        if sure < BEYOND_CHANCE**2 or now - left < OF_ACCOUNT * now:
             break
         free.append(i)
         now, best = left, theta.copy()
@@ -106,5 +106,5 @@ def changes(
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))
         for i, s in zip(free, sd, strict=True)
-        if abs(best[i] - theta[i]) > DRIFT_LEAST * abs(theta[i])
+        if abs(best[i] - theta[i]) > MATERIAL * abs(theta[i])
     ]

@@ -12,7 +12,7 @@ from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
 from identification.estimation.structure_fit import FittedStructure, band, plain_structure
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, FOLLOWED
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
 
 REFINEMENT = "the refinement of the plain model to its end"
@@ -57,7 +57,7 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     if model.imposed:
         return PlainModel(rows, start, first, model, library, recorded)
     logs = rows.logs
-    if model.misfit <= FOLLOWED:  # else its stops are not the machine's
+    if model.misfit <= ADEQUATE:  # else its stops are not the machine's
         logs = tuple(replace(one, reference=model.plant.friction) for one in logs)
     # A run that is not followed may have swollen its band in place of what is missing.
     slow = band(model) if model.misfit <= ASTRAY else 0.0

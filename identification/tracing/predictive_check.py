@@ -19,7 +19,7 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import WORSE_PREDICTION
+from identification.thresholds import WORSE
 
 HORIZONS = (0.2, 2.0)  # s of free run from the measured state
 FEWEST_SAMPLES = 12  # of a horizon
@@ -55,7 +55,7 @@ def predicts_worse(
 
 def is_worse(before: float, after: float) -> bool:
     """Whether a prediction is clearly worse than another; errors in units of the noise."""
-    return after**2 - 1.0 > WORSE_PREDICTION**2 * max(before**2 - 1.0, 1.0)
+    return after**2 - 1.0 > WORSE**2 * max(before**2 - 1.0, 1.0)
 
 
 def _error(plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float) -> float:

@@ -22,7 +22,7 @@ from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt
-from identification.thresholds import LINEAR_ACTUATOR, SPEEDS_APART
+from identification.thresholds import SPEEDS_APART, WORSE
 from identification.tracing.regression.candidates import best_of
 from identification.tracing.remaining_structure import FEWEST_ROWS
 
@@ -90,7 +90,7 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
     if rig.kind == "motor" or not commanded(train):
         return False
     left = left_by_actuator(train)
-    if left > LINEAR_ACTUATOR:
+    if left * WORSE > 1.0:
         logs = [motion_log(log, held=False, by_command=True) for log in train]
         stage, first = first_stage(logs, True)
         own = [e for e in library.values() if e.place.in_actuator]
@@ -98,7 +98,7 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         rows = first[ACTUATOR].rows if ACTUATOR in first else None
         fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
         left = min([left, *(left_share(one, rows.sd, rows.b) for one in fits if rows is not None)])
-    if left > LINEAR_ACTUATOR:
+    if left * WORSE > 1.0:
         remarks.append(
             f"the command explains little of the force (a linear actuator leaves {100 * left:.0f}"
             " % of"

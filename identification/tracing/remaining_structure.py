@@ -18,7 +18,6 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.row_fit import RowFit, mean_square, rms
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.estimation.structure_fit import FittedStructure, band
-from identification.estimation.windowed_run.parameters import PERIOD_REACH
 from identification.estimation.windowed_run.run_errors import soft
 from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
@@ -27,18 +26,16 @@ from identification.signals.sampling import samples
 from identification.thresholds import (
     ASTRAY,
     COMPLETE,
-    IMPOSED_LEFT,
+    FAR_LESS,
+    HOPELESS,
     MATERIAL,
     MOST_PLACES,
-    MUCH,
-    MUCH_IS_LEFT,
     ROUGH_LEFT,
     SHARE_LEFT,
     STRUCTURED,
 )
 from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, SEPARATE, dependence
 from identification.tracing.free_run.backward_elimination import equations_explained, first_steps
-from identification.tracing.regression.shape_grid import fewest_periods
 from identification.tracing.regression.stepwise import Choice, Step
 from identification.tracing.result import Dependence
 
@@ -78,7 +75,7 @@ def remaining_structure(
         if not any_size:
             size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
             whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
-            rough = bool(choice.steps) and mean_square(o) > MUCH_IS_LEFT
+            rough = bool(choice.steps) and mean_square(o) > HOPELESS
             least = {MECHANICAL: MATERIAL, BREAKAWAY: LEAST_AT_BREAKAWAY}.get(equation, 0.0)
             if size < least * _level(choice) or is_slight(left, size**2, whole, rough):
                 continue
@@ -201,9 +198,9 @@ def too_much(choice: Choice, after: FittedStructure) -> bool:
         r = o.fit.residual[keep]
         left = float(np.mean(r**2)) if len(r) else 0.0
         scale = float(np.median(o.rows.sd[keep])) if len(r) else 0.0
-        part = IMPOSED_LEFT if after.stage.imposed else ROUGH_LEFT
+        part = FAR_LESS if after.stage.imposed else ROUGH_LEFT
         missing = part * _excess(choice.first[equation]) if choice.steps else 0.0
-        if left > MUCH**2 and (left - 1.0) * scale**2 > missing:
+        if left > ASTRAY and (left - 1.0) * scale**2 > missing:
             return True
     if after.imposed or after.misfit <= ASTRAY:
         return False
@@ -230,17 +227,6 @@ def before_pieces(choice: Choice) -> Choice:
 
 def _of_place(step: Step) -> bool:
     return step.candidate.effect.depends_on == ("y",)
-
-
-def unrepeated(after: FittedStructure) -> bool:
-    """Whether a force repeats over more than the travel shows: it stands in for another."""
-    one = max(after.stage.logs, key=lambda each: float(np.ptp(each.log["y"])))
-    travel = float(np.ptp(one.log["y"]))
-    return any(
-        acting.values[period] * fewest_periods(acting.effect, one) > PERIOD_REACH * travel
-        for acting in after.plant.effects
-        if acting.effect.place.drives and (period := acting.effect.named("period"))
-    )
 
 
 def unsized(choice: Choice, after: FittedStructure) -> bool:

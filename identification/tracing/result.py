@@ -11,7 +11,7 @@ from identification.effects._base import Effect
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
-from identification.thresholds import SMALLEST_LEVEL
+from identification.thresholds import NOTHING_OF
 
 TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
 
@@ -167,4 +167,4 @@ class Trace:
 
 def rubs(level: float, left: float) -> bool:
     """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
-    return level > SMALLEST_LEVEL * left
+    return level > NOTHING_OF * left

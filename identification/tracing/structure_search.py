@@ -5,24 +5,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.fit import by_equation_if_surer, finished
-from identification.estimation.regressed_plant import inertia_is_lost
+from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
 from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import HELPS, MUCH, SHARE_LEFT
+from identification.thresholds import ASTRAY, EARNS, SHARE_LEFT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
-    doubted,
+    equations_explained,
     fewest,
     first_alone,
     suffices,
 )
-from identification.tracing.free_run.forward_selection import at_once, judged_forward
+from identification.tracing.free_run.forward_selection import judged_forward
 from identification.tracing.free_run.rivals import discriminated
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
@@ -42,15 +43,13 @@ class FirstEffect:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What the equations choose: the first effect alone, refined on its run, and all of them.
+    """The effects that the equations choose.
 
     pieces: whether they are pieces of one law of place, all but the first dropped.
     """
 
     plain: PlainModel
     setting: Setting
-    begun: Choice
-    alone: FittedStructure | None
     choice: Choice
     pieces: bool
 
@@ -84,7 +83,7 @@ def selection(begin: FirstEffect, rng: np.random.Generator, report: Progress) ->
         choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
     pieces = not plain.model.imposed and in_pieces(choice)
     choice = before_pieces(choice) if pieces else choice
-    return Selection(plain, setting, begun, alone, choice, pieces)
+    return Selection(plain, setting, choice, pieces)
 
 
 def share_beside(plain: PlainModel, choice: Choice) -> float:
@@ -105,39 +104,26 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
     """The effects refined on the free run, without those that it does without, with those that
     only it shows."""
     setting, choice, plain = chosen.setting, chosen.choice, chosen.plain.model
-    begun, alone, model = chosen.begun, chosen.alone, plain
-    sliding = choice.base[MECHANICAL]
-    hidden = plain.imposed and (inertia_is_lost(sliding) or mean_square(sliding) > MUCH**2)
-    unsure = setting.start.band == 0.0 and not hidden
-    # Where the first effect leaves next to nothing of the equations, the run may tell the next.
-    more = alone is not None and 0 < len(alone.plant.effects) < len(choice.steps)
-    halt = setting.halt
-    found = None
-    if alone is not None and more:
-        what = "a second effect that the free run shows at once"
-        found = halt.tried(what, lambda: at_once(begun, alone, setting, report), None)
-    if found is not None:
-        choice, model = found
-    elif choice.steps:
-        choice, model = fewest(choice, setting, unsure)
-    if unsure:
-        choice, model = _doubted(choice, model, setting)
-        setting = replace(setting, doubted=choice.steps)
+    model = plain
+    if choice.steps:
+        choice, model = fewest(choice, setting)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    if not halt.reached() and useless(choice, plain, model):
+    if not setting.halt.reached() and useless(choice, plain, model):
         choice, model = without_effects(chosen.plain, choice), plain
-    return Refinement(discriminated(choice, model, setting), model)
+    return Refinement(discriminated(choice, model, setting), by_equations(choice, model, setting))
 
 
-def _doubted(
-    choice: Choice, model: FittedStructure, setting: Setting
-) -> tuple[Choice, FittedStructure]:
-    """As `doubted`; halted, the choice and its model as they are."""
-    if not choice.steps:
-        return choice, model
-    what = "whether the plain model's band had hidden an effect of slow motion"
-    return setting.halt.tried(what, lambda: doubted(choice, model, setting), (choice, model))
+def by_equations(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
+    """The model with sliding friction and effects as the equations identify them, where these are
+    explained but the run is not followed, which would bend them and make them unsure."""
+    followed = model.imposed or model.misfit <= ASTRAY
+    if followed or not choice.steps or not equations_explained(choice.base):
+        return model
+    told = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
+    names = [name for name, sd in told.prior.items() if name in model.sd and sd > 0.0]
+    plant = plant_with(model.plant, names, values_of(told.plant, names))
+    return replace(model, plant=plant, sd={**model.sd, **{n: told.prior[n] for n in names}})
 
 
 def without_effects(plain: PlainModel, choice: Choice) -> Choice:
@@ -156,13 +142,13 @@ def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> 
     if after.imposed or not choice.steps:
         return False
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    lacked = any(mean_square(choice.first[e]) > MUCH**2 for e in told)
+    lacked = any(mean_square(choice.first[e]) > ASTRAY for e in told)
     if lacked and all(
-        mean_square(choice.base[e]) <= max(MUCH**2, SHARE_LEFT * mean_square(choice.first[e]))
+        mean_square(choice.base[e]) <= max(ASTRAY, SHARE_LEFT * mean_square(choice.first[e]))
         for e in told
     ):
         return False
-    return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
+    return after.misfit - 1.0 > EARNS * max(before.misfit - 1.0, 0.0)
 
 
 def settled_plain(

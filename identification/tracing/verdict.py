@@ -16,7 +16,7 @@ from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
-from identification.thresholds import MAIN_EFFECTS_LEAVE, OTHER_LAW
+from identification.thresholds import HALF_LEFT, ROUGH_LEFT
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
@@ -72,13 +72,13 @@ def verdict_of(
 
 def is_headline(share: float) -> bool:
     """Whether effects that leave this share of what was missing are told first."""
-    return share <= MAIN_EFFECTS_LEAVE
+    return share <= HALF_LEFT
 
 
 def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]:
     """Effects whose own signals tell of what is left (`share` of what was missing): their law is
     not the machine's."""
-    if share * left.explained <= OTHER_LAW:
+    if share * left.explained <= ROUGH_LEFT:
         return ()
     return tuple(
         step.candidate.effect.key

@@ -13,7 +13,7 @@ from scipy.stats import wilcoxon
 
 from identification.arrays import Array
 from identification.progress import KeepGoing, without_end
-from identification.thresholds import CARRIES, CHANCE_LEVEL, SHOWN_FROM
+from identification.thresholds import ADEQUATE, CHANCE_LEVEL, WORSE
 from identification.velocity.fit import ValveFit, fit, refined
 from identification.velocity.model import Valve
 from identification.velocity.record import AHEAD, MOST_FOLDS, SHORTLY_AHEAD, Record, folds
@@ -115,13 +115,13 @@ def clearly_better(one: Array, other: Array, tests: int = 1) -> tuple[bool, floa
     if not np.any(gain):
         return False, 1.0
     p = float(wilcoxon(gain, alternative="greater").pvalue)
-    less = float(np.sqrt(np.mean(one))) <= CARRIES * float(np.sqrt(np.mean(other)))
+    less = float(np.sqrt(np.mean(one))) < float(np.sqrt(np.mean(other))) / WORSE
     return bool(p * tests <= CHANCE_LEVEL and less), p
 
 
 def is_noise(square: float, noise: float) -> bool:
     """Whether a mean square error [m²] from a measured start is the sensor's, of this noise [m]."""
-    return square <= SHOWN_FROM * 2.0 * noise**2
+    return square <= ADEQUATE * 2.0 * noise**2
 
 
 def left_by_valve(

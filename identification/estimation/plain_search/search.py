@@ -8,7 +8,6 @@ import numpy as np
 from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.cost import START_V, START_Y
 from identification.estimation.plain_search.fitted_runs import total_cost
-from identification.estimation.plain_search.growing_windows import climb
 from identification.estimation.plain_search.local_search import Optimum, refine
 from identification.estimation.plain_search.problem import Problem, plant_of, pose
 from identification.log import Log, Rig
@@ -35,12 +34,7 @@ def searched_plant(
     moves, BadLog where a signal is missing.
     """
     problem = pose(logs, rig, drive, halt)
-    found = (
-        climb(opened(problem), rng, report)
-        if problem.hold
-        else _search(problem, rng, report, attempt)
-    )
-    return plant_of(problem, found)
+    return plant_of(problem, _search(problem, rng, report, attempt))
 
 
 def opened(problem: Problem) -> Problem:

@@ -16,7 +16,8 @@ from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.weighted_rows import Rows, spread_of_left_out
 from identification.log import Log
-from identification.thresholds import SHARE_BEYOND, SHARE_GAINS, SURE_OF_SHARE
+from identification.model.estimates import NORMAL_95
+from identification.thresholds import BEYOND_CHANCE, MATERIAL
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
 FAR_FASTER = 50.0  # periods a sample, as which any more count
@@ -63,9 +64,9 @@ def _rate_column(one: MotionLog) -> Array:
 
 def told_share(share: float, sd: float, gain: float) -> float:
     """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
-    if share < SURE_OF_SHARE * sd or gain < SHARE_GAINS:
+    if share < BEYOND_CHANCE * sd or gain < MATERIAL:
         return 0.0
-    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + SHARE_BEYOND * sd else 0.0
+    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + NORMAL_95 * sd else 0.0
 
 
 def between_samples(log: Log, share: float, held: bool) -> Log:

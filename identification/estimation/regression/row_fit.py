@@ -26,7 +26,7 @@ from identification.estimation.regression.weighted_rows import (
     solve_rows,
     stacked,
 )
-from identification.thresholds import MUCH_IS_LEFT
+from identification.thresholds import HOPELESS
 
 TRIM = 4.0  # what a row counts that is left out for its low speed
 TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that may be left out
@@ -174,7 +174,7 @@ def rms(r: Array) -> float:
 
 def rough(base: Mapping[str, RowFit]) -> bool:
     """Whether far more than the sensors' noise is left when nothing more is found."""
-    return any(mean_square(base[e]) > MUCH_IS_LEFT for e in (MECHANICAL, ACTUATOR) if e in base)
+    return any(mean_square(base[e]) > HOPELESS for e in (MECHANICAL, ACTUATOR) if e in base)
 
 
 def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> dict[str, float]:

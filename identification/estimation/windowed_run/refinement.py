@@ -41,7 +41,7 @@ from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halted
 from identification.simulation.effect_table import LONGEST_BRISTLE
-from identification.thresholds import COMPLETE, FOLLOWED, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, COMPLETE, NEARLY_FOLLOWED
 
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
 # where a stop comes late, no more than its own window is lost, so the minimum is wide.
@@ -88,7 +88,7 @@ class Refit:
     def sd(self) -> dict[str, float]:
         """Standard deviations by name (effects as key.name)."""
         deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist()
-        least = self.prior if self.misfit > FOLLOWED else {}
+        least = self.prior if self.misfit > ADEQUATE else {}
         return {n: max(s, least.get(n, 0.0)) for n, s in zip(self.names, deviations, strict=True)}
 
 
@@ -213,7 +213,7 @@ def refit(
 
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
-        factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
+        factor = RUN_WINDOW / logs[0].log.h if found > ADEQUATE else 1.0
         scale = np.outer(unit[free], unit[free])
         if not any(walks(one, drive) for one in logs):
             return factor * at.covariance() * scale

@@ -20,7 +20,7 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import CHANCE_WINDOWS, FOLLOWED, FORGIVEN_FROM
+from identification.thresholds import ADEQUATE, CHANCE_WINDOWS
 
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
@@ -63,7 +63,7 @@ def _lost(plant: Plant, one: MotionLog, drive: Drive, own: Freed | None) -> Bool
         return out
     window = window_of(own.begun, len(one.log))
     each, kept = _by_window(r[0], window, one.signals["d"] != 0)
-    spoilt = np.setdiff1d(np.flatnonzero(each > FOLLOWED), kept)
+    spoilt = np.setdiff1d(np.flatnonzero(each > ADEQUATE), kept)
     return np.isin(window, spoilt)
 
 
@@ -119,6 +119,6 @@ def _by_window(r: Array, window: IntArray, moves: BoolArray | None) -> tuple[Arr
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
     told = len(size) if moves is None else int(np.count_nonzero(np.bincount(window, moves)))
-    spoilt = max(int(CHANCE_WINDOWS * told), int(told >= FORGIVEN_FROM))
+    spoilt = round(CHANCE_WINDOWS * told)
     kept = np.argsort(each)[: max(1, len(size) - spoilt)]
     return np.asarray(each, dtype=np.float64), kept.astype(np.int64)

@@ -5,34 +5,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.effects._base import Effect
+from identification.effects._base import MAX_SIGNALS, Acting, Effect
 from identification.errors import UserError
-from identification.estimation.regression.effect_columns import by_load
-from identification.estimation.windowed_run.closest import closer
-from identification.estimation.windowed_run.nudged_search import (
-    BREAKS_RANGE,
-    CLOSE_RANGE,
-    FAR_RANGE,
-    FINER_RANGE,
-    GROWTH_RANGE,
-    MIDWAY_RANGE,
-    SIDES_RANGE,
-    SLIDING_RANGE,
-    judge_nudged,
-    less_load,
-    nearer,
-    nudged_search,
-)
+from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD, by_load
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
-from identification.estimation.windowed_run.refinement import Refit, briefly, onward, refit
+from identification.estimation.windowed_run.refinement import Refit, briefly, refit
 from identification.estimation.windowed_run.run_errors import judge, loss, misfit
 from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import RUN_WINDOW
+from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.thresholds import COMPLETE, NEARLY_FOLLOWED
+from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import (
     Setting,
-    known,
     refined_near,
 )
 from identification.tracing.free_run.trial_structures import Trial, seen_in_run
@@ -40,6 +25,7 @@ from identification.tracing.regression.stepwise import Step
 
 MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
+SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 LARGER = 3  # starts of a play, from the best up
 
 
@@ -55,11 +41,10 @@ class RunContender:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A trial after a first search: the plant before and after it, what that leaves (a run nudged
-    along the log where nothing else holds it, and one let go), and other plants to begin from."""
+    """A trial after a first search: the plant, what its run leaves, and other plants to begin
+    from."""
 
     trial: Trial
-    start: Plant
     plant: Plant
     loss: float
     misfit: float
@@ -78,27 +63,35 @@ def begun_with(trial: Trial, setting: Setting) -> list[Begun]:
             continue
     if not plants:
         return []
-    free = loose(plants[0], setting.drive)
-    if free and not known(setting):
-        errors_of = judge_nudged(plants[0], setting.short, setting.drive, 1.0)
-    else:
-        errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
+    errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
     try:
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
         at = int(np.argmin(costs))
         first = _first(plants[at], trial.effect, setting)
         others: tuple[Plant, ...] = ()
-        if free and (by_load(trial.effect) or trial.effect.place.in_stops):
-            # What hardly shows by itself is small at its best start: another from the middle.
-            others = (plants[len(plants) // 2],)
-        elif trial.effect.place.shows and len(trial.effect.params) == 1:
+        if trial.effect.place.shows and len(trial.effect.params) == 1:
             # The plain parameters are bent to do without it: a larger size may be the better start.
             others = tuple(plants[at + 1 : at + LARGER])
         left_by = misfit(first, setting.short, setting.drive)
-        return [Begun(trial, plants[at], first, loss(errors_of(first)), left_by, others)]
+        return [Begun(trial, first, loss(errors_of(first)), left_by, others)]
     except UserError:  # two effects of a kind that a plant takes one of
         return []
+
+
+def load_share(friction: Karnopp, acting: Acting) -> float:
+    """Share of the applied force that friction by load leaves to the motion."""
+    none = np.zeros(MAX_SIGNALS)
+    level = friction.F_cp
+    taken = acting.effect.value(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, level, level, none, acting.array)
+    return max(1.0 - taken, LEAST_LEFT_BY_LOAD)
+
+
+def less_load(base: Plant, acting: Acting) -> Plant:
+    """The plant with what friction by load takes of the force taken off its own parameters."""
+    nine = base.friction.array.copy()
+    nine[SCALED] *= load_share(base.friction, acting)
+    return replace(base, friction=Karnopp.from_array(nine))
 
 
 def on_short_logs(one: Begun, setting: Setting, enough: float) -> RunContender | None:
@@ -107,13 +100,12 @@ def on_short_logs(one: Begun, setting: Setting, enough: float) -> RunContender |
     enough: misfit from which it may be the best; far above it no other start is tried.
     """
     trial = one.trial
-    free = loose(one.plant, setting.drive)
     try:
-        found = near_start(one.start, one.plant, setting)
+        found = near_start(one.plant, setting)
         for other in one.others:
-            if found.misfit <= COMPLETE or (not free and found.misfit > WORTH * enough):
+            if found.misfit <= COMPLETE or found.misfit > WORTH * enough:
                 break
-            again = near_start(other, _first(other, trial.effect, setting), setting)
+            again = near_start(_first(other, trial.effect, setting), setting)
             found = min(found, again, key=lambda x: x.misfit)
     except UserError:
         return None
@@ -123,61 +115,22 @@ def on_short_logs(one: Begun, setting: Setting, enough: float) -> RunContender |
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
-        if not effect.place.in_stops and not on_bristle(plant):
-            return briefly(plant, setting.short, setting.drive).plant
-        # Growth shows in stops alone, of which brief windows see little.
-        # Where the plain run is nearly followed, its band and limits are nearly right.
-        around = MIDWAY_RANGE if setting.plain.misfit <= NEARLY_FOLLOWED else SLIDING_RANGE
-        around = BREAKS_RANGE if effect.place.in_stops else around
-        stage = (0.0, around) if known(setting) else (1.0, FAR_RANGE)
-        return nudged_search(plant, setting.short, setting.drive, setting.rng, (stage,))
+        return plant if on_bristle(plant) else briefly(plant, setting.short, setting.drive).plant
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
     return plant
 
 
-def near_start(start: Plant, plant: Plant, setting: Setting) -> Refit:
-    """The plant after a first search, or its start, refined a little on the short logs."""
-    if loose(plant, setting.drive) and misfit(plant, setting.short, setting.drive) > COMPLETE:
-        plant = nearer((plant, start), setting.short, setting.drive)
-        plant = nudged_search(
-            plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE_RANGE),)
-        )
+def near_start(plant: Plant, setting: Setting) -> Refit:
+    """The plant after a first search refined a little on the short logs."""
     return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    growth = one.effect.place.in_stops and loose(one.plant, setting.drive)
-    found = _grown(one, setting) if growth else refined_near(one.plant, setting)
+    found = refined_near(one.plant, setting)
     if COMPLETE < found.misfit < MAY_BE_UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
-        if found.misfit > COMPLETE and loose(found.plant, setting.drive):
-            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES_RANGE)
-            found = again if again.misfit < found.misfit else found
     return found
-
-
-def _grown(one: RunContender, setting: Setting) -> Refit:
-    """A contender of growing stiction, searched and refined on the whole logs in turn.
-
-    A breakaway is at one sample or the next, so a small change of its limit changes nothing, and
-    where each start hangs on the rest before it, minima are many and narrow.
-    """
-    logs, drive = setting.logs, setting.drive
-    begins = [one.plant]
-    # All but the rare late breakaways
-    if not one.steps and setting.plain.misfit <= NEARLY_FOLLOWED:
-        begins.append(replace(one.plant, friction=setting.plain.plant.friction))
-    best: Refit | None = None
-    for around in (GROWTH_RANGE, GROWTH_RANGE, FINER_RANGE, FINER_RANGE):
-        near = [nudged_search(x, logs, drive, setting.rng, ((0.0, around),)) for x in begins]
-        found = onward(nearer((*begins, *near), logs, drive), logs, drive)
-        best = found if best is None or found.misfit < best.misfit else best
-        if not COMPLETE < best.misfit < MAY_BE_UNEVEN:
-            break
-        begins = [best.plant]
-    assert best is not None
-    return best

@@ -21,28 +21,19 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     shortened,
 )
-from identification.estimation.regression.row_fit import RowFit, mean_square, rough, settled_fits
+from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.closest import SHORT_SECONDS
 from identification.estimation.windowed_run.parameters import loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit
 from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import (
-    ADEQUATE,
-    ALONE,
-    ASTRAY,
-    COMPLETE,
-    HALF_OF_EXCESS,
-    MUCH,
-    NEARLY_FOLLOWED,
-)
+from identification.thresholds import ADEQUATE, ALONE, ASTRAY, COMPLETE, HALF_LEFT, NEARLY_FOLLOWED
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     earned,
     enough,
-    known,
+    equations_explained,
     pruned,
     seconds,
     with_steps,
@@ -60,6 +51,7 @@ from identification.tracing.regression.candidates import EffectCandidate, trial
 from identification.tracing.regression.significance import by_luck
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
+SHORT_SECONDS = 15.0  # s of each log on which contenders are tried first
 RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
 Report = Callable[[str, float], None]
 
@@ -68,12 +60,11 @@ def judged_forward(
     choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure]:
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
-    free = loose(model.plant, setting.drive)
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
-    if model.imposed or (on_bristle(model.plant) and free):
+    if model.imposed or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
     called_for = choice.steps
-    if model.misfit > enough(setting, choice.steps) and hidden(choice, free):
+    if model.misfit > enough(setting, choice.steps) and hidden(choice):
         found = setting.halt.tried(
             RUN_ALONE, lambda: _contested(choice, model, setting, report), None
         )
@@ -89,7 +80,8 @@ def _contested(
     choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure] | None:
     """The choice and its model with what a contest on short logs adds or exchanges, if anything."""
-    short = cut_short(choice, model, setting)
+    logs, drive = setting.logs, setting.drive
+    short = [most_left(model.plant, one, drive, SHORT_SECONDS) for one in logs]
     return contest(choice, model, replace(setting, short=short), report)
 
 
@@ -104,57 +96,24 @@ def _pruned(
     return setting.halt.tried(what, lambda: pruned(choice, model, setting), (choice, model))
 
 
-def at_once(
-    choice: Choice, model: FittedStructure, setting: Setting, report: Report
-) -> tuple[Choice, FittedStructure] | None:
-    """The choice and its model with one effect more, where a first search in the run finds one
-    with which nothing is missing."""
-    free = loose(model.plant, setting.drive)
-    if model.imposed or (on_bristle(model.plant) and free):
-        return None
-    found = contest(
-        choice, model, replace(setting, short=cut_short(choice, model, setting)), report,
-        quickly=True,
-    )  # fmt: skip
-    return found if found is not None and found[1].misfit <= COMPLETE else None
-
-
-def cut_short(choice: Choice, model: FittedStructure, setting: Setting) -> list[MotionLog]:
-    """The logs' beginnings or, where the run alone tells what is missing, what it follows least."""
-    logs, drive = setting.logs, setting.drive
-    if not choice.steps and loose(model.plant, drive) and known(setting):
-        return [most_left(model.plant, one, drive, SHORT_SECONDS) for one in logs]
-    return [shortened(one, SHORT_SECONDS) for one in logs]
-
-
-def hidden(choice: Choice, free: bool) -> bool:
+def hidden(choice: Choice) -> bool:
     """Whether what the run lacks may be an effect that the equations hardly show.
 
-    Where they themselves leave much, and no effect explains more of it, none is; nor is one where
-    nothing brings the run back (free) and none brings the equations near the sensors' noise.
+    Where they themselves leave much, and no effect explains most of it, none is.
     """
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    return all(mean_square(choice.base[e]) <= MUCH**2 for e in told) or any(
-        mean_square(one.outcomes[e]) < HALF_OF_EXCESS * mean_square(choice.base[e])
+    return equations_explained(choice.base) or any(
+        mean_square(one.outcomes[e]) < HALF_LEFT * mean_square(choice.base[e])
         for one in choice.tried
-        if not (free and rough(one.outcomes))
         for e in told
         if e in one.outcomes
     )
 
 
 def contest(
-    choice: Choice,
-    model: FittedStructure,
-    setting: Setting,
-    report: Report,
-    *,
-    quickly: bool = False,
+    choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure] | None:
-    """The best structure of one effect more, or of another in an effect's place, if decisive.
-
-    quickly: only where a first search already follows the short logs with one.
-    """
+    """The best structure of one effect more, or of another in an effect's place, if decisive."""
     begun = list[Begun]()
     tried = list(structures(choice, model, setting))
     for i, attempt in enumerate(tried):
@@ -162,8 +121,6 @@ def contest(
         report("judging", 0.5 * (i + 1) / len(tried))
     # What a sensor shows leads the run astray, so its loss tells nothing.
     begun.sort(key=lambda one: (one.misfit > ADEQUATE, one.loss))
-    if quickly and not (begun and begun[0].misfit <= ADEQUATE):
-        return None
     promising = earning(choice, model, setting)
     screened = screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
@@ -186,7 +143,7 @@ def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
     """
     if not choice.steps:
         return np.inf
-    without = near_start(model.plant, model.plant, setting).misfit
+    without = near_start(model.plant, setting).misfit
     return np.inf if without <= COMPLETE else earned(without)
 
 
@@ -227,7 +184,7 @@ def decisive(before: float, others: Sequence[RunContender]) -> float:
     rival = min((one.misfit for one in others), default=before)
     least = min(before, rival)
     return max(
-        min(ADEQUATE, 1.0 + HALF_OF_EXCESS * (before - 1.0)),
+        min(ADEQUATE, 1.0 + HALF_LEFT * (before - 1.0)),
         min(NEARLY_FOLLOWED, 1.0 + ALONE * (least - 1.0)),
     )
 

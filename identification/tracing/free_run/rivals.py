@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from identification.estimation.structure_fit import FittedStructure
-from identification.thresholds import CHANCE_IN_GAIN, COMPLETE, LEAST_SHARE
+from identification.thresholds import COMPLETE, EARNS, PENALTY
 from identification.tracing.free_run.backward_elimination import Setting, fitted, only, seconds
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, Step, merit, share
@@ -17,8 +17,8 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
         c
         for c in step.rivals
         if c.effect.key not in step.apart
-        and mine - merit(c) < CHANCE_IN_GAIN
-        and share(c, step.base) >= LEAST_SHARE
+        and mine - merit(c) < PENALTY
+        and share(c, step.base) >= 1.0 - EARNS
     )
 
 
@@ -42,7 +42,7 @@ def discriminated(choice: Choice, after: FittedStructure, setting: Setting) -> C
                 setting.halt.left_out(f"rivals of {key} on the free run")
                 return
             lost = seconds(setting) * (run.misfit - after.misfit)
-            if not run.imposed and run.misfit > COMPLETE and lost > CHANCE_IN_GAIN:
+            if not run.imposed and run.misfit > COMPLETE and lost > PENALTY:
                 yield rival.effect.key
 
     return replace(choice, steps=tuple(replace(x, apart=frozenset(short(x))) for x in choice.steps))

@@ -26,7 +26,7 @@ from identification.estimation.regression.effect_rows import EffectRows, with_ef
 from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, row_fit, with_sizes
 from identification.estimation.regression.weighted_rows import stacked
-from identification.thresholds import CALLED
+from identification.thresholds import PENALTY
 from identification.tracing.regression.shape_grid import shape_grid
 
 REFINED = 30  # evaluations of the refinement for each parameter
@@ -88,7 +88,7 @@ def best_of(
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
     best = shaped(free, bounds, best, score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
-    if half != best and score(half) < score(best) + CALLED:
+    if half != best and score(half) < score(best) + PENALTY:
         best = half  # a harmonic had taken the whole of it
     total, found = trial(own, effect, best, told_in)
     for i in range(SUBSTITUTIONS if needs_rounds(effect) else 0):
@@ -115,7 +115,7 @@ def shaped(
         best = refined_shape([free[i] for i in told], [bounds[i] for i in told], best, score)
     if len(told) < len(free):
         other = refined_shape(free, bounds, best, score)
-        if score(other) < score(best) - CALLED * (len(free) - len(told)):
+        if score(other) < score(best) - PENALTY * (len(free) - len(told)):
             best = other
     return best
 

@@ -33,14 +33,7 @@ from identification.estimation.regression.signals_behind_effects import (
     shown_to_true,
 )
 from identification.progress import Halted, Progress
-from identification.thresholds import (
-    CARRIES,
-    ELASTIC,
-    LEAST_SHARE,
-    MATERIAL,
-    MOSTLY_EXPLAINED,
-    PENALTY,
-)
+from identification.thresholds import EARNS, FAR_LESS, HALF_LEFT, MATERIAL, PENALTY, WORSE
 from identification.tracing.regression.candidates import EffectCandidate, best_of
 from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import by_luck, chance
@@ -173,7 +166,7 @@ def trusted(
 def is_trusted(left: float, explained: float) -> bool:
     """Whether an effect carries over, or explains most; left: share of the error on logs left out,
     explained: of what is missing."""
-    return left < CARRIES or explained >= MOSTLY_EXPLAINED
+    return left * WORSE < 1.0 or explained >= HALF_LEFT
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
@@ -237,7 +230,7 @@ def next_step(
         c
         for c in ranked
         if material(c, scaled, base)
-        and share(c, base) >= LEAST_SHARE
+        and share(c, base) >= 1.0 - EARNS
         and shows_fast(c, scaled, base)
         and gives_way(c, base)
     ]
@@ -287,7 +280,7 @@ def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:
     if at_rest < 0.5 * candidate.gain:
         return True
     left = mean_square(candidate.outcomes[REST]) - 1.0
-    return left <= ELASTIC * max(mean_square(base[REST]) - 1.0, 0.0)
+    return left <= FAR_LESS * max(mean_square(base[REST]) - 1.0, 0.0)
 
 
 def share(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> float:
@@ -360,7 +353,7 @@ def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, R
             return True
         if equation == REST and size > float(np.median(base[equation].rows.sd)):
             return True
-        if equation == BREAKAWAY and size > 10 * MATERIAL * level:
+        if equation == BREAKAWAY and size > 2.0 * MATERIAL * level:
             return True
     return False
 

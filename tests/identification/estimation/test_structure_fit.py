@@ -1,7 +1,7 @@
 """From a regression's sizes to a plant."""
 
 from identification.effects._library import built_in
-from identification.estimation.regressed_plant import EQUATION_DEVIATIONS, left_open, slight
+from identification.estimation.regressed_plant import slight
 
 KEY = "position_dependent_friction"
 
@@ -28,16 +28,3 @@ def test_the_one_size_of_an_effect_is_never_taken_for_nothing() -> None:
     effect = built_in()["spring"]
     assert slight(effect, {"k": 0.1, "k_3": 1e6}, {"k": 1.0, "k_3": 1.0}) == set()
     assert slight(effect, {"k": 50.0, "k_3": 1.0}, {"k": 1.0, "k_3": 10.0}) == {"k_3"}
-
-
-def test_only_what_sliding_tells_is_known() -> None:
-    effects = built_in()
-    spring = effects["spring"].acting({"k": 50.0})
-    growth = effects["rising_stiction"].acting({"F_r": 2.0, "tau": 1.0})
-    sd = {"m": 0.01, "F_cp": 0.0, "spring.k": 2.0, "rising_stiction.F_r": 0.1}
-    assert left_open([spring], sd) == {
-        "m": EQUATION_DEVIATIONS * 0.01,
-        "spring.k": EQUATION_DEVIATIONS * 2.0,
-    }
-    assert left_open([spring, growth], sd) == {}
-    assert left_open([], sd) == {}

@@ -41,7 +41,7 @@ def logged(u_d: float) -> Log:
 def test_an_actuator_that_an_effect_makes_linear_is_judged(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(recorded_rows, "LINEAR_ACTUATOR", 0.9)  # of this log a line leaves 0.92
+    monkeypatch.setattr(recorded_rows, "WORSE", 1.0 / 0.9)  # of this log a line leaves 0.92
     log, dead = logged(0.25), {"valve_dead_zone": built_in()["valve_dead_zone"]}
     remarks: list[str] = []
     assert recorded_rows._by_command([log], RIG, dead, remarks)

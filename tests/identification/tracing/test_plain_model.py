@@ -5,7 +5,7 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.log import Rig
-from identification.thresholds import FOLLOWED
+from identification.thresholds import ADEQUATE
 from identification.tracing import plain_model as module
 from identification.tracing.plain_model import PlainModel, plain_model
 from identification.tracing.recorded_rows import recorded_rows
@@ -24,7 +24,7 @@ def plain_of(effects: dict[str, dict[str, float]] | None) -> PlainModel:
 @pytest.mark.slow
 def test_only_a_plant_that_is_followed_says_how_far_noise_walks() -> None:
     followed, lost = plain_of(None), plain_of(COGGING)
-    assert followed.model.misfit <= FOLLOWED < lost.model.misfit
+    assert followed.model.misfit <= ADEQUATE < lost.model.misfit
     assert [one.reference for one in followed.rows.logs] == [followed.model.plant.friction]
     assert [one.reference for one in lost.rows.logs] == [None]
 

@@ -24,7 +24,6 @@ from identification.tracing.remaining_structure import (
     remaining_structure,
     strongest,
     too_much,
-    unrepeated,
     unsized,
     upward,
 )
@@ -114,21 +113,6 @@ def test_three_effects_of_place_are_pieces_of_another(
     three = of("spring", "cogging", "warmup", "tight_spot", "stribeck")
     assert places(three) == 3
     assert before_pieces(three).steps == three.steps[:3]
-
-
-def test_a_force_repeats_only_over_what_the_travel_shows(
-    found: tuple[Choice, FittedStructure],
-) -> None:
-    _, after = found
-    travel = float(np.ptp(after.stage.logs[0].log["y"]))
-
-    def along(key: str, periods: float) -> FittedStructure:
-        values = {"a": 1.0, "period": travel / periods}
-        return replace(after, plant=plant({key: values}))
-
-    assert not unrepeated(along("cogging", 1.5))
-    assert unrepeated(along("cogging", 1.2))
-    assert not unrepeated(along("position_dependent_friction", 1.2))  # of which a part may show
 
 
 def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(

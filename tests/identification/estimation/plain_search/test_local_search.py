@@ -9,6 +9,7 @@ from identification.arrays import Array
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.plain_search.fitted_runs import FittedRun, prepare_run, total_cost
 from identification.estimation.plain_search.local_search import (
+    _solved,
     pack,
     refine,
     sample,
@@ -83,3 +84,15 @@ def test_pack_and_unpack_are_inverse() -> None:
     sets, begun = unpack([run], truth * 2, starts + 1, FREE, theta[None])
     assert np.array_equal(sets[0], truth)
     assert np.array_equal(begun[0, 0, list(run.open)], run.start[list(run.open)])
+
+
+def test_elimination_of_starts_equals_the_dense_solution() -> None:
+    rng = np.random.default_rng(0)
+    own = [2, 1, 3] * 8
+    shared, d = 9, 9 + sum(own)
+    matrix = np.diag(rng.uniform(5.0, 9.0, d))
+    matrix[:shared, :] += 0.1 * rng.standard_normal((shared, d))
+    matrix[:, :shared] = matrix[:shared, :].T
+    pull = rng.standard_normal(d)
+    step = _solved(matrix, pull, shared, own)
+    assert np.allclose(matrix @ step, pull, atol=1e-10)

@@ -7,6 +7,7 @@ import numpy as np
 from identification.estimation.windowed_run import windows as module
 from identification.estimation.windowed_run.run_errors import judge, mean_loss, misfit
 from identification.estimation.windowed_run.windows import (
+    FAST_SHARE,
     RUN_WINDOW,
     WHOLE,
     position_rms,
@@ -129,3 +130,13 @@ def test_of_few_windows_none_is_forgiven() -> None:
     assert mean_loss(r, window) < 1.5
     three = window < 3
     assert mean_loss(r[three], window[three]) > 10.0
+
+
+def test_a_window_in_motion_begins_fast() -> None:
+    one = seen(made(3))
+    begun = starts(one, "command", 0.3)
+    moving = begun.sd[1] > 0.0
+    speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
+    usual = np.median(speed[speed > 0])
+    assert np.count_nonzero(moving) > 3
+    assert np.mean(np.abs(begun.v[moving][1:]) >= FAST_SHARE * usual) > 0.9

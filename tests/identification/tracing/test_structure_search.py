@@ -1,0 +1,58 @@
+"""Whose numbers a structure has: the run's where it is followed, else those of the equations."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.effects._library import built_in
+from identification.estimation.regression.row_fit import first_stage
+from identification.estimation.structure_fit import FittedStructure
+from identification.log import Rig
+from identification.thresholds import ASTRAY
+from identification.tracing.free_run.backward_elimination import Setting
+from identification.tracing.regression.stepwise import Choice, choose
+from identification.tracing.structure_search import by_equations
+from tests.identification.motor_logs import K_A, made, plant, seen
+
+MOTOR = Rig("motor", force_per_command=K_A)
+BENT = {"m": 0.5, "spring.k": 30.0, "F_sp": 2.0}  # deviations of a run that is not followed
+
+
+@cache
+def spring() -> tuple[Setting, Choice]:
+    """A motor with a spring of 40 N/m, and what its equations call for."""
+    one = seen(made(4, {"spring": {"k": 40.0}}))
+    rng = np.random.default_rng(0)
+    start, first = first_stage([one], False)
+    plain = FittedStructure(start, first, plant(), {}, False, 90.0)
+    library = {"spring": built_in()["spring"]}
+    setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
+    return setting, choose(start, first, library, rng, lambda _stage, _share: None)
+
+
+def model(misfit: float) -> FittedStructure:
+    """A plant with another spring, of which the run leaves this."""
+    setting, choice = spring()
+    bent = plant({"spring": {"k": 55.0}})
+    return replace(setting.plain, plant=bent, sd=BENT, misfit=misfit, stage=choice.end)
+
+
+def test_a_run_that_is_followed_has_its_own_numbers() -> None:
+    setting, choice = spring()
+    followed = model(0.9 * ASTRAY)
+    assert by_equations(choice, followed, setting) is followed
+    prescribed = replace(model(90.0), imposed=True)
+    assert by_equations(choice, prescribed, setting) is prescribed
+
+
+def test_equations_that_are_explained_answer_for_a_run_that_is_not_followed() -> None:
+    setting, choice = spring()
+    found = by_equations(choice, model(90.0), setting)
+    (acting,) = found.plant.effects
+    assert acting.values["k"] == pytest.approx(40.0, rel=0.01)
+    assert found.sd["spring.k"] < 1.0 and found.sd["m"] < 0.1
+    assert found.sd["F_sp"] == BENT["F_sp"]  # of which the equations of sliding say nothing
+    unexplained = replace(choice, base=setting.first)
+    assert by_equations(unexplained, model(90.0), setting).plant.effects[0].values["k"] == 55.0
