@@ -31,10 +31,10 @@ from identification.estimation.fit import (
     are_few,
     bends_the_equation,
     contradicts_the_equation,
-    goes_astray,
     is_material,
     is_no_run,
     leaves_much,
+    run_is_off,
 )
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.imposed_motion import is_unexplained
@@ -49,9 +49,10 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
 )
 from identification.estimation.regression.force_terms import predicts_as_much
-from identification.estimation.regression.held_command import told_share
+from identification.estimation.regression.held_command import significant_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
+from identification.estimation.residual_drift import drift_size
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.surroundings import (
@@ -61,9 +62,8 @@ from identification.estimation.surroundings import (
     larger_than_friction,
     stands_out,
 )
-from identification.estimation.turn_orders import are_most, is_sure, turns
+from identification.estimation.turn_orders import are_most, is_significant, turns
 from identification.estimation.two_masses import are_two, shows_a_load
-from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.run_errors import mean_loss
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
@@ -113,7 +113,7 @@ from identification.tracing.free_run.backward_elimination import (
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.judgement import hides_friction
-from identification.tracing.levels_refitted import explains_the_day, follows_worse
+from identification.tracing.levels_refitted import explains_the_change, follows_worse
 from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.predictive_check import is_worse
@@ -656,20 +656,20 @@ def test_jitter_from() -> None:
 
 def test_sure_of_share() -> None:
     """A share of the command's step that is no more than chance is none."""
-    assert told_share(0.4, 0.1, 1.0) == 0.0
-    assert told_share(0.4, 0.064, 1.0) == 0.4
+    assert significant_share(0.4, 0.1, 1.0) == 0.0
+    assert significant_share(0.4, 0.064, 1.0) == 0.4
 
 
 def test_share_gains() -> None:
     """Nor is one that explains next to nothing."""
-    assert told_share(0.3, 0.01, 0.008) == 0.0
-    assert told_share(0.3, 0.01, 0.0125) == 0.3
+    assert significant_share(0.3, 0.01, 0.008) == 0.0
+    assert significant_share(0.3, 0.01, 0.0125) == 0.3
 
 
 def test_share_beyond() -> None:
     """One larger than any faster loop makes is something else, unless it is so by chance."""
-    assert told_share(0.5 + 1.6 * 0.04, 0.04, 1.0) == 0.5
-    assert told_share(0.5 + 2.5 * 0.04, 0.04, 1.0) == 0.0
+    assert significant_share(0.5 + 1.6 * 0.04, 0.04, 1.0) == 0.5
+    assert significant_share(0.5 + 2.5 * 0.04, 0.04, 1.0) == 0.0
 
 
 def smooth(size: float, at: int, length: int) -> Array:
@@ -750,9 +750,9 @@ def test_replaced_gains() -> None:
 def test_residual_drifts() -> None:
     """Sums of what a run leaves that are so sure to be more than noise make it walk."""
     noise = np.random.default_rng(3).standard_normal(6000)
-    assert walk_size([noise]) == 0.0
-    assert walk_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
-    assert walk_size([noise + 0.1 * np.sin(np.arange(6000) / 600.0)]) > 0.0
+    assert drift_size([noise]) == 0.0
+    assert drift_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
+    assert drift_size([noise + 0.1 * np.sin(np.arange(6000) / 600.0)]) > 0.0
 
 
 def test_frozen_run() -> None:
@@ -818,9 +818,9 @@ def test_worse_than_equation() -> None:
 
 def test_run_astray() -> None:
     """A run that is off by more than this part of the travel leaves the word to the equation."""
-    assert not goes_astray(0.016, 1.0)
-    assert goes_astray(0.025, 1.0)
-    assert goes_astray(float("nan"), 1.0)
+    assert not run_is_off(0.016, 1.0)
+    assert run_is_off(0.025, 1.0)
+    assert run_is_off(float("nan"), 1.0)
 
 
 def test_most_unexplained() -> None:
@@ -875,7 +875,7 @@ def test_orders_leave() -> None:
 
 
 def test_sure_of_order() -> None:
-    assert is_sure(0.6, 0.1) and not is_sure(0.4, 0.1)
+    assert is_significant(0.6, 0.1) and not is_significant(0.4, 0.1)
 
 
 def test_follows_as_well() -> None:
@@ -890,8 +890,8 @@ def test_hides() -> None:
 
 
 def test_levels_leave() -> None:
-    assert explains_the_day(1.6, 1.25, 1.0) and not explains_the_day(1.6, 1.3, 1.0)
-    assert not explains_the_day(4.0, 1.6, 1.0)
+    assert explains_the_change(1.6, 1.25, 1.0) and not explains_the_change(1.6, 1.3, 1.0)
+    assert not explains_the_change(4.0, 1.6, 1.0)
 
 
 def test_beyond_equation() -> None:

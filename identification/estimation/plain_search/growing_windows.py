@@ -4,7 +4,7 @@ For logs on which a search over long windows is lost: with many stops, without a
 from, or driven by a motor, whose position has no spring to bring it back. The stretches' states
 are unknowns, so what the short ones leave is noise where the parameters are right, and there the
 longer ones begin. The search is by differential evolution with the residual bounded tightly and
-widely in turn (either alone is led astray by some logs), then for one direction's friction alone.
+widely in turn (either alone fails on some logs), then for one direction's friction alone.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ SLIDING_DEVIATIONS, LEAST_SLIDING_RANGE = 5.0, 0.02
 # Searches in turn: residual bounded tightly or not, sliding close to a regression or anywhere.
 CLIMB_ATTEMPTS = ((False, True), (True, True), (True, False))
 CLIMB_ROUNDS = 6
-WIDER = 3.0  # times the box in which a search over long windows looks
+WIDER = 3.0  # times the box of a search over long windows
 CLIMB_POPULATION, CLIMB_GENERATIONS, NEAR_GENERATIONS = 64, 150, 60
 PARAMETERS_OF_SIDE = ((F_CP, F_VP, DV_P, F_SP), (F_CN, F_VN, DV_N, F_SN))
 SAME_MINIMUM = 1.002  # relative cost of two searches that have found the same minimum
@@ -48,7 +48,11 @@ LEAST_GAIN_OF_ROUND = 0.003  # relative gain of a round below which there is no 
 
 
 def climb(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
-    """The fit over whole runs that short stretches lead to, or over the longest that it follows."""
+    """The fit over whole runs that short stretches lead to, or over the longest that it follows.
+
+    Sources: multiple shooting, Bock (1983); differential evolution, Storn, Price (1997); joining of
+    stretches and the searches of one direction are ours.
+    """
     box = problem.box.wider(WIDER)
     # A motor's first range of the band is narrow; short stretches show more of it.
     box = replace(box, low=np.where(np.isin(box.free, (DV_P, DV_N)), box.low / WIDER, box.low))
@@ -74,7 +78,7 @@ def _attempted(
     """The best of searches over the stretches until two of them agree on it.
 
     A single one can be caught beside the minimum with little more than noise left. Where they
-    agree on much more than noise, the narrower searches that follow may still tell.
+    agree on much more than noise, the narrower searches that follow may still find it.
     """
     boxes = cycle(_regressed(problem))
     found: list[Optimum] = []
@@ -115,9 +119,9 @@ def _regressed(problem: Problem) -> list[tuple[Box, Array]]:
             SLIDING_DEVIATIONS * np.median([one.sd for one in found], axis=0),
             LEAST_SLIDING_RANGE * five,
         )
-        told = np.flatnonzero((five > 0) & (off < five))
+        known = np.flatnonzero((five > 0) & (off < five))
         low, high, row = problem.box.low.copy(), problem.box.high.copy(), problem.row.copy()
-        low[told], high[told], row[told] = (five - off)[told], (five + off)[told], five[told]
+        low[known], high[known], row[known] = (five - off)[known], (five + off)[known], five[known]
         out.append((replace(problem.box, low=low, high=high), row))
     return out or [(problem.box, problem.row)]
 
@@ -214,7 +218,7 @@ def _kept(problem: Problem, cut: Stretches, best: Optimum) -> tuple[Stretches, O
 
 
 def _close(problem: Problem, best: Optimum) -> Box:
-    """The box within reach of what the stretches tell of each of the nine."""
+    """The box within reach of what the stretches give for each of the nine."""
     free = problem.box.free[:9]
     size = np.abs(best.p[free])
     off = REACH_IN_DEVIATIONS * np.sqrt(np.maximum(np.diag(best.covariance)[:9], 0.0))

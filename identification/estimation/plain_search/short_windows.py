@@ -18,15 +18,15 @@ from identification.estimation.plain_search.fitted_runs import FittedRun, rest_w
 HALVES = (15, 7)  # samples either side of a moving start that a cubic is put through
 CUBIC = 3
 CUBIC_FITS = 1.3  # times the noise that the cubic may leave
-SURELY_MOVES = 4.0  # sigma of the velocity from which a body surely moves
-PLACES_TRIED = 8  # places looked at within the length of a stretch
+SURELY_MOVES = 4.0  # sigma of the velocity from which a body moves significantly
+PLACES_TRIED = 8  # places tried within the length of a stretch
 
 
 def stretch_windows(run: FittedRun, seconds: float) -> RestartWindows:
     """Restarts about `seconds` apart, at a rest where there is one, else in smooth motion.
 
     The first one starts the log. Of the places in motion the one is taken that a cubic follows
-    best: its state is a first guess only.
+    best: its state is a first guess only (multiple shooting, Bock 1983).
     """
     measured = run.measured
     y, h, sigma = measured.y, measured.h, 1.0 / measured.weight_y
@@ -123,7 +123,10 @@ class Stretches:
 
 
 def stretches(runs: Sequence[FittedRun], seconds: float) -> Stretches:
-    """The runs cut about every `seconds`, where the state is at least roughly known."""
+    """The runs cut about every `seconds`, where the state is at least roughly known.
+
+    Source: multiple shooting, Bock (1983).
+    """
     parts = []
     for run in runs:
         windows = stretch_windows(run, seconds)

@@ -22,7 +22,7 @@ OUTLIER_FROM = 2.0  # robust deviations from which a window counts less
 
 @dataclass(frozen=True)
 class Sliding:
-    """m, F_cp, F_cn, F_vp, F_vn (5,) with standard deviations, infinite where the log is silent."""
+    """m, F_cp, F_cn, F_vp, F_vn (5,) with standard deviations, infinite where nothing slides."""
 
     five: Array
     sd: Array
@@ -31,8 +31,9 @@ class Sliding:
 def fit_sliding(log: Log, first: FirstEstimate, share: float, *, held: bool) -> Sliding | None:
     """The five from samples faster than `share` of the largest speed; None where none slide.
 
-    held: the force is a command held over each period. The band's edge is not known here: a body
-    within it does not follow the equation, so windows that do not fit count less.
+    held: the force is a zero-order hold of a command. The band's edge is not known here: a body
+    within it does not follow the equation, so windows that do not fit count less. Sources: weak
+    form, Messenger, Bortz (2021); Cauchy's weights, Holland, Welsch (1977).
     """
     v = first.motion.v
     threshold = share * float(np.quantile(np.abs(v), FASTEST_QUANTILE))
@@ -43,7 +44,7 @@ def fit_sliding(log: Log, first: FirstEstimate, share: float, *, held: bool) -> 
 
 
 def _doubt(one: Sliding) -> float:
-    """Mean relative deviation, a parameter that is not told counting as much as itself."""
+    """Mean relative deviation, a parameter not identified counting as much as itself."""
     return float(np.mean(np.minimum(one.sd / np.maximum(np.abs(one.five), 1e-300), 1.0)))
 
 

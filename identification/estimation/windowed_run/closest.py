@@ -8,9 +8,9 @@ import numpy as np
 
 from identification.estimation.regression.equation_rows import MotionLog, shortened
 from identification.estimation.windowed_run.nudged_search import (
+    BAND_RANGE,
     CLOSE_RANGE,
     FAR_RANGE,
-    TOLD_RANGE,
     Range,
     nudged_search,
 )
@@ -22,7 +22,7 @@ from identification.model.plant import Plant
 from identification.progress import Halted
 from identification.thresholds import ADEQUATE, COMPLETE
 
-DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
+DOUBLE = 2.0  # times the slowest significant sliding, up to which a band is tried
 SHORT_SECONDS = 15.0  # s of each log on which a search from afar is made
 SEARCHES, SEARCH_GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
 PROMISING_MISFIT, POOR = (
@@ -37,13 +37,13 @@ MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searc
 class SearchLimits:
     """How long a plant is searched.
 
-    most: searches on the whole logs, none where no search will do; told: the first plant has
+    most: searches on the whole logs, none where no search will do; identified: the first plant has
     everything but its band from the equations, so it is searched close by before; known: by name,
     how far the equations leave a parameter open.
     """
 
     most: int = SEARCHES
-    told: bool = False
+    identified: bool = False
     known: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -57,17 +57,18 @@ def closest(
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
     begins: plants to begin from in turn, as long as more is left than should be; done: found
-    already, and beside the searches one that may be agreed with.
+    already, and beside the searches one that may be agreed with. Sources: added damping, Abarbanel
+    et al. (2009); differential evolution, Storn, Price (1997); the order is ours.
     """
     short = [shortened(one, SHORT_SECONDS) for one in logs]
     best, poor = done, 0
     around = replace(CLOSE_RANGE, known=limits.known)
     try:
-        for i, plant in enumerate([*begins[: int(limits.told)], *begins]):
-            if limits.told and i == 0:
+        for i, plant in enumerate([*begins[: int(limits.identified)], *begins]):
+            if limits.identified and i == 0:
                 banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
                 near = nudged_search(
-                    banded, short, drive, rng, ((0.0, TOLD_RANGE), (0.0, CLOSE_RANGE))
+                    banded, short, drive, rng, ((0.0, BAND_RANGE), (0.0, CLOSE_RANGE))
                 )
             else:
                 stages = ((1.0, replace(FAR_RANGE, known=limits.known)), (0.0, around))
@@ -118,8 +119,7 @@ def closer(
     """The plant refined, then searched close by and refined again, so many times at most, as long
     as that helps.
 
-    done: found from elsewhere, with which
-    one that agrees is the last.
+    done: found from elsewhere, with which one that agrees is the last. Ours.
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
     slow = on_bristle(plant)

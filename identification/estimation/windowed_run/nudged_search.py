@@ -1,11 +1,11 @@
-"""Search for a plant by a run that is nudged towards the measured velocity.
+"""Search for a plant by a run that is corrected toward the measured velocity.
 
 A free run that is driven by a force alone turns on every stop: a little too much friction, and the
 body stays where it should have passed. The distance to the log then has many narrow minima, all
-around the right one. A damping between the body and the measured velocity, D (v_log - v), keeps
-the run near the log whatever the friction (as an observer does; Abarbanel, Creveling, Farsian,
-Kostuk, SIAM Journal on Applied Dynamical Systems 8 (2009) 1341), so what is left changes smoothly
-with the parameters. It is searched in a wide range first, then without nudging in a narrow one.
+around the right one. A damping between the body and the measured velocity, D (v_log - v), keeps the
+run near the log whatever the friction (as an observer does; Abarbanel, Creveling, Farsian, Kostuk,
+SIAM Journal on Applied Dynamical Systems 8 (2009) 1341), so what is left changes smoothly with the
+parameters. It is searched in a wide range first, then without added damping in a narrow one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,11 +32,11 @@ from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
 
-TAU = 0.1  # s, in which a nudged body takes on the log's velocity
-STRONG = 1.5  # times the body's own viscous friction, with which it is nudged at least
-NUDGED_SAMPLES = 10  # the same at least, in samples
-SHAKEN = 0.1  # of the Coulomb level, that the velocity's noise may push a nudged body with
-REST_SAMPLES = 5  # samples of a rest, in which nothing nudges it
+TAU = 0.1  # s, in which a body with added damping takes on the log's velocity
+STRONG = 1.5  # times the body's own viscous friction, that is added at least
+DAMPED_SAMPLES = 10  # the same at least, in samples
+SHAKEN = 0.1  # of the Coulomb level, that the velocity's noise may make by the added damping
+REST_SAMPLES = 5  # samples of a rest, in which its velocity counts as 0
 # Members and generations, of a plant with effects and (its runs are quick) without.
 CROWD, PLAIN_CROWD = (32, 30), (48, 40)
 FIRST_SPREAD = 0.25  # of the first members
@@ -46,7 +46,7 @@ NARROWER = 0.3  # of that spread, for mass and sliding friction
 @dataclass(frozen=True)
 class Range:
     """How far around a plant is searched: shares of mass and sliding friction and of the stick
-    limits, factors on the band and on effects; open: from no more than the regression tells;
+    limits, factors on the band and on effects; open: from no more than the regression gives;
     uneven: around an asymmetry that is 0; known: by name, how far at most, where that is less."""
 
     five: float
@@ -60,7 +60,7 @@ class Range:
 
 FAR_RANGE = Range(0.03, 0.0, 2.5, 4.0, True)
 SLIDING_RANGE = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
-TOLD_RANGE = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
+BAND_RANGE = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations give all but the band
 BREAKS_RANGE = Range(0.004, 0.12, 8.0, 3.0, False)  # growth may have bent stick limits and bands
 MIDWAY_RANGE = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE_RANGE = Range(0.005, 0.05, 1.4, 1.4, False)
@@ -71,7 +71,7 @@ FINER_RANGE = Range(0.0, 0.003, 1.01, 1.3, False, 0.1)  # the same, nearly found
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 KNOWN_SLIDING = 0.002  # share within which sliding is searched where an effect acts in stops alone
 ASYMMETRY_REACH = 0.15  # by which an asymmetry that is not 0 is searched
-LEAST_BAND = 0.15  # of the slowest sure speed, that a band is at least
+LEAST_BAND = 0.15  # of the slowest significant speed, that a band is at least
 # Times the Coulomb level: least, usual and most of a stick limit
 STICK_PER_COULOMB = (0.95, 1.6, 3.0)
 STICK_REACH = 1.15  # times a stick limit, up to which it is searched
@@ -81,14 +81,15 @@ def nudged_search(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
     stages: Sequence[tuple[float, Range]] = ((1.0, FAR_RANGE), (0.0, CLOSE_RANGE)),
 ) -> Plant:  # fmt: skip
-    """The plant with the parameters that the logs' run by force calls for, nearly.
+    """The plant with about the parameters with which a run driven by the force follows the logs.
 
-    stages: nudging (1: in full, 0: none) and range of one search after the other.
+    stages: share of the added damping (1: in full, 0: none) and range of one search after the
+    other. Sources: Abarbanel, Creveling, Farsian, Kostuk (2009); Storn, Price (1997).
     """
     by_force = any(by_load(acting.effect) for acting in plant.effects)
     first = plant
     for share, around in stages:
-        if share > 0.0 and by_force:  # the force that nudges would be a load too
+        if share > 0.0 and by_force:  # the added force would be a load too
             continue
         if share == 0.0 and plant is not first:
             plant = nearer((plant, first), logs, drive)
@@ -103,7 +104,7 @@ def nearer(plants: Sequence[Plant], logs: Sequence[MotionLog], drive: Drive) -> 
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:
-    """Share of the applied force that friction by load leaves to the motion."""
+    """Share of the applied force that load-dependent friction leaves to the motion."""
     none = np.zeros(MAX_SIGNALS)
     level = friction.F_cp
     taken = acting.effect.value(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, level, level, none, acting.array)
@@ -111,21 +112,21 @@ def load_share(friction: Karnopp, acting: Acting) -> float:
 
 
 def less_load(base: Plant, acting: Acting) -> Plant:
-    """The plant with what friction by load takes of the force taken off its own parameters."""
+    """The plant with what load-dependent friction takes of the force taken off its parameters."""
     nine = base.friction.array.copy()
     nine[SCALED] *= load_share(base.friction, acting)
     return replace(base, friction=Karnopp.from_array(nine))
 
 
 def loaded(plant: Plant) -> Plant:
-    """The plant with what its own friction by load takes of the force taken off."""
+    """The plant with what its own load-dependent friction takes of the force taken off."""
     for acting in plant.effects:
         plant = less_load(plant, acting) if by_load(acting.effect) else plant
     return plant
 
 
 def more_load(plant: Plant) -> Plant:
-    """The plant without what friction by load takes of the force: as a plain one appears."""
+    """The plant without what load-dependent friction takes of the force: as a plain one appears."""
     loads = [acting for acting in plant.effects if by_load(acting.effect)]
     nine = plant.friction.array.copy()
     for acting in loads:
@@ -134,7 +135,10 @@ def more_load(plant: Plant) -> Plant:
 
 
 def judge_nudged(plant: Plant, logs: Sequence[MotionLog], drive: Drive, share: float) -> Judge:
-    """Errors of a plant like this one nudged by a share of the damping (`run_errors.judge`)."""
+    """Errors of a plant like this one with a share of the added damping (`run_errors.judge`).
+
+    Source: Abarbanel et al. (2009); `README.md`, (6).
+    """
     damping = share * nudging(plant, logs)
     if damping == 0.0:
         return judge(plant, logs, drive, SHORT_WINDOW)
@@ -144,7 +148,10 @@ def judge_nudged(plant: Plant, logs: Sequence[MotionLog], drive: Drive, share: f
 
 
 def nudged(one: MotionLog, plant: Plant, damping: float) -> MotionLog:
-    """The log with the force [N] in it by which a damping [N s/m] nudges a body."""
+    """The log with the force [N] in it by which a damping [N s/m] corrects a body toward it.
+
+    Source: Abarbanel et al. (2009).
+    """
     v = one.signals["v"].copy()
     for low, high in rest_stretches(one, REST_SAMPLES):
         v[low:high] = 0.0
@@ -156,10 +163,13 @@ def nudged(one: MotionLog, plant: Plant, damping: float) -> MotionLog:
 
 
 def nudging(plant: Plant, logs: Sequence[MotionLog]) -> float:
-    """Damping [N s/m] that nudges a body to the measured velocity but not shaken by noise."""
+    """Damping [N s/m] that corrects a body toward the measured velocity, but hardly by its noise.
+
+    After Abarbanel et al. (2009); the size is ours: `README.md`, (6).
+    """
     p = plant.friction
     noise = max(one.v_noise for one in logs)
-    tau = max(TAU, *(NUDGED_SAMPLES * one.log.h for one in logs))
+    tau = max(TAU, *(DAMPED_SAMPLES * one.log.h for one in logs))
     strong = max(p.m / tau, STRONG * max(p.F_vp, p.F_vn))
     return float(min(strong, SHAKEN * min(p.F_cp, p.F_cn) / max(noise, 1e-300)))
 
@@ -174,10 +184,10 @@ def _searched(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator, share: float,
     around: Range,
 ) -> Plant:  # fmt: skip
-    """The best plant in this range, nudged by this share of the damping."""
+    """The best plant in this range, with this share of the added damping."""
     size, generations = CROWD if plant.effects else PLAIN_CROWD
     errors_of = judge_nudged(plant, logs, drive, share)
-    # Friction by load and everything else scale each other: they are searched apart.
+    # Load-dependent friction and everything else scale each other: they are searched apart.
     plant = more_load(plant)
     names = names_of(plant, drive)
     low, high = limits(plant, names, SURE_OF_DIRECTION * max(one.v_noise for one in logs), around)
@@ -202,9 +212,9 @@ def _searched(
 
 
 def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tuple[Array, Array]:
-    """Bounds (k,) of each parameter; slow [m/s]: speed from which the log is sure of a motion."""
+    """Bounds (k,) of each parameter; slow [m/s]: speed from which a motion is significant."""
     p = plant.friction
-    # Growing stiction does not bend what sliding tells: that is known closely already.
+    # Growing stiction does not bias what sliding identifies: that is known closely already.
     stops = bool(plant.effects) and all(a.effect.place.in_stops for a in plant.effects)
     five = min(around.five, KNOWN_SLIDING) if stops else around.five
     params = {f"{a.key}.{one.name}": one for a in plant.effects for one in a.effect.params}
@@ -226,7 +236,7 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
                 np.sign(value) * most * coulomb,
             ]
         elif name in columns and params[name].spare and value == 0.0:
-            ends = [0.0, 0.0]  # sliding calls for none
+            ends = [0.0, 0.0]  # sliding shows none
         elif name in params:
             ends = _of_effect(params[name], value, around)
         else:

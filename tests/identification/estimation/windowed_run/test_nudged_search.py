@@ -9,11 +9,11 @@ import pytest
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.closest import SearchLimits, agree, closer, closest
 from identification.estimation.windowed_run.nudged_search import (
+    BAND_RANGE,
     CLOSE_RANGE,
     FAR_RANGE,
     GROWTH_RANGE,
     SIDES_RANGE,
-    TOLD_RANGE,
     Range,
     judge_nudged,
     less_load,
@@ -92,9 +92,9 @@ def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
     one = seen(made(4))
     unsure = replace(plant(), friction=replace(NINE, dv_p=0.003, dv_n=-0.003, F_sp=16.2))
     found = closest(
-        [unsure], [one], "command", np.random.default_rng(0), SearchLimits(1, told=True)
+        [unsure], [one], "command", np.random.default_rng(0), SearchLimits(1, identified=True)
     )
-    assert ranges[0] == TOLD_RANGE and FAR_RANGE not in ranges
+    assert ranges[0] == BAND_RANGE and FAR_RANGE not in ranges
     assert found.misfit <= COMPLETE
     assert found.plant.friction.array == pytest.approx(NINE.array, rel=0.06)
 
