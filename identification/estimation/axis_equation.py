@@ -30,7 +30,7 @@ from identification.thresholds import EVENTS_NEEDED, SLIDES_NEEDED, WIDEST_SD
 
 COULOMB_LEVELS = ("F_cp", "F_cn")
 COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
-SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
+NOISE_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, converges
 SLOW_QUARTER = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
@@ -38,9 +38,9 @@ OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
 
 @dataclass(frozen=True, eq=False)
 class AxisEquation:
-    """What the equation of motion tells of one log.
+    """What the equation of motion identifies in one log.
 
-    values, sd: by name, F_cp, F_cn [N], and where they are told m [kg], F_vp, F_vn [N s/m], and the
+    values, sd: by name, F_cp, F_cn [N], and where identifiable m [kg], F_vp, F_vn [N s/m], and the
     breakaway forces F_sp, F_sn [N], sizes. offset: (F_cn - F_cp)/2 [N], a constant force towards +y
     if friction is alike both ways, with its sd. breakaways: how many, up and down. relative: share
     of the force that is left while sliding. position [m], level [N] (size) and up, (r,): Coulomb
@@ -60,8 +60,10 @@ class AxisEquation:
 def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     """The log's equation of motion; y [m] and F [N] are needed.
 
-    held: the force is a command held over each period. Raises NotIdentifiable where too little
-    slides in a direction, BadLog where the log is too short for one window.
+    held: the force is a zero-order hold of a command. Raises NotIdentifiable where too little
+    slides in a direction, BadLog where the log is too short for one window. Sources: weak form,
+    Messenger, Bortz (2021); inverse dynamic model by least squares, Gautier, Khalil, CDC 1988;
+    jackknife, Tukey (1958); deviation of a median, Huber, Robust Statistics (1981).
     """
     one = motion_log(log, held=held, by_command=False)
     up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
@@ -70,7 +72,7 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
             f" least {SLIDES_NEEDED} of each needed; log strokes in both directions"
         )
-    rows, theta = _settled(one)
+    rows, theta = _converged(one)
     used, theta, each = _discriminated(rows)
     spread = np.hypot(spread_of_left_out(each), OF_EQUATION * np.abs(theta))
     names = [rows.names[k] for k in used]
@@ -92,23 +94,23 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
 
 
 def slides_enough(up: int, down: int) -> bool:
-    """Whether so many windows of sliding in either direction tell its friction."""
+    """Whether so many windows of sliding in either direction identify its friction."""
     return min(up, down) >= SLIDES_NEEDED
 
 
-def _settled(one: MotionLog) -> tuple[Rows, Array]:
+def _converged(one: MotionLog) -> tuple[Rows, Array]:
     """The rows, and the parameters of their least squares."""
     theta = NOTHING_KNOWN
-    for _ in range(SETTLING_ROUNDS):
+    for _ in range(NOISE_ROUNDS):
         theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
     return mechanical(one, np.maximum(theta, 0.0)), theta
 
 
 def _discriminated(rows: Rows) -> tuple[list[int], Array, Array]:
-    """The columns that the log tells apart, their parameters (k,), and these without each stretch
+    """The columns that the log separates, their parameters (k,), and these without each stretch
     of the log in turn (b, k): all, else without mass, else without viscous friction too.
 
-    A column that is not told would take its neighbours' parameters with it.
+    A column that is not identifiable would bias its neighbours' parameters.
     """
     for used in COLUMNS_TRIED:
         some = replace(rows, X=rows.X[:, used])

@@ -1,9 +1,10 @@
-"""Bad samples that no signal shows by itself: those that a run which follows the log contradicts.
+"""Bad samples that no signal shows by itself: those with which a run that follows the log
+disagrees.
 
 A position that has jumped by a few deviations of its noise looks like any other, but from there on
 the run is off by as much. A command or a force that was logged wrong for a sample drives the run
 away, and without it the run stays. So where a plant follows a log but for a few places, these are
-looked at, corrected and told, and the plant is fitted anew.
+tested, corrected and reported, and the plant is fitted anew.
 """
 
 from collections.abc import Sequence
@@ -56,7 +57,7 @@ MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single sample
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
 # Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
 SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
-WALKS_OVER = 0.5  # s, over which what a command's noise adds up to passes for one bad sample
+DRIFTS_OVER = 0.5  # s, over which what a command's noise adds up to passes for one bad sample
 SHIFT_STEPS = 3  # to the likeliest value in place of a bad one
 FARTHEST_SHIFT = 20.0  # times the drive's roughness, the longest of these steps
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
@@ -82,7 +83,7 @@ def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
 
     Where the command was logged wrong, the log is cut: what the machine was given is not known; so
     it is at a jump, whose size is known within its noise only.
-    misfit: what the plant leaves; of a run that is not followed at all nothing is looked for.
+    misfit: what the plant leaves; of a run that is not followed at all nothing is searched. Ours.
     """
     if misfit > HOPELESS:
         return Corrected(recorded, (), tuple(range(len(recorded.logs))))
@@ -132,11 +133,11 @@ def _of_log(
     if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
     r = states(window_errors(run, one, drive))
-    unsure = one.position_sd / one.noise_y
-    y, off = _without_spikes(r[0], log["y"] / one.noise_y, unsure)
-    found += _told(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
+    noisier = one.position_sd / one.noise_y
+    y, off = _without_spikes(r[0], log["y"] / one.noise_y, noisier)
+    found += _finding(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
     seen = log["y"] + (r[0] - y) * one.noise_y
-    jumped = _jumps(y / unsure, begun)
+    jumped = _jumps(y / noisier, begun)
     for k in jumped.tolist():
         size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise_y
         seen_size = [jump_size(log["y"], k, side) for side in LINE_SIDES]
@@ -149,7 +150,7 @@ def _of_log(
     log = log.with_signals(y=seen)
     if len(r) > 1:
         F, off = _without_spikes(r[1], log["F"] / one.noise_F, np.ones(len(log)))
-        found += _told(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
+        found += _finding(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
         log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise_F)
     return log, found
 
@@ -159,10 +160,10 @@ def _spread(r: Array) -> float:
     return max(float(np.median(np.abs(np.diff(r)))) / 0.954, LEAST_SPREAD)
 
 
-def _without_spikes(r: Array, seen: Array, unsure: Array) -> tuple[Array, BoolArray]:
+def _without_spikes(r: Array, seen: Array, noisier: Array) -> tuple[Array, BoolArray]:
     """Errors (n,) of a run with the single ones put on the level around them, and where.
 
-    unsure (n,): how much noisier than at rest every sample is; seen (n,): the signal in the same
+    noisier (n,): how much noisier than at rest every sample is; seen (n,): the signal in the same
     unit, which has to show the spike too: where it does not, the run has stopped or set off a
     sample too late.
     """
@@ -172,7 +173,7 @@ def _without_spikes(r: Array, seen: Array, unsure: Array) -> tuple[Array, BoolAr
         height = deviations(seen, length)[0]
         for i in range(length):
             shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
-    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r / unsure) * unsure
+    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r / noisier) * noisier
     off &= shown > SIGNAL_SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -200,7 +201,7 @@ def _side(k: int, begun: Starts, n: int) -> int:
     return int(np.clip(nearest - 1, RUN_SIDES[0] // 2, 2 * RUN_SIDES[-1]))
 
 
-def _told(log: Log, name: str, kind: Kind, off: BoolArray, size: Array) -> list[BadSamples]:
+def _finding(log: Log, name: str, kind: Kind, off: BoolArray, size: Array) -> list[BadSamples]:
     """The samples that are off as one finding."""
     if not np.any(off):
         return []
@@ -238,7 +239,7 @@ class _Driven:
         if not isinstance(actuator, Actuator):
             return 0.0
         noise = one.walk / (actuator.k1 * one.log.h)
-        return RUN_JUMP_FROM * noise * float(np.sqrt(max(1.0, WALKS_OVER / one.log.h)))
+        return RUN_JUMP_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
 
     def by(self, x: Array) -> Log:
         """The log with this drive (n,)."""
@@ -294,7 +295,7 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
         return log, []
     now, before, found = x, loss(r), list[BadSamples]()
     near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
-    if driven.drive == "force":  # which has noise, so that every run by it walks away
+    if driven.drive == "force":  # which has noise, so that every run by it drifts off
         tried = _candidates(x, MEASURED_SEEN_FROM, RUN_SPIKE_FROM * driven.one.noise_F)
     else:
         tried = [*_candidates(x, SEEN_FROM), *_kicks(r[0], x)]
@@ -317,7 +318,7 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
         near[max(first - RUN_SIDES[0], 0) : first + RUN_SIDES[0]] = True
         off = np.zeros(len(x), dtype=bool)
         off[own] = True
-        found += _told(log, driven.name, "spike", off, np.abs(x - now))
+        found += _finding(log, driven.name, "spike", off, np.abs(x - now))
     # Where most is left all the same, something else than a few samples is wrong.
     excess = max(loss(r) - NOISE_LOSS * r.size, 0.0)
     if not found or loss(r) - before < MOST_EXPLAINED * excess:
@@ -359,6 +360,6 @@ def _candidates(x: Array, seen_from: float, least: float = 0.0) -> list[tuple[in
     return [one[1:] for one in sorted(found, reverse=True)[:MOST_CANDIDATES]]
 
 
-def told_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:
+def lines_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:
     """A line for each finding of a fit."""
     return tuple(f"{one.line}, since the run contradicts it" for one in fit_bad)

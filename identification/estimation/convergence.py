@@ -1,4 +1,4 @@
-"""How far chains of a walk agree, and how many independent draws they are worth.
+"""How far chains of a sampler agree, and how many independent draws they are worth.
 
 Rank-normalised split R-hat and bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter,
 Bürkner, Bayesian Analysis 16 (2021) 667, as arviz has them, so that no more than numpy is needed.
@@ -13,10 +13,11 @@ FEWEST_DRAWS = 8  # of a chain, whose halves have a spread of their own
 
 
 def rank_r_hat(chains: Array) -> float:
-    """Rank-normalised split R-hat of chains (c, n): 1 where all tell the same.
+    """Rank-normalised split R-hat of chains (c, n): 1 where all agree.
 
-    The larger of that of the draws and that of their distances from the median, which tells of
-    chains that agree in the middle but not in the tails. Infinite of chains too short to tell.
+    The larger of that of the draws and that of their distances from the median, which is large of
+    chains that agree in the middle but not in the tails. Infinite of chains too short for it.
+    Source: Vehtari et al., Bayesian Analysis 16 (2021) 667.
     """
     if chains.shape[1] < FEWEST_DRAWS:
         return float("inf")
@@ -26,7 +27,11 @@ def rank_r_hat(chains: Array) -> float:
 
 
 def bulk_ess(chains: Array) -> float:
-    """Independent draws that chains (c, n) are worth in their bulk; 0 of chains too short."""
+    """Independent draws that chains (c, n) are worth in their bulk; 0 of chains too short.
+
+    Source: Vehtari et al., Bayesian Analysis 16 (2021) 667; autocorrelation time, Geyer,
+    Statistical Science 7 (1992) 473.
+    """
     if chains.shape[1] < FEWEST_DRAWS:
         return 0.0
     z = _normal_ranks(_split(chains))
@@ -70,7 +75,7 @@ def _autocovariance(z: Array) -> Array:
 
 
 def _time(rho: Array) -> float:
-    """Autocorrelation time of correlations (n,): Geyer's sum of pairs that fall and stay positive,
+    """Autocorrelation time of correlations (n,): Geyer's (1992) sum of pairs, falling and positive,
     with the last even one once."""
     pairs = rho[: len(rho) - len(rho) % 2].reshape(-1, 2).sum(axis=1)[: (len(rho) - 1) // 2]
     negative = np.flatnonzero(pairs[1:] <= 0.0)

@@ -1,4 +1,4 @@
-"""What a log can tell of each parameter: events and speeds before, interval widths after.
+"""What a log identifies of each parameter: events and speeds before, interval widths after.
 
 A number that the log does not support is not given: a parameter without the events that carry it,
 without an interval, with one wider than itself, or at a bound is reported as None with the reason.
@@ -26,7 +26,7 @@ SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "fixed at its default: the logs do not support another value"
-SILENT = "no interval: nothing that these logs show changes with it"
+NO_CHANGE_WHY = "no interval: nothing that these logs show changes with it"
 EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 
 
@@ -68,14 +68,15 @@ def reported_estimate(
     value: float, unit: str, sd: float | None, *, interval: tuple[float, float] | None = None,
     bounds: tuple[float, float] = (-np.inf, np.inf), at_bound: float = AT_ZERO, beside: float = 0.0,
 ) -> Estimate:  # fmt: skip
-    """An estimate by the one rule of what is told: a value with its interval, or None and why.
+    """An estimate by the one rule of what is reported: a value with its interval, or None and why.
 
     value, sd, 95 % `interval` (by default a normal spread's) and bounds in `unit`; at_bound:
     distance from a bound that counts as there; beside: of a term of a sum, the size that matters.
-    An interval of no width, one wider than the value itself or a value at a bound is not told.
+    An interval of no width, one wider than the value itself or a value at a bound gives None. The
+    rule is ours.
     """
     if sd is None or not np.isfinite(sd) or not sd > LEAST_SD * abs(value):
-        return Estimate(None, unit, reason=SILENT, assumed=value)
+        return Estimate(None, unit, reason=NO_CHANGE_WHY, assumed=value)
     low, high = interval or (value - NORMAL_95 * sd, value + NORMAL_95 * sd)
     wrong = _beyond(value, bounds)
     where = _bound_of(value, bounds, at_bound)
@@ -152,7 +153,8 @@ def normal_samples(values: Array, sd: Array) -> Array:
 
 
 def silent_reason(name: str, events: Events, log: str) -> str | None:
-    """Reason why the events of the log cannot carry a parameter, if so, and what to add to it."""
+    """Reason why the events of the log do not identify a parameter, if so, and what to add to
+    it."""
     if name not in NAMES or name == "m":
         return None
     side = 1 if name.endswith("n") else 0
@@ -187,7 +189,8 @@ def _scale(name: str, events: Events) -> float:
 
 def _beside(name: str, value_of: Mapping[str, float], events: Events) -> float:
     """Size at which a term of sliding friction would be as large as the term beside it, 0 where
-    there is none: a viscous term is known where it is surely small beside the Coulomb force."""
+    there is none: a viscous term is known where it is significantly smaller than the Coulomb
+    force."""
     side = 1 if name.endswith("n") else 0
     fastest = events.fastest[side]
     if name.startswith("F_v") and fastest > 0:

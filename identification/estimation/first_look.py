@@ -1,8 +1,8 @@
-"""What a fit will tell, seen in seconds: its first part, by the same rules.
+"""What a fit will identify, found in seconds: its first part, by the same rules.
 
 The equation of motion is solved, the free run refined from it for so many samples; no search, no
 whole runs. Then the rules of the fit say who answers, the run or the equation, and
-what is told. What only the search could change is said to be open.
+what is identifiable. What only the search could change is reported as open.
 """
 
 import itertools
@@ -21,7 +21,7 @@ from identification.thresholds import NEARLY_FOLLOWED
 
 SAMPLES_RUN = 1.5e7  # of simulated runs, for which a free run is refined: some two seconds
 RUNS_OF_LAG = 1500  # of each log, with which a lag is tried, of several: a second
-LOOK_SEED = 0  # a look is the same each time
+FIRST_FIT_SEED = 0  # the answer is the same each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class FirstLook:
 
 
 def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> FirstLook:
-    """The first part of `fit_plant` of the same logs.
+    """The first part of `fit_plant` of the same logs, by its sources (weak form, Messenger, Bortz
+    2021).
 
     Raises as it does: BadLog where a signal is missing, NotIdentifiable where nothing moves.
     """
@@ -43,7 +44,7 @@ def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> Fir
     rows = float(np.mean([len(log) for log in logs]))
     runs = SAMPLES_RUN / rows
     beside = what_acts_beside(logs, rig, each=lambda: _ending(RUNS_OF_LAG * len(logs)))
-    rng, halt = np.random.default_rng(LOOK_SEED), _ending(runs)
+    rng, halt = np.random.default_rng(FIRST_FIT_SEED), _ending(runs)
     fit = fit_beside(logs, beside, rng, rig, drive, None, halt, quick=True)
     near = not (fit.imposed or fit.adequate) and fit.chi_square <= NEARLY_FOLLOWED
     return FirstLook(fit, halt.reached() and near)

@@ -1,13 +1,15 @@
 """The one estimator: from logs of a machine to its parameters, with intervals and reasons.
 
 The nine of friction, the actuator's, and those of effects; driven by the command, by the measured
-force, or along a motion that a rig imposes; from nothing, or from the model that was in force.
+force, or along a prescribed motion; from nothing, or from the model that was active.
 
-1. The equations in weak form give a start (or the model in force does).
+1. The equations in weak form give a start (or the active model does).
 2. The free run in windows from measured states, the states' uncertainty taken out, refines it.
-3. Where more than noise is left, a search for the plain plant looks for another start.
-4. The fit settles (`settling`): whole runs where they are followed, windows elsewhere; the equation
-   of motion answers where it tells more. Events and spread say what is told.
+3. Where more than noise is left, a search for the plain plant finds another start.
+4. The last step (`settling`): whole runs where they are followed, windows elsewhere; the equation
+   of motion where it is more informative. Events and spread decide what is identifiable.
+
+The equations, with symbols, units and sources: `README.md` here and in each room below.
 """
 
 from collections.abc import Sequence
@@ -17,15 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.contradicted import Corrected, corrected, told_of
+from identification.estimation.contradicted import Corrected, corrected, lines_of
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
     is_unexplained,
     left_by,
     of_one_way,
-    untold,
     way_of,
+    without_estimates,
 )
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.plain_search.actuator_fit import fit_actuator
@@ -67,18 +69,18 @@ from identification.thresholds import (
     WORSE,
 )
 
-IMPOSED_WHY = "prescribed motion: inertia is negligible in the force"
+PRESCRIBED_WHY = "prescribed motion: inertia is negligible in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
 FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
 )
-SURER_WHY = (
+LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
     " a noisy clock or command; stick limits and band are not identifiable"
 )
-CORRECTIONS = 3  # rounds in which bad samples are looked for
+CORRECTIONS = 3  # rounds in which bad samples are searched for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
@@ -94,12 +96,14 @@ def fit_plant(
 ) -> KarnoppFit:
     """The parameters of a machine from its logs.
 
-    logs: each with y [m] and F [N] (F_e), and u [V] for a drive by command, on an even clock.
-    drive: "command" or "force"; by default the command where a linear actuator explains the
-    force. prior: the plant that was in force, from which the fit begins, with the effects that it
-    has. keep_going: asked before every run; once it says no, the best so far is the result, and a
-    remark says so. Without a prior, a constant force, gravity and a lag of the columns are told
+    logs: each with y [m] and F [N] (F_e), and u [V] to drive it by the command, evenly sampled.
+    drive: "command" or "force"; by default the command where a linear actuator explains the force.
+    prior: the plant that was active, from which the fit begins, with the effects that it has.
+    keep_going: asked before every run; once it says no, the best so far is the result, and a remark
+    says so. Without a prior, a constant force, gravity and a lag of the columns are identified
     beside friction. Raises BadLog where a signal is missing, NotIdentifiable where nothing moves.
+    Sources: weak form, Messenger, Bortz, J. Comput. Phys. 443 (2021) 110525; friction, the paper's
+    eq. (1) (Karnopp 1985); windows, Bock (1983); the order of steps is ours.
     """
     halt = Halt(keep_going)
     if prior is not None:
@@ -143,9 +147,9 @@ def fit_beside(
         return replace(fit, surroundings=beside)
     if beside.sampled:  # a measured current, which no period holds
         fit = replace(fit, command_period=0.0)
-    told = widened_friction(fit.estimates, beside, logs) | surrounding_estimates(beside)
+    reported = widened_friction(fit.estimates, beside, logs) | surrounding_estimates(beside)
     return replace(
-        fit, surroundings=beside, effects=beside.effects, estimates={**fit.estimates, **told}
+        fit, surroundings=beside, effects=beside.effects, estimates={**fit.estimates, **reported}
     )
 
 
@@ -162,36 +166,36 @@ def _fit(
         fit = _with_effects(prior, recorded, settle, report)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     near, given = None, recorded
-    set_aside = SetAside((), tuple(range(len(logs))))
+    excluded = Excluded((), tuple(range(len(logs))))
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
         made = corrected(near.plant, recorded, near.misfit)
         if made.bad:
-            recorded, set_aside = made.recorded, set_aside.and_of(made)
+            recorded, excluded = made.recorded, excluded.and_of(made)
             near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
             fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
-            return set_aside.told(fit, given)
-    recorded, found, set_aside = _without_bad(recorded, begin, set_aside)
+            return excluded.reported(fit, given)
+    recorded, found, excluded = _without_bad(recorded, begin, excluded)
     if near is not None and near.misfit < found.misfit:
         found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
     fit = finished(found, recorded, settle, report, by=drive, quick=quick)
     fit = _with_actuator(fit, recorded)
-    return set_aside.told(fit, given)
+    return excluded.reported(fit, given)
 
 
 @dataclass(frozen=True)
-class SetAside:
-    """Samples that were set aside, and for each log the number of the given one that it is of."""
+class Excluded:
+    """Samples that were excluded, and for each log the number of the given one that it is of."""
 
     bad: tuple[BadSamples, ...]
     owner: tuple[int, ...]
 
-    def and_of(self, made: Corrected) -> "SetAside":
+    def and_of(self, made: Corrected) -> "Excluded":
         """With what was found next, in these logs."""
-        return SetAside((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
+        return Excluded((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
 
-    def told(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
+    def reported(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
         """The fit of all pieces as one of the given logs, that says what became of them."""
         fit = replace(fit, remarks=(*given.remarks, *fit.remarks))
         if not self.bad:
@@ -208,7 +212,7 @@ class SetAside:
                     chi_square=float(np.mean([one.chi_square for one in own])),
                 )
             )  # fmt: skip
-        said = (*told_of(self.bad), *fit.remarks)
+        said = (*lines_of(self.bad), *fit.remarks)
         return replace(fit, bad=self.bad, remarks=said, logs=tuple(logs))
 
 
@@ -218,15 +222,15 @@ def _together(rms: Sequence[float]) -> float:
 
 
 def _without_bad(
-    recorded: RecordedLogs, rng: np.random.Generator, set_aside: SetAside
-) -> tuple[RecordedLogs, FittedStructure, SetAside]:
+    recorded: RecordedLogs, rng: np.random.Generator, excluded: Excluded
+) -> tuple[RecordedLogs, FittedStructure, Excluded]:
     """The logs without the samples that the plain plant contradicts, that plant, and those samples.
 
-    Looked for where the plant follows the logs but for a few places; again from the plant without
+    Searched where the plant follows the logs but for a few places; again from the plant without
     what was found. A run that contradicts a log in more than a handful of places is a wrong model,
-    and nothing is set aside for it.
+    and nothing is excluded for it.
     """
-    given, none = recorded, set_aside
+    given, none = recorded, excluded
     found = first = plain_structure(recorded, rng)
     for seed in rng.spawn(CORRECTIONS):
         if found.imposed or recorded.halt.reached():
@@ -235,13 +239,13 @@ def _without_bad(
             made = corrected(found.plant, recorded, found.misfit)
         if not made.bad:
             break
-        if not are_few((*set_aside.bad, *made.bad), given.logs):
+        if not are_few((*excluded.bad, *made.bad), given.logs):
             return given, first, none
         again = plain_structure(made.recorded, seed)
         if again.misfit > max(found.misfit, COMPLETE):
             break
-        recorded, found, set_aside = made.recorded, again, set_aside.and_of(made)
-    return recorded, found, set_aside
+        recorded, found, excluded = made.recorded, again, excluded.and_of(made)
+    return recorded, found, excluded
 
 
 def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
@@ -261,15 +265,15 @@ def finished(
     found: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
     *, by: Drive | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
-    """The fit that a plain structure leads to: searched where more than noise is left, settled;
-    quick: neither searched nor settled over whole runs.
+    """The fit from a plain structure: searched where more than noise is left, then converged;
+    quick: neither searched nor fitted over whole runs.
 
-    by: the drive that was asked for; without one, a run by command that a nonlinear actuator
-    spoils is driven by the measured force instead.
+    by: the drive that was asked for; without one, a run driven by the command that a nonlinear
+    actuator spoils is driven by the measured force instead.
     """
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
-        return fit_imposed(recorded, settle, IMPOSED_WHY)
+        return fit_imposed(recorded, settle, PRESCRIBED_WHY)
     if not (quick or needs_no_search(found, recorded)):
         found = searched(found, recorded, search, report, WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
@@ -298,8 +302,9 @@ def finished(
 
 def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
     """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
-    equation than least squares do on stretches that they have not seen: its run is not followed,
-    or only down to a noise that the equation averages out."""
+    equation than least squares do on held-out stretches: its run is not followed, or only down to a
+    noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
+    (1974) 111; the comparison is ours."""
     if fit.effects:
         return fit
     left = left_by(fit.friction, recorded)
@@ -310,20 +315,20 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generat
     if wrong and fit.adequate:
         wrong = is_material(left[0], left[1], level)
     if wrong:
-        other = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY)
-        # A run that is followed to the noise lacks nothing, whatever tells its numbers.
+        other = _by_equation(recorded, rng, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
+        # A run that is followed to the noise lacks nothing, whichever gives its parameters.
         fit = fit if other is None else replace(other, adequate=fit.adequate)
-    elif not fit.adequate:  # of a run that is not followed, windows may tell next to nothing
+    elif not fit.adequate:  # of a run that is not followed, windows may identify next to nothing
         other = _by_equation(recorded, rng, FLOOR_WHY)
-        fit = other if other is not None and _told(other) > _told(fit) else fit
+        fit = other if other is not None and _identified(other) > _identified(fit) else fit
     return _unless_unexplained(fit, left)
 
 
 def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> KarnoppFit:
-    """The fit, with nothing told where it and the equation leave most of the force; left: as
+    """The fit, nothing reported where it and the equation leave most of the force; left: as
     `left_by` has it."""
     share = min(left[0], left[1]) / left[2]
-    return untold(fit, share) if is_unexplained(share) else fit
+    return without_estimates(fit, share) if is_unexplained(share) else fit
 
 
 def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
@@ -333,8 +338,8 @@ def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
     return recorded.held or not open_to_more or search_is_hopeless(found, recorded)
 
 
-def _told(fit: KarnoppFit) -> int:
-    """How many of mass and sliding friction a fit tells."""
+def _identified(fit: KarnoppFit) -> int:
+    """How many of mass and sliding friction a fit identifies."""
     return sum(fit.estimates[name].value is not None for name in FIVE)
 
 
@@ -375,7 +380,7 @@ def is_no_run(misfit: float) -> bool:
 def _with_effects(
     prior: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
 ) -> KarnoppFit:
-    """The fit of a plant with effects, from where it was; once more with its band looked for,
+    """The fit of a plant with effects, from where it was; once more with its band searched,
     where that leaves more than noise."""
     logs, drive = recorded.logs, recorded.drive
     held = even(prior)
@@ -390,7 +395,7 @@ def _with_effects(
 
 def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """A fit by the measured force with the actuator that a regression gives, where it explains most
-    of the force: not told by the fit, but good enough to simulate with."""
+    of the force: not identified by the fit, but good enough to simulate with."""
     if fit.drive == "command" or fit.actuator is not None or not commanded(recorded.plain):
         return fit
     found = fit_actuator(recorded.plain)

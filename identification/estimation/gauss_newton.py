@@ -1,4 +1,7 @@
-"""The nearest minimum of a square sum by differences, and how sure it is."""
+"""The nearest minimum of a square sum by differences, and its covariance.
+
+Levenberg, Q. Appl. Math. 2 (1944) 164; Marquardt, SIAM J. 11 (1963) 431.
+"""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +14,7 @@ from identification.progress import Halted
 from identification.thresholds import ADEQUATE
 
 WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
-# Near it: what tells the scale common to masses and forces is a small difference of large columns.
+# Near it: the scale common to masses and forces shows in a small difference of large columns.
 FINE_STEP = 1e-7
 DAMPING_TRIES = 6  # of the damping in one step
 ALIKE = 0.5  # of a derivative, by which those to either side may differ
@@ -35,9 +38,9 @@ class Minimum:
     def covariance(self, cluster: IntArray | None = None) -> Array:
         """Of x, (k, k), for residuals that are noise of this mean square.
 
-        cluster (n,): stretches of the first n residuals within which they walk together; the
-        stretches are independent, and what they pull x about by tells its deviation (Liang, Zeger,
-        Biometrika 73 (1986) 13).
+        cluster (n,): stretches of the first n residuals within which they are correlated; the
+        stretches are independent, and the scatter of their scores gives the deviation of x (cluster
+        sandwich; Liang, Zeger, Biometrika 73 (1986) 13).
         """
         J = smooth_jacobian(self.fun, self.x)
         inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
@@ -54,7 +57,10 @@ class Minimum:
         return np.asarray(wider, dtype=np.float64)
 
     def covariance_by(self, noise: Array) -> Array:
-        """Of x, (k, k), where draws of the first n residuals' noise are known: noise (draws, n)."""
+        """Of x, (k, k), where draws of the first n residuals' noise are known: noise (draws, n).
+
+        The sandwich (J'J)^-1 J'SJ (J'J)^-1, S their covariance; Huber, Robust Statistics (1981).
+        """
         J = smooth_jacobian(self.fun, self.x)
         inverse = np.linalg.pinv(J.T @ J)
         moved = noise @ J[: noise.shape[1]] @ inverse
@@ -67,8 +73,9 @@ def gauss_newton(
 ) -> Minimum:  # fmt: skip
     """Minimum of the square sum of `fun` near x, within this reach of it (k,).
 
-    Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps; little:
-    share of the cost below which a step is the last in any case. Halted, it gives the x reached.
+    Damping of Levenberg (1944) and Marquardt (1963), differences for the Jacobian, at most so many
+    steps; little: share of the cost below which a step is the last in any case. Halted, it gives
+    the x reached.
     """
     low, high = x - reach, x + reach
     r = fun(x)
@@ -114,16 +121,13 @@ def _step(
     return None
 
 
-def jacobian(
-    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = WIDE_STEP
-) -> Array:
-    """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
+def jacobian(fun: Callable[[Array], Array], x: Array, r: Array, step: float = WIDE_STEP) -> Array:
+    """Derivatives of `fun` (n, k) by forward differences from its value r (n,) at x (k,)."""
 
     def column(i: int) -> Array:
-        up, down = x.copy(), x.copy()
+        up = x.copy()
         up[i] += step
-        down[i] -= step
-        return (fun(up) - r) / step if r is not None else (fun(up) - fun(down)) / (2 * step)
+        return (fun(up) - r) / step
 
     with ThreadPoolExecutor(2) as pool:
         return np.column_stack(list(pool.map(column, range(len(x)))))
@@ -133,8 +137,8 @@ def smooth_jacobian(fun: Callable[[Array], Array], x: Array) -> Array:
     """Derivatives of `fun` (n, k) at x where it is smooth.
 
     A run that loses a stop within the step jumps: over the step that would be a derivative beyond
-    all others, and a parameter surer than it is. It does so to one side; the run goes on smoothly
-    to the other.
+    all others, and a parameter more exact than it is. It does so to one side; the run is smooth
+    on the other. Ours.
     """
     here = fun(x)
     down, up = (-jacobian(lambda at: fun(2.0 * x - at), x, here, FINE_STEP),

@@ -36,7 +36,9 @@ def evolve(
     """Population after at most `generations`, towards one of its leaders at every move.
 
     cost: members (k, d) to costs (k,), infinite or NaN where a member cannot be; first: members
-    (k, d) in the unit cube. Stops when the median member is as good as the best.
+    (k, d) in the unit cube. Stops when the median member is as good as the best. Sources: Storn,
+    Price, J. Global Optim. 11 (1997) 341; drawn to one of the best as in Zhang, Sanderson, IEEE
+    Trans. Evol. Comput. 13 (2009) 945.
     """
     z = np.array(first, dtype=np.float64)
     k = len(z)

@@ -1,4 +1,4 @@
-"""Friction where the motion is imposed and the force is what is measured.
+"""Friction where the motion is prescribed and the force is what is measured.
 
 A rig that drives the body along a given path shows friction as a force, not in the response: a
 free run has nothing to follow there. The parameters then come from the force equation alone, and
@@ -48,10 +48,10 @@ from identification.thresholds import HALF_LEFT
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
-FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
+FEWEST_COMPARED = 48  # windows of sliding, by which a fit is compared with the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
-ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
+ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, converges
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
     "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
@@ -66,22 +66,20 @@ FALLS_WHY = (
 )
 
 
-def fit_imposed(
-    recorded: RecordedLogs, rng: np.random.Generator, why: str, remarks: Sequence[str] = ()
-) -> KarnoppFit:
+def fit_imposed(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
-    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`.
-    Raises NotIdentifiable where no log slides enough in both directions.
+    why: what kept a free run from being fitted; it is the first of the remarks.
+    Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
+    Messenger, Bortz (2021), of the inverse dynamic model, Gautier, Khalil, CDC 1988.
     """
     fit, rows = force_fit(recorded)
-    return _made(fit, rows, recorded, rng, why, remarks)
+    return _made(fit, rows, recorded, rng, why)
 
 
 def _made(
-    fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, rng: np.random.Generator,
-    why: str, remarks: Sequence[str],
-) -> KarnoppFit:  # fmt: skip
+    fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, rng: np.random.Generator, why: str
+) -> KarnoppFit:
     """A fit of the force equation as one of the machine."""
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
@@ -122,7 +120,6 @@ def _made(
         breakaways=(0, 0),
         evaluations=0,
         remarks=(
-            *remarks,
             f"{why}: fitted on the force equation, which leaves {100 * fit.relative:.1f} % of the"
             " force",
         ),
@@ -130,7 +127,7 @@ def _made(
         left=(fit.relative, fit.rms),
         falling=_falling(fit, recorded),
     )
-    return untold(made, fit.relative) if is_unexplained(fit.relative) else made
+    return without_estimates(made, fit.relative) if is_unexplained(fit.relative) else made
 
 
 def is_unexplained(share: float) -> bool:
@@ -138,20 +135,20 @@ def is_unexplained(share: float) -> bool:
     return share > HALF_LEFT
 
 
-def untold(fit: KarnoppFit, share: float) -> KarnoppFit:
-    """The fit with none of the nine told: its model leaves this share of the force."""
+def without_estimates(fit: KarnoppFit, share: float) -> KarnoppFit:
+    """The fit with none of the nine reported: its model leaves this share of the force."""
     reason = (
         f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
         " larger than friction acts (`workbench trace` searches for it), so no estimate is valid"
     )
     values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
-    untold = {
+    found = {
         name: replace(one, value=None, sd=None, low=None, high=None, at_most=None,
                       reason=reason, assumed=values[name])
         if name in NAMES else one
         for name, one in fit.estimates.items()
     }  # fmt: skip
-    return replace(fit, estimates=untold)
+    return replace(fit, estimates=found)
 
 
 def _motor(recorded: RecordedLogs) -> Motor | None:
@@ -162,7 +159,8 @@ def _motor(recorded: RecordedLogs) -> Motor | None:
 def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     """Sliding friction by the force equation, and the rows that it was fitted on.
 
-    Raises NotIdentifiable where no log slides enough in both directions.
+    Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
+    Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
     rows = _rows(recorded)
     up, down = _ways(rows)
@@ -184,14 +182,15 @@ def _ways(rows: Sequence[Rows]) -> tuple[int, int]:
 def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
     """The equation of motion of logs that move one way: mass, viscous and Coulomb friction.
 
-    Raises NotIdentifiable where they go both ways, or hardly slide.
+    Raises NotIdentifiable where they go both ways, or hardly slide. Source: as `fit_imposed`,
+    Messenger, Bortz (2021).
     """
     moved = _moved(recorded.plain, recorded.held)
     way = _way(moved)
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
-    return _made(fitted(data, ONE_WAY[way]), data, recorded, rng, why, ())
+    return _made(fitted(data, ONE_WAY[way]), data, recorded, rng, why)
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
@@ -200,19 +199,19 @@ def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
 
 
 def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
-    """The logs with their motion, smoothed until its direction is sure."""
+    """The logs with their motion, smoothed until its direction is significant."""
     return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
 
 
 def _way(moved: Sequence[MotionLog]) -> bool | None:
     up = np.concatenate([one.up for one in moved])
     share = float(np.mean(up)) if len(up) else 0.5
-    return share > 0.5 if len(up) >= FEWEST_JUDGED and is_one_way(share) else None
+    return share > 0.5 if len(up) >= FEWEST_COMPARED and is_one_way(share) else None
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
-    """The fit of logs that move one way, with Coulomb friction as no such log tells it: together
-    with whatever constant force there is."""
+    """The fit of logs that move one way, with Coulomb friction not identifiable: together with
+    whatever constant force there is."""
     name = "F_cp" if up else "F_cn"
     both = fit.estimates[name]
     if both.value is None:
@@ -244,7 +243,7 @@ def _slightest_mass(data: Sequence[Rows]) -> float:
 
 
 def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> Array:
-    """All nine for simulation: the five of sliding kept to their signs, stick just above slip;
+    """All nine for simulation: the five of sliding of their signs, stick just above slip;
     slight: a mass [kg] that the equation does without."""
     nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
     m = center[0] if center[0] > 0 else slight
@@ -265,14 +264,14 @@ def _estimates(
     shown = [i for i in fit.used if i != 0 or fit.share >= INERTIA_SHARE]
     values = np.array([fit.theta[fit.used.index(i)] for i in shown])
     names = [FIVE[i] for i in shown]
-    told = _of_sliding(names, values, samples[:, shown], _ways(data), fastest, recorded)
-    return _reasoned(told, nine, fit.share, recorded)
+    known = _of_sliding(names, values, samples[:, shown], _ways(data), fastest, recorded)
+    return _reasoned(known, nine, fit.share, recorded)
 
 
 def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | None:
     """Force [N] that a plant leaves of the equation of motion while sliding, that the equation's
-    own least squares leave on stretches that they have not seen, and the force itself; root mean
-    squares.
+    own least squares leave on held-out stretches (cross-validation, Stone 1974), and the force
+    itself; root mean squares.
 
     None where too little slides. Of rows faster than the plant's band, in which it says something
     else of friction.
@@ -282,7 +281,7 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
     made = rows_and_windows(logs, theta)
     rows = stacked([one.rows for one in made])
     fast = np.concatenate([one.outside(p) for one in made])
-    if np.count_nonzero(fast) < FEWEST_JUDGED:
+    if np.count_nonzero(fast) < FEWEST_COMPARED:
         return None
     rows = rows.at(fast)
     own = rows.b - rows.X @ theta
@@ -292,21 +291,21 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
 def imposed_estimates(
     plant: Plant, theta: Array, sd: Mapping[str, float], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
-    """The nine of a plant with effects whose motion is imposed; sd: of the five of sliding.
+    """The nine of a plant with effects under prescribed motion; sd: of the five of sliding.
 
     theta (5,): these as the equations have them, before a plant takes what is negative as 0.
-    The same rules as of a fit along an imposed motion say which of them the logs tell.
+    The same rules as of a fit along a prescribed motion decide which of them are identifiable.
     """
     names = [name for name in FIVE if name in sd]
     raw = dict(zip(FIVE, theta.tolist(), strict=True))
-    kept = {name: float(getattr(plant.friction, name)) for name in names}
-    values = np.array([kept[name] if raw[name] > 0.0 else raw[name] for name in names])
+    own = {name: float(getattr(plant.friction, name)) for name in names}
+    values = np.array([own[name] if raw[name] > 0.0 else raw[name] for name in names])
     samples = normal_samples(values, np.array([sd[name] for name in names]))
     up = np.concatenate([one.up for one in recorded.logs])
     sliding = (int(np.count_nonzero(up)), int(np.count_nonzero(~up)))
     fastest = float(max(np.max(one.speed, initial=0.0) for one in recorded.logs))
-    told = _of_sliding(names, values, samples, sliding, fastest, recorded)
-    return _reasoned(told, plant.friction.array, None, recorded)
+    known = _of_sliding(names, values, samples, sliding, fastest, recorded)
+    return _reasoned(known, plant.friction.array, None, recorded)
 
 
 def _of_sliding(
@@ -331,16 +330,16 @@ def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
 
 
 def _reasoned(
-    told: Mapping[str, Estimate], nine: Array, share: float | None, recorded: RecordedLogs
+    known: Mapping[str, Estimate], nine: Array, share: float | None, recorded: RecordedLogs
 ) -> dict[str, Estimate]:
-    """All nine: those that are told, and why the others are not; share: of the force, inertia's,
-    where it is known."""
+    """All nine: those that are identifiable, and why the others are not; share: of the force,
+    inertia's, where it is known."""
     explained = "next to nothing" if share is None else f"{share:.1%}"
     units = ROTARY_UNITS if recorded.rig.motion == "rotary" else UNITS
     out: dict[str, Estimate] = {}
     for key, value in zip(NAMES, nine, strict=True):
-        if key in told:
-            one = told[key]  # not told: what is assumed has the sign that a friction has
+        if key in known:
+            one = known[key]  # without a value: what is assumed has the sign of friction
             if one.value is None:
                 falls = key in VISCOUS_NAMES and one.assumed is not None and one.assumed < 0.0
                 why = FALLS_WHY.format(one.assumed, units[key]) if falls else one.reason

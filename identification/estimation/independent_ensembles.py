@@ -1,8 +1,12 @@
-"""Several ensembles of walkers that know nothing of each other, walked until they agree.
+"""Several independent ensembles of walkers, sampled until they agree.
 
 Each is one of emcee's. Half of its moves are along the walkers' own differences, which cross the
 ridges of a rough likelihood; the others are drawn from a t-distribution about what the ensemble has
 seen so far: where the likelihood is about normal one of those forgets all that was before.
+
+Affine-invariant ensembles, Goodman, Weare, Commun. Appl. Math. Comput. Sci. 5 (2010) 65, in emcee,
+Foreman-Mackey et al., PASP 125 (2013) 306; differential-evolution moves, ter Braak, Statistics and
+Computing 16 (2006) 239.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,11 +18,11 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.convergence import bulk_ess, rank_r_hat
 
-ENSEMBLES = 4  # as many as Vehtari et al. (2021) ask for, so that one astray is seen
+ENSEMBLES = 4  # as many as Vehtari et al. (2021) ask for, so that one that is caught is seen
 R_HAT_MOST = 1.01  # their limits of chains that can be believed: of R-hat,
 ESS_LEAST = 400.0  # and of independent draws of each parameter
-WARM_STEPS = 100  # before the first steps that may be kept; each round then doubles the walk
-MOST_WALK_STEPS = 6400  # of each walker
+WARM_STEPS = 100  # before the first steps that may count; each round then doubles the chain
+MOST_CHAIN_STEPS = 6400  # of each walker
 WALKERS_APIECE = 4  # walkers for each unknown, in whole blocks of the kernels' lanes (twice 16)
 WALKER_BLOCK = 32
 OWN_FREEDOM = 8.0  # degrees of freedom of the moves drawn about what has been seen
@@ -28,10 +32,10 @@ Cost = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Walks:
-    """Kept chains (ensembles, steps, walkers, d), and what they say of themselves.
+class SampledChains:
+    """Chains (ensembles, steps, walkers, d) of the last round, and how they agree.
 
-    r_hat, ess (j,): of the first j unknowns, those judged; steps: of each walker, kept or not.
+    r_hat, ess (j,): of the first j unknowns, those compared; steps: of each walker, of all rounds.
     """
 
     chains: Array
@@ -54,15 +58,16 @@ def walkers_for(unknowns: int) -> int:
 
 
 def independent_ensembles(
-    cost: Cost, seeds: Array, rng: np.random.Generator, *, judged: int,
-    steps: int = MOST_WALK_STEPS, on_progress: Callable[[float], None] | None = None,
-) -> Walks:  # fmt: skip
-    """Samples of exp(-cost / 2), walked in rounds that double until the ensembles agree.
+    cost: Cost, seeds: Array, rng: np.random.Generator, *, compared: int,
+    steps: int = MOST_CHAIN_STEPS, on_progress: Callable[[float], None] | None = None,
+) -> SampledChains:  # fmt: skip
+    """Samples of exp(-cost / 2), in rounds that double until the ensembles agree.
 
     cost: members (k, d) to costs (k,), infinite where a member cannot be; called from a thread for
-    each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; judged: how many
-    of the unknowns, from the first on, have to agree; steps: of a walker at most. A round begins
-    with moves made to what the one before has seen, and only the last round is kept.
+    each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; compared: how
+    many of the unknowns, from the first on, have to agree; steps: of a walker at most. A round
+    begins with moves made to what the one before has seen, and only the last round counts. Sources:
+    Goodman, Weare (2010); Foreman-Mackey et al. (2013); limits, Vehtari et al. (2021).
     """
     walks = [_Ensemble(cost, own, one) for own, one in zip(seeds, rng.spawn(len(seeds)),
                                                            strict=True)]  # fmt: skip
@@ -79,7 +84,7 @@ def independent_ensembles(
             jobs = [pool.submit(one.round, now, report, i) for i, one in enumerate(walks)]
             chains = np.array([job.result() for job in jobs])
             done += now
-            found = _judged(chains, walks, judged, done)
+            found = _compared(chains, walks, compared, done)
             if (done > WARM_STEPS and found.converged) or done >= steps:
                 break
             now = min(done, steps - done)
@@ -159,15 +164,17 @@ class _OwnDraw:
         return np.asarray(-0.5 * (OWN_FREEDOM + at.shape[1]) * np.log1p(square))
 
 
-def _judged(chains: Array, walks: Sequence[_Ensemble], judged: int, steps: int) -> Walks:
-    """The chains (ensembles, steps, walkers, d) with what they say of themselves."""
+def _compared(
+    chains: Array, walks: Sequence[_Ensemble], compared: int, steps: int
+) -> SampledChains:
+    """The chains (ensembles, steps, walkers, d) with how they agree."""
     e, n, w, _ = chains.shape
-    # An ensemble is one chain in order of time; its walkers are told apart for how much it is
+    # An ensemble is one chain in order of time; its walkers are separated for how much it is
     # worth, since a draw says little of the next of the same walker.
-    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(judged)]
+    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(compared)]
     apart = np.moveaxis(chains, 2, 1)
-    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(judged)]
-    return Walks(
+    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(compared)]
+    return SampledChains(
         chains, np.array(r_hat), np.array(ess),
         float(np.mean([one.accepted / max(one.moves, 1) for one in walks])), steps,
         sum(one.evaluations for one in walks),

@@ -1,9 +1,9 @@
-"""A position that is read late by a slow drive, whose equation of motion in weak form tells no lag.
+"""A late position of a slow drive, whose equation of motion in weak form identifies no lag.
 
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
 command acts as late as it does, and nowhere else. So a lag of a motor in a loop is believed where a
-run follows with it, and looked for there where the log is slow; so is that of a measured force. A
+run follows with it, and searched there where the log is slow; so is that of a measured force. A
 lag too short for a run to notice is believed where it explains most of what the equation leaves.
 """
 
@@ -27,7 +27,9 @@ from identification.model.surroundings import Surroundings
 from identification.progress import Halt
 from identification.thresholds import ADEQUATE
 
-SLOW_LOG = 6e-3  # s between samples, from which the equation's windows are too long to tell a lag
+SLOW_LOG = (
+    6e-3  # s between samples, from which the equation's windows are too long to identify a lag
+)
 DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
 NEARER = (2.0, 1.0, 0.5)  # samples, to either side of the best so far
 LAG_SD = 0.25  # samples, within which the best of halves is known

@@ -1,8 +1,8 @@
-"""The likelihood by which a fit was settled, with its noise and bounds, for a walk around the fit.
+"""The likelihood by which a fit has converged, with its noise and bounds, for sampling around it.
 
 The same three ways as of the fit: white noise over whole runs, its level taken from what is left;
-windows from measured states, whose uncertainty is integrated out, and with it the walk of a
-measured force; the rows of the force equation where the motion is imposed. Priors are flat.
+windows from measured states, whose uncertainty is integrated out, and with it the drift by a
+measured force's noise; the rows of the force equation under prescribed motion. Priors are flat.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +32,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
 from identification.thresholds import ADEQUATE
 
-LOOKED_FOR = 3  # rounds in which a fit's bad samples are looked for again, as in the fit
+CORRECTION_ROUNDS = 3  # rounds in which a fit's bad samples are searched again, as in the fit
 ROOM = 4.0  # times the search's box, in which parameters of a whole run may lie
 WHOLE_RUNS = "the run over the whole of each log"
 IN_WINDOWS = "the run in windows from measured states"
@@ -44,7 +44,7 @@ class Likelihood:
     """Minus twice a log likelihood, of the parameters `names` (d,) and then the runs' own starts.
 
     center (u,), covariance (u, u): where it is largest, and how wide about there. cost: members
-    (k, u) to (k,), infinite outside the bounds. aside (d,): deviations of what the likelihood
+    (k, u) to (k,), infinite outside the bounds. further (d,): deviations of what the likelihood
     cannot hold, the force between its samples. way: on what it is, in words.
     """
 
@@ -52,21 +52,23 @@ class Likelihood:
     center: Array
     covariance: Array
     cost: Callable[[Array], Array]
-    aside: Array
+    further: Array
     way: str
 
 
 def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
     """The likelihood of a fit's parameters on the logs that it was made from.
 
-    Raises BadLog where the logs lack a signal, NotIdentifiable where nothing moves.
+    Raises BadLog where the logs lack a signal, NotIdentifiable where nothing moves. Sources: normal
+    noise of the level that is left, over whole runs; windows as `LikelyWindows`, Ribatet, Cooley,
+    Davison (2012).
     """
     recorded = recorded_logs(logs, rig, fit.drive)
     if fit.imposed:
         return _by_force(recorded)
     plant = Plant(fit.friction, fit.actuator, fit.effects)
     left = misfit(plant, recorded.logs, recorded.drive)
-    for _ in range(LOOKED_FOR if fit.bad else 0):
+    for _ in range(CORRECTION_ROUNDS if fit.bad else 0):
         recorded = corrected(plant, recorded, left).recorded
         left = misfit(plant, recorded.logs, recorded.drive)
     walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
@@ -95,21 +97,21 @@ def _over_whole_runs(plant: Plant, recorded: RecordedLogs) -> Likelihood | None:
 
 
 def _around(box: Box, optimum: Optimum) -> Box:
-    """The box with the optimum in it, which a refinement may have led out of it."""
+    """The box with the optimum in it, which a refinement may have left."""
     size = np.abs(optimum.p[box.free])
     return replace(box, low=np.minimum(box.low, 0.5 * size), high=np.maximum(box.high, 2.0 * size))
 
 
 def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:
-    """Windows of any plant; the fit's own parameters, of which some may be held."""
+    """Windows of any plant; the fit's own parameters, of which some may be fixed."""
     covariance = np.atleast_2d(fit.covariance)
     windows = LikelyWindows.of(plant, recorded.logs, recorded.drive, fit.free, covariance)
     by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
     center = values_of(plant, fit.free)
     # What the windows are stretched to has that in it already.
     by_force = by_force if windows.stretch is None else 0.0
-    aside = by_force * np.array([BETWEEN.get(name, 0.0) for name in fit.free]) * np.abs(center)
-    return Likelihood(fit.free, center, covariance, windows.cost, aside, IN_WINDOWS)
+    further = by_force * np.array([BETWEEN.get(name, 0.0) for name in fit.free]) * np.abs(center)
+    return Likelihood(fit.free, center, covariance, windows.cost, further, IN_WINDOWS)
 
 
 def _by_force(recorded: RecordedLogs) -> Likelihood:

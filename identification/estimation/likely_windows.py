@@ -1,11 +1,11 @@
-"""Likelihood of any plant by its run in windows, with what the windows are unsure of taken out.
+"""Likelihood of any plant by its run in windows, with the windows' uncertain states taken out.
 
 A window begins in a measured state of normal, known uncertainty, with which the run changes about
 linearly: so the states are integrated out, r'(I + B B')^-1 r for residuals r and their changes B.
 
-A measured force drives a run with its noise, which turns on stops and walks: no density of all
+A measured force drives a run with its noise, which turns on stops and drifts: no density of all
 samples at once is to be had then. What is left is a likelihood of each by itself, with the weights
-of the estimator. Such a one is sure beyond measure; here it counts for less and is stretched about
+of the estimator. Such a one is far too narrow; here it counts for less and is stretched about
 its maximum, so that there it is as wide as draws of the noise move the estimator (Ribatet, Cooley,
 Davison, Statistica Sinica 22 (2012) 813, eqs. 2.8 and 2.10): the shape is the likelihood's, the
 width that of the errors.
@@ -60,9 +60,10 @@ SCALES = ("m", "dv_p", "dv_n", "k1", "k2")
 class LikelyWindows:
     """Logs in windows, as a likelihood of parameters `names` (d,) of a plant like this one.
 
-    found: by log, what its windows are unsure of; low, high (d,): bounds; center (d,): the plant's
-    own values; stretch (d, d): of what is off them, in cost; factor: of the robust square sum;
-    granted: independent samples for which a residual that is no noise counts, 0 where it is noise.
+    found: by log, how its run changes with the windows' states; low, high (d,): bounds; center
+    (d,): the plant's own values; stretch (d, d): of what is off them, in cost; factor: of the
+    robust square sum; granted: independent samples for which a residual that is no noise counts, 0
+    where it is noise.
     """
 
     plant: Plant
@@ -84,7 +85,8 @@ class LikelyWindows:
         """The logs in the windows in which a refinement of the plant ends.
 
         Where these are the whole log but the run loses a stop in it, they are shorter. covariance
-        (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed.
+        (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed. Source:
+        composite likelihood, Ribatet, Cooley, Davison, Statistica Sinica 22 (2012) 813.
         """
         walking = any(walks(one, drive) for one in logs)
         steady = drive == "command" and not walking and not on_bristle(plant)
@@ -103,7 +105,7 @@ class LikelyWindows:
             left = posed.square(plant) / posed.count / NOISE_LOSS
             if left <= ADEQUATE:
                 return replace(posed, factor=AS_NOISE / left)
-            # What the model lacks walks for as long as a window.
+            # What the model lacks is correlated over a window.
             windows = float(sum(len(one.begun.at) for one in own))
             tried.append((left, replace(posed, granted=windows)))
         if not tried:
@@ -121,7 +123,10 @@ class LikelyWindows:
         return values_of(self.plant, self.names)
 
     def cost(self, members: Array) -> Array:
-        """Minus twice the log likelihood of members (k, d), (k,); infinite outside the bounds."""
+        """Minus twice the log likelihood of members (k, d), (k,); infinite outside the bounds.
+
+        Normal states integrated out, Ribatet et al. (2012) for the stretch; `README.md`, (5).
+        """
         inside = np.all((members >= self.low) & (members <= self.high), axis=1)
         at = members
         if self.stretch is not None:
@@ -148,7 +153,8 @@ class LikelyWindows:
         that the cost there curves as the inverse of the covariance (d, d).
 
         The factor makes it as wide on the whole, the matrix in each direction: a cost that is only
-        stretched keeps its steps where stops come and go, in which walkers are caught.
+        stretched keeps its steps where stops come and go, in which walkers are caught. Source:
+        Ribatet, Cooley, Davison (2012), eqs. 2.8 and 2.10.
         """
         unit = np.maximum(np.sqrt(np.diag(covariance)), 1e-300)
         size = units_in(self.plant, self.names, self.center)
@@ -207,7 +213,8 @@ def likely_square(at: IntArray, B: Array, inverse: Array, r: Array, far: float) 
     """Robust square sum of weighted errors r (k, n) less what is likeliest of the states in which
     the windows, from samples `at` on, begin, and the square of these; `r` is left as it is.
 
-    B (3, k, n), inverse (windows, 3, 3): as in `windows.Freed`.
+    B (3, k, n), inverse (windows, 3, 3): as in `windows.Freed`. The states are the best linear
+    prediction of a normal random effect (Robinson, Statistical Science 6 (1991) 15).
     """
     rows, n = r.shape
     total = 0.0

@@ -10,9 +10,9 @@ from identification.arrays import Array
 from identification.estimation.independent_ensembles import (
     ENSEMBLES,
     ESS_LEAST,
-    MOST_WALK_STEPS,
+    MOST_CHAIN_STEPS,
     R_HAT_MOST,
-    Walks,
+    SampledChains,
     independent_ensembles,
     walkers_for,
 )
@@ -48,7 +48,7 @@ class Posterior:
 
     @property
     def ensembles(self) -> int:
-        """How many walked independently."""
+        """How many were sampled independently."""
         return len(self.chains)
 
     @property
@@ -59,7 +59,7 @@ class Posterior:
     def interval(self, level: float = 0.95) -> Mapping[str, tuple[float, float, float]]:
         """Median and the bounds of the central `level` interval, by name: (low, median, high).
 
-        Empty where the walk has not converged: its spread is then no one's.
+        Empty where the chains have not converged: their spread is then none of the posterior.
         """
         if not self.converged:
             return MappingProxyType({})
@@ -75,25 +75,26 @@ def sample_posterior(
     rng: np.random.Generator,
     *,
     rig: Rig,
-    steps: int = MOST_WALK_STEPS,
+    steps: int = MOST_CHAIN_STEPS,
     on_progress: Callable[[float], None] | None = None,
 ) -> Posterior:
     """Posterior of a fit's parameters, effects' too, on the logs that it was made from.
 
-    By the likelihood by which the fit was settled, with its noise, under flat priors inside the
-    estimator's bounds. steps: of each walker at most; the walk ends when its ensembles agree.
+    By the likelihood by which the fit has converged, with its noise, under flat priors inside the
+    estimator's bounds. steps: of each walker at most; it ends when the ensembles agree. Sources:
+    Goodman, Weare (2010), Foreman-Mackey et al. (2013); convergence, Vehtari et al. (2021).
     """
     found = likelihood_of(fit, logs, rig)
     seeding, walking, between = rng.spawn(3)
     seeds = _seeds(found, seeding)
     walks = independent_ensembles(
-        found.cost, seeds, walking, judged=len(found.names), steps=steps, on_progress=on_progress
+        found.cost, seeds, walking, compared=len(found.names), steps=steps, on_progress=on_progress
     )
     chains = np.moveaxis(walks.chains, 2, 1)[..., : len(found.names)]
     chains = chains.reshape(len(seeds), -1, len(found.names))
     return Posterior(
         names=found.names,
-        chains=chains + found.aside * between.standard_normal(chains.shape),
+        chains=chains + found.further * between.standard_normal(chains.shape),
         r_hat=dict(zip(found.names, walks.r_hat.tolist(), strict=True)),
         ess=dict(zip(found.names, walks.ess.tolist(), strict=True)),
         way=found.way,
@@ -127,7 +128,7 @@ def _seeds(found: Likelihood, rng: np.random.Generator) -> Array:
     return np.asarray(picked.reshape(ENSEMBLES, -1, d))
 
 
-def _verdict(found: Likelihood, walks: Walks) -> str:
+def _verdict(found: Likelihood, walks: SampledChains) -> str:
     """One line: whether the ensembles agree, by what figures, and what to do where not."""
     worst, least = int(np.argmax(walks.r_hat)), int(np.argmin(walks.ess))
     figures = (

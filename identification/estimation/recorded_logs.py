@@ -36,7 +36,7 @@ from identification.thresholds import WORSE
 class RecordedLogs:
     """Logs of one machine with their motion.
 
-    drive: what drives their runs; imposed: a rig leads the body along a path; halt: whether
+    drive: what drives their runs; imposed: the motion is prescribed by a rig; halt: whether
     whatever is made of them is to go on; share: of the step of the command to the next sample, by
     which its mean between them is another than the logged one: it is in these logs, and `given`
     puts it into others. remarks: what became of logs whose clock is faster than their motion.
@@ -154,7 +154,10 @@ def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
 
 
 def plain_share(recorded: RecordedLogs) -> float:
-    """Share of the command's step to the next sample, as a machine without effects shows it."""
+    """Share of the command's step to the next sample, as a machine without effects shows it.
+
+    Ours: `regression/README.md`, (13).
+    """
     if recorded.held:
         if any(not len(one.sliding.start) for one in recorded.logs):
             return 0.0
@@ -221,7 +224,10 @@ def commanded(logs: Sequence[Log]) -> bool:
 
 
 def left_by_actuator(logs: Sequence[Log]) -> float:
-    """Share of the force's rate that a linear actuator with the logged command leaves."""
+    """Share of the force's rate that a linear actuator with the logged command leaves.
+
+    Source: the paper's dF/dt = k1 u - k2 v, in weak form (Messenger, Bortz 2021).
+    """
     seen = [motion_log(log, held=False, by_command=True) for log in logs]
     rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in seen])
     return left_share(solve_rows(rows), rows.sd, rows.b)
@@ -234,7 +240,7 @@ def left_share(found: Fitted, sd: Array, rate: Array) -> float:
 
 
 def led_by_rig(recorded: RecordedLogs) -> bool:
-    """Whether a rig leads the body along a path, so that no run of its own is to be followed."""
+    """Whether the motion is prescribed by a rig, so that no run of its own is to be followed."""
     if recorded.held or commanded(recorded.plain):
         return False
     return inertia_has_no_part(recorded.logs)

@@ -1,4 +1,4 @@
-"""A plant by the equations alone, and how sure these are of each of its parameters."""
+"""A plant by the equations alone, with the deviation of each of its parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,20 +21,20 @@ from identification.thresholds import INERT
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
 SHAPE = 0.03  # relative trust in a searched parameter
-LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none
+FAR_BEYOND = 1e3  # times its size, a deviation from which a part of an effect begins as none
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 
 
 @dataclass(frozen=True, eq=False)
 class RegressedPlant:
-    """A structure by the equations alone: its plant, how sure they are of each parameter by name,
-    and (silent) parameters of which they tell nothing; slow [m/s]: speed below which they do not
+    """A structure by the equations alone: its plant, the deviation of each parameter by name,
+    and parameters that they do not identify; slow [m/s]: speed below which they do not
     hold."""
 
     plant: Plant
     prior: Mapping[str, float]
-    silent: Mapping[str, float]
+    unidentified: Mapping[str, float]
     slow: float
 
 
@@ -42,7 +42,10 @@ def regressed_plant(
     stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
     recorded: RecordedLogs,
 ) -> RegressedPlant:  # fmt: skip
-    """The plant by the equations alone."""
+    """The plant by the equations alone: weighted least squares in weak form.
+
+    Sources: Messenger, Bortz (2021); inverse dynamic model, Gautier, Khalil, CDC 1988.
+    """
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     sliding = outcomes[MECHANICAL]
     prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
@@ -62,39 +65,39 @@ def regressed_plant(
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
-    acting, silent = [], dict[str, float]()
+    acting, unidentified = [], dict[str, float]()
     for effect, shape in effects:
-        values, spreads, unheard = _of_effect(effect, shape, outcomes)
+        values, spreads, none = _of_effect(effect, shape, outcomes)
         acting.append(effect.acting(values))
         prior |= spreads
-        silent |= dict.fromkeys(unheard, np.inf)
+        unidentified |= dict.fromkeys(none, np.inf)
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
-    return RegressedPlant(Plant(nine, drives, tuple(acting)), prior, silent, slow)
+    return RegressedPlant(Plant(nine, drives, tuple(acting)), prior, unidentified, slow)
 
 
 def _of_effect(
     effect: Effect, shape: Values, outcomes: Mapping[str, RowFit]
 ) -> tuple[dict[str, float], dict[str, float], list[str]]:
-    """An effect's parameters by the equations, how sure they are of each (as key.name), and those
-    (as key.name) of which they tell nothing."""
+    """An effect's parameters by the equations, the deviation of each (as key.name), and those (as
+    key.name) that they do not identify."""
     values = inside(effect, with_sizes(effect, shape, outcomes))
     spreads = effect_sd(effect, values, outcomes)
-    none, unheard = slight(effect, values, spreads), []
-    for p in effect.params:  # a signal that is not there tells nothing of its parameter
-        if p.name in AT_REST:  # nor do the equations tell a stick limit
-            unheard.append(f"{effect.key}.{p.name}")
+    none, unidentified = slight(effect, values, spreads), []
+    for p in effect.params:  # a signal that is not there identifies no parameter
+        if p.name in AT_REST:  # nor do the equations identify a stick limit
+            unidentified.append(f"{effect.key}.{p.name}")
             spreads.pop(p.name)
         elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
-            unheard.append(f"{effect.key}.{p.name}")
+            unidentified.append(f"{effect.key}.{p.name}")
             values[p.name] = float(np.clip(0.0, p.low, p.high))
-        elif lost(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
+        elif far_beyond(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
             values[p.name] = float(np.clip(0.0, p.low, p.high))
-    return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unheard
+    return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unidentified
 
 
-def lost(sd: float | None, value: float, typical: float) -> bool:
+def far_beyond(sd: float | None, value: float, typical: float) -> bool:
     """Whether a deviation is so far beyond its parameter that no search should begin from it."""
-    return sd is not None and not sd < LOST * max(abs(value), abs(typical))
+    return sd is not None and not sd < FAR_BEYOND * max(abs(value), abs(typical))
 
 
 def _limit(coulomb: float, held: float) -> float:
@@ -112,7 +115,7 @@ def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> floa
 
 
 def inertia_is_lost(o: RowFit) -> bool:
-    """Whether the motion is imposed: inertia is of no account beside what the model leaves."""
+    """Whether the motion is prescribed: inertia is negligible beside what the model leaves."""
     keep = o.rows.speed >= o.slowest
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
@@ -137,7 +140,8 @@ def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def deviations(o: RowFit) -> Array:
-    """Standard deviations of theta, (k,), widened by what the rows leave and their overlap.
+    """Standard deviations of theta, (k,), of weighted least squares (Aitken 1936), widened by what
+    the rows leave and their overlap.
 
     0 where a column is nothing.
     """

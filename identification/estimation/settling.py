@@ -1,9 +1,9 @@
 """The last step of a fit: from a plant that follows the logs to values, intervals and reasons.
 
-Where a plain plant follows whole runs by the command down to the sensors' noise, nothing tells
-more than they do: their likelihood has the last word. Everywhere else (more than noise is left, it
+Where a plain plant follows whole runs by the command down to the sensors' noise, nothing is more
+informative: their likelihood decides. Everywhere else (more than noise is left, it
 is driven by a measured force or a noisy command, or has effects) runs in windows from measured
-states tell, and by how much one window differs from the next.
+states decide, and by how much one window differs from the next.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ from identification.estimation.plain_search.problem import (
 )
 from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.walking_residual import walk_size, widened
+from identification.estimation.residual_drift import drift_size, widened
 from identification.estimation.windowed_run.parameters import even, names_of, values_of
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED
@@ -84,16 +84,17 @@ def settled(
     """The fit of a plant that a search or refinement has come to, near its minimum.
 
     misfit: what it leaves in windows; refined: the refinement that it comes from, if it is one;
-    quick: by the windows, which take no search.
+    quick: by the windows, which take no search. Sources: whole runs, Levenberg (1944), Marquardt
+    (1963), Cappé et al. (2004); windows, Bock (1983), Liang, Zeger (1986).
     """
-    walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
-    exact = recorded.drive == "command" and not plant.effects and not walking and not quick
+    drifts = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
+    exact = recorded.drive == "command" and not plant.effects and not drifts and not quick
     spread = None
     if exact and misfit <= ADEQUATE:
         spread = _over_whole_runs(plant, recorded, rng, report)
     if spread is None:
         spread = _over_windows(plant, recorded, misfit, rng, refined)
-    return _told(spread, recorded)
+    return _as_fit(spread, recorded)
 
 
 def _over_whole_runs(
@@ -119,7 +120,7 @@ def _over_whole_runs(
 def nearest(problem: Problem, plant: Plant) -> Optimum:
     """The minimum over whole runs that is nearest to a plant."""
     row = kernel_row(problem, plant)
-    # Its start first, or the first step goes astray.
+    # Its start first, or the first step diverges.
     begun = refine(problem.long_runs, row, problem.free[:0])
     return refine(begun.runs(problem.long_runs), row, problem.free)
 
@@ -140,11 +141,11 @@ def _of_solution(problem: Problem, solution: Solution) -> Spread:
     optimum = solution.optimum
     runs = [simulated(problem, optimum, i) for i in range(len(problem.logs))]
     samples = solution.samples[:, : len(problem.free)]
-    walk = walk_size(_residuals(problem, runs)) if solution.chi_square <= ADEQUATE else 0.0
+    drift = drift_size(_residuals(problem, runs)) if solution.chi_square <= ADEQUATE else 0.0
     return Spread(
         plant=plant_of(problem, optimum),
         names=tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free),
-        samples=widened(samples, np.mean(samples, axis=0), walk) if walk else samples,
+        samples=widened(samples, np.mean(samples, axis=0), drift) if drift else samples,
         chi_square=solution.chi_square,
         adequate=solution.adequate,
         noise=solution.noise,
@@ -153,11 +154,11 @@ def _of_solution(problem: Problem, solution: Solution) -> Spread:
         events=events_of(
             [run.mode for run in runs], [run.v for run in runs], force_of(problem.logs)
         ),
-        remarks=(RESIDUAL_WALK_SAID.format(walk),) if walk else (),
+        remarks=(RESIDUAL_DRIFT_SAID.format(drift),) if drift else (),
     )
 
 
-RESIDUAL_WALK_SAID = (
+RESIDUAL_DRIFT_SAID = (
     "the run drifts slowly from the log (by {:.3g} deviations in all), less than the noise at any"
     " sample: a sample of the command may be wrong, or the body was touched; intervals are widened"
     " for it"
@@ -190,7 +191,7 @@ def _over_windows(
     plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
     refined: Refit | None,
 ) -> Spread:  # fmt: skip
-    """By runs in windows from measured states, within which what is left walks together."""
+    """By runs in windows from measured states, within which what is left is correlated."""
     near = refined or refit(plant, recorded.logs, recorded.drive, prior=even(plant), effort="near")
     if near.misfit <= misfit:
         plant = near.plant
@@ -242,8 +243,10 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     """Covariance (d, d) of the free parameters."""
     covariance = near.covariance.copy()
     # What changes nothing in the run is not known, rather than known exactly.
-    silent = ~(np.diag(covariance) > 0.0)
-    covariance[silent, silent] = _of_silent(near.plant, near.names, values, events)[silent] ** 2
+    unknown = ~(np.diag(covariance) > 0.0)
+    covariance[unknown, unknown] = (
+        _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
+    )
     by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
     floor = by_force * np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
     covariance = covariance + np.diag(floor**2)
@@ -252,7 +255,7 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     return np.asarray(covariance)
 
 
-def _of_silent(plant: Plant, names: Sequence[str], values: Array, events: Events) -> Array:
+def _as_large_as_can_be(plant: Plant, names: Sequence[str], values: Array, events: Events) -> Array:
     """Deviations (d,) of parameters of which the logs say nothing: as large as they could be."""
     p = plant.friction
     force = max(p.F_cp, p.F_cn, p.F_sp, -p.F_sn)
@@ -276,12 +279,12 @@ def _window_log(plant: Plant, recorded: RecordedLogs, index: int) -> LogFit:
     )
 
 
-def _told(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
+def _as_fit(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
     """The spread as estimates with intervals and reasons."""
     center = values_of(spread.plant, spread.names)
     own = [i for i, name in enumerate(spread.names) if "." not in name]
     sd = dict(zip(spread.names, np.std(spread.samples, axis=0).tolist(), strict=True))
-    told = {
+    found = {
         **estimates(
             [spread.names[i] for i in own], center[own], spread.samples[:, own], spread.events,
             recorded.rig, recorded.name,
@@ -292,7 +295,7 @@ def _told(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
         friction=spread.plant.friction,
         actuator=spread.plant.actuator,
         effects=spread.plant.effects,
-        estimates=told,
+        estimates=found,
         free=spread.names,
         covariance=np.atleast_2d(np.cov(spread.samples.T)),
         samples=spread.samples,
@@ -344,13 +347,13 @@ def structure_estimates(
 ) -> dict[str, Estimate]:
     """The nine and the actuator's of a plant that has been refined already; sd: by name.
 
-    The same rules as of a fit say which of them the logs tell.
+    The same rules as of a fit decide which of them are identifiable.
     """
     names = [name for name in names_of(plant, recorded.drive) if "." not in name]
     values = values_of(plant, names)
     events = _events(plant, recorded)
     own = np.array([sd.get(name, 0.0) for name in names])
-    own = np.where(own > 0.0, own, _of_silent(plant, names, values, events))
+    own = np.where(own > 0.0, own, _as_large_as_can_be(plant, names, values, events))
     samples = normal_samples(values, own)
     return dict(estimates(names, values, samples, events, recorded.rig, recorded.name))
 

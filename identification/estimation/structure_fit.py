@@ -42,16 +42,16 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 
-PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
-ABOVE_BAND = 1.3  # times the band, above which sliding friction is judged
+PIECE_SECONDS = 10.0  # s of each log, in which fewer marginal stops are lost than in the whole
+ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 
 
 @dataclass(frozen=True, eq=False)
 class FittedStructure:
     """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
 
-    imposed: the motion is, so the plant has no free run to be refined on; misfit: of the free
-    run, 1 where it leaves the sensors' noise; fit: what it settled to, where it has been.
+    imposed: the motion is prescribed, so the plant has no free run to be refined on; misfit: of the
+    free run, 1 where it leaves the sensors' noise; fit: what it converged to, where it has been.
     """
 
     stage: EffectRows
@@ -71,15 +71,16 @@ def fitted_structure(
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
     limits to begin from too, where those of the regression lead nowhere. Halted, it gives the best
-    so far, with the deviations that the regression tells.
+    so far, with the deviations that the regression gives. Sources: of the equations, Messenger,
+    Bortz (2021); of the run, Bock (1983), Levenberg (1944), Marquardt (1963).
     """
     logs, drive = recorded.logs, recorded.drive
-    told = regressed_plant(stage, outcomes, effects, recorded)
-    plant, prior = told.plant, dict(told.prior)
+    regressed = regressed_plant(stage, outcomes, effects, recorded)
+    plant, prior = regressed.plant, dict(regressed.prior)
     if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
-        return FittedStructure(stage, outcomes, plant, {**prior, **told.silent}, True)
+        return FittedStructure(stage, outcomes, plant, {**prior, **regressed.unidentified}, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
-    # follows the velocity as the log tells it, so even of the right effect more than noise is left.
+    # follows the velocity as the log shows it, so even of the right effect more than noise is left.
     remembers = any(effect.evolve and effect.place.rubs for effect, _ in effects)
     left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
     missing = max(left) > ASTRAY and not remembers
@@ -88,10 +89,10 @@ def fitted_structure(
     try:
         free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
         if free and not (missing or on_bristle(plant)):
-            done = _stops_searched(told, recorded, rng)
+            done = _stops_searched(regressed, recorded, rng)
             if done.misfit <= followed:
                 return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
-        done = _refined(told, logs, drive, near, "rough" if hopeless else "whole", done)
+        done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
         if smooth and done.misfit > COMPLETE and not hopeless:
             again = replace(onward(done.plant, logs, drive), prior=prior)
@@ -99,7 +100,7 @@ def fitted_structure(
         return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
-        spreads = {**prior, **told.silent}
+        spreads = {**prior, **regressed.unidentified}
         return FittedStructure(stage, outcomes, best, spreads, False, least)
 
 
@@ -118,35 +119,35 @@ def _best_so_far(
 
 
 def _stops_searched(
-    told: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator
+    regressed: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator
 ) -> Refit:
     """The regression's plant, its stops searched by themselves, refined on the free run."""
     logs, drive = recorded.logs, recorded.drive
-    plant = stick_search(told.plant, logs, drive, rng)
-    return refit(plant, logs, drive, prior=dict(told.prior), effort="near")
+    plant = stick_search(regressed.plant, logs, drive, rng)
+    return refit(plant, logs, drive, prior=dict(regressed.prior), effort="near")
 
 
 def _refined(
-    told: RegressedPlant, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
+    regressed: RegressedPlant, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
     effort: Effort, before: Refit | None,
 ) -> Refit:  # fmt: skip
     """The regression's plant refined on the free run, from another band and on a piece first where
     that leaves more than noise; or one of before, if that is better."""
-    plant, prior = told.plant, dict(told.prior)
-    done = refit(plant, logs, drive, band=max(told.slow, 1e-4), prior=prior, effort=effort)
+    plant, prior = regressed.plant, dict(regressed.prior)
+    done = refit(plant, logs, drive, band=max(regressed.slow, 1e-4), prior=prior, effort=effort)
     done = done if before is None or done.misfit <= before.misfit else before
     try:
-        return _rebegun(done, told, logs, drive, near, effort)
+        return _rebegun(done, regressed, logs, drive, near, effort)
     except Halted:
         return done  # which the next ask halts
 
 
 def _rebegun(
-    done: Refit, told: RegressedPlant, logs: Sequence[MotionLog], drive: Drive,
+    done: Refit, regressed: RegressedPlant, logs: Sequence[MotionLog], drive: Drive,
     near: Karnopp | None, effort: Effort,
 ) -> Refit:  # fmt: skip
     """The better of a refinement and of those from another band and on a piece first."""
-    plant, prior = told.plant, dict(told.prior)
+    plant, prior = regressed.plant, dict(regressed.prior)
     free = loose(plant, drive)
     if near is not None and not free and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
@@ -167,7 +168,7 @@ def _rebegun(
 def band(model: FittedStructure) -> float:
     """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
     p = model.plant.friction
-    # A run that is not followed may have any band; most of the sliding is judged all the same.
+    # A run that is not followed may have any band; most of the sliding is compared all the same.
     widest = widest_band(model.stage.logs)
     return 0.0 if model.imposed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)
 
@@ -176,7 +177,8 @@ def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedS
     """The plant without effects: by the equations, refined on its free run.
 
     Where these have too few rows of sliding, the run alone is fitted, from a first estimate. A
-    search follows where the equations of an actuator's plant are right but its run is not.
+    search follows where the equations of an actuator's plant are right but its run is not. Ours, of
+    the paper's plant.
     """
     regressed, search = rng.spawn(2)
     stage, first = first_stage(recorded.logs, recorded.by_command)

@@ -89,8 +89,9 @@ class _Squares:
 def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     """What acts beside the applied force in logs of one machine, with y [m] and F [N].
 
-    Nothing where too little of their motion slides to tell. Orders of a turn hide all the rest,
-    which is looked for without them.
+    Nothing where too little of their motion slides. Orders of a turn hide all the rest, which is
+    searched without them. Sources: weak form, Messenger, Bortz (2021); gravity and constant force,
+    Gautier, Khalil, CDC 1988; deviations, Tukey (1958).
     """
     orders: tuple[Order, ...] = ()
     if rig.kind == "motor" or chosen_drive(logs, rig, None) == "force":
@@ -189,11 +190,11 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
 def widened_friction(
     friction: Mapping[str, Estimate], around: Surroundings, logs: Sequence[Log]
 ) -> dict[str, Estimate]:
-    """The nine, their intervals with what is unsure of a force that was taken out before them.
+    """The nine, their intervals with the deviation of a force that was taken out before them.
 
     A constant force moves F_cp and F_cn by all of its error, gravity by the mean that its sine and
     cosine have in motion that way; every one errs by a share of itself, since the force was put
-    right between its samples.
+    right between its samples. First-order propagation of independent errors; ours.
     """
     moves = [np.diff(np.asarray(log["y"])) for log in logs]
     angles = np.concatenate([np.asarray(log["y"])[1:] for log in logs])
@@ -235,7 +236,8 @@ def lag_estimate(around: Surroundings) -> Estimate | None:
 def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:
     """What the equation leaves of the force without the lag and with it [N], root mean squares.
 
-    Of these logs' own coefficients. Raises NotIdentifiable where too little of them slides.
+    Of these logs' own coefficients, by (1) of `README.md` (Gautier, Khalil 1988). Raises
+    NotIdentifiable where too little of them slides.
     """
     held = rig.kind == "motor" and not around.sampled
     moved = [motion_log(log, held=held, by_command=False) for log in logs]
@@ -250,8 +252,9 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
 
 
 def _has_gravity(found: _Squares) -> bool:
-    """Whether the force goes by the sine of the angle, surely, for much of what is left without,
-    and a spring's, by the angle itself, would not leave clearly less: in a narrow swing both do."""
+    """Whether the force depends on the sine of the angle, significantly, for much of what is left
+    without, and a spring, on the angle itself, would not leave clearly less: in a narrow motion
+    both do."""
     plain, spring, weight = (found.least(used) for used in (PLAIN, SPRING, GRAVITY))
     if not explains(plain, weight) or explains(weight, spring):
         return False
@@ -271,7 +274,7 @@ def explains_most(without: float, left: float) -> bool:
 
 
 def stands_out(size: float, sd: float) -> bool:
-    """Whether a size is surely not 0."""
+    """Whether a size is significantly different from 0."""
     return abs(size) > BEYOND_CHANCE * sd
 
 
@@ -335,7 +338,7 @@ def _but(every: BoolArray, k: int) -> BoolArray:
 def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | None:
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
-    held: the force's column stays until the next sample.
+    held: the force's column is a zero-order hold.
     """
     if not any(len(one.speed) for one in moved):
         return None

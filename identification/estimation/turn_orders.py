@@ -73,10 +73,12 @@ class _Turning:
 
 
 def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
-    """Orders of the turn whose forces explain most of what friction and inertia leave, each sure.
+    """Orders of the turn whose forces explain most of what friction and inertia leave, each
+    significant.
 
     None where a machine does not turn, too little of its motion slides, or the whole of what is
-    left is not mostly theirs: a small one is an effect as any other, for a trace to find.
+    left is not mostly theirs: a small one is an effect as any other, for a trace to find. Sources:
+    harmonics of cogging, Hanselman, chapter 4; forward selection, Chen, Billings, Luo (1989).
     """
     if rig.motion != "rotary" or not turns(max(float(np.ptp(log["y"])) for log in logs)):
         return ()
@@ -96,15 +98,16 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
         for value, s in zip(theta[PLAIN_COLUMNS:], sd[PLAIN_COLUMNS:], strict=True)
     ]
     made = [Order(n, sizes[2 * i], sizes[2 * i + 1]) for i, n in enumerate(chosen)]
-    sure = (one for one in made if is_sure(one.size, one.sd))
-    return tuple(sorted(sure, key=lambda one: -one.size))
+    significant = (one for one in made if is_significant(one.size, one.sd))
+    return tuple(sorted(significant, key=lambda one: -one.size))
 
 
 def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:
     """What the equation leaves of the force without the orders and with them [N m], root mean
     squares; the orders as they are, friction and inertia of these logs.
 
-    Raises NotIdentifiable where too little of them slides.
+    Raises NotIdentifiable where too little of them slides. By (2) of `README.md` (Hanselman;
+    Gautier, Khalil 1988).
     """
     held = rig.kind == "motor"
     without, left = (
@@ -123,13 +126,13 @@ def are_most(without: float, left: float) -> bool:
     return left <= HALF_LEFT * without
 
 
-def is_sure(size: float, sd: float) -> bool:
-    """Whether the size of an order is no luck among all the orders that were tried."""
+def is_significant(size: float, sd: float) -> bool:
+    """Whether the size of an order is beyond chance among all the orders that were tried."""
     return size > BEYOND_CHANCE * sd
 
 
 def turns(angle: float) -> bool:
-    """Whether motion over an angle [rad] tells neighbouring orders apart."""
+    """Whether motion over an angle [rad] separates neighbouring orders."""
     return angle >= ORDERS_FROM * 2.0 * np.pi
 
 
@@ -186,7 +189,7 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     """Rows of the equation, thinned to so many; None where too few slide."""
     moved: list[MotionLog] = []
     for log in logs:
-        try:  # slow motion is smoothed until its direction is sure
+        try:  # slow motion is smoothed until its direction is significant
             moved.append(motion_log(log, held=held, by_command=False, imposed=True))
         except UserError:
             continue

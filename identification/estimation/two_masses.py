@@ -56,7 +56,8 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     """A resonance of two masses, where it explains most of what one body leaves; None elsewhere.
 
     logs: each with y [m] and F [N], without what acts beside the applied force. Intervals are by
-    the scatter between windows.
+    the scatter between windows. Sources: elastic shaft, Schroeder, chapter 19; variable projection,
+    Golub, Pereyra (1973); Levenberg (1944), Marquardt (1963); jackknife, Tukey (1958).
     """
     h = logs[0].h
     try:
@@ -85,7 +86,7 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
     if not inside or not are_two(float(one_body @ one_body), float(found.fun @ found.fun)):
         return None
-    return _told(found.x, cut, h, damping)
+    return _resonance(found.x, cut, h, damping)
 
 
 def shows_a_load(resonance: float, anti_resonance: float) -> bool:
@@ -123,7 +124,7 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
     return {name: reported_estimate(one.value, unit, one.sd) for name, (one, unit) in sizes.items()}
 
 
-def _told(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
+def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
     """The resonance with its deviations, by leaving out a tenth of the windows in turn."""
     whole = _numbers(p, cut, h)
     groups = np.arange(len(cut)) % min(10, len(cut))
@@ -161,8 +162,10 @@ def _two_bodies(p: Array, cut: Sequence[_Window], h: float) -> tuple[Array, Arra
     decay, turn = damping * w_r, w_r * np.sqrt(max(1.0 - min(damping, 0.99) ** 2, 1e-4))
 
     def free(t: Array) -> Array:
-        swing = np.exp(-decay * t)
-        return np.column_stack([_drift(t), swing * np.cos(turn * t), swing * np.sin(turn * t)])
+        decaying = np.exp(-decay * t)
+        return np.column_stack(
+            [_drift(t), decaying * np.cos(turn * t), decaying * np.sin(turn * t)]
+        )
 
     return _left(cut, (top, below), h, free)
 

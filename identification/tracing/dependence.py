@@ -1,5 +1,5 @@
-"""On what a residual depends: functions of one signal at a time, or a swing of one frequency,
-judged on blocks left out."""
+"""On what a residual depends: functions of one signal at a time, or a vibration of one frequency,
+tested on blocks left out."""
 
 from collections.abc import Mapping
 
@@ -11,22 +11,25 @@ from identification.thresholds import OF_ACCOUNT
 from identification.tracing.result import Dependence
 
 BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
-FEW_VALUES = 8  # values of a signal (a switch, a gear) that are told apart each by itself
+FEW_VALUES = 8  # values of a signal (a switch, a gear) that are each a level of its own
 MOST_SIGNALS = 3  # signals named
 OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
 SECOND_SIGNAL = 0.15  # share of what is left that a second signal must explain
-APART = 0.1  # of the residual, that a swing in time must explain beyond any signal: a periodic
-# motion makes all that depends on place or speed swing as well
-FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length tells apart
+APART = 0.1  # of the residual, that a vibration in time must explain beyond any signal: a periodic
+# motion makes all that depends on place or speed periodic as well
+FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length resolves
 GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
-OF_MOTION = 0.1  # of the motion, that a swing at a rate explains where the rate is its own
-HARMONICS = 3  # of a motion, in which what depends on it may swing
-SWINGS = 200  # rows; of fewer, the frequency that fits best does so by luck
+OF_MOTION = 0.1  # of the motion, that a vibration at a rate explains where the rate is its own
+HARMONICS = 3  # of a motion, in which what depends on it may vibrate
+SWINGS = 200  # rows; of fewer, the frequency that fits best does so by chance
 ROWS_IN_PERIOD = 4.0  # rows in a period
 
 
 def hats(x: Array, levels: int) -> Array:
-    """Piecewise linear functions of `x` over its quantiles, (n, k)."""
+    """Piecewise linear functions of `x` over its quantiles, (n, k).
+
+    Source: linear B-splines, de Boor, A Practical Guide to Splines (1978).
+    """
     values = np.unique(x)
     if len(values) <= FEW_VALUES:
         return np.asarray(x[:, np.newaxis] == values, dtype=np.float64)
@@ -37,7 +40,11 @@ def hats(x: Array, levels: int) -> Array:
 
 
 def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
-    """Share of the residual's square that X explains on blocks left out, and what it predicts."""
+    """Share of the residual's square that X explains on blocks left out, and what it predicts.
+
+    Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the slight ridge, Hoerl,
+    Kennard, Technometrics 12 (1970) 55.
+    """
     G = {
         b: (X[block == b].T @ X[block == b], X[block == b].T @ r[block == b])
         for b in np.unique(block)
@@ -59,15 +66,16 @@ def dependence(
 ) -> Dependence:  # fmt: skip
     """Signals on which a whitened residual (n,) depends, most of all first.
 
-    signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time,
-    left out in turn; each: rows that a level of a signal needs; least: share of the residual from
-    which a signal is named, None: the usual. Each signal may act otherwise in the two directions.
+    signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time, left
+    out in turn; each: rows that a level of a signal needs; least: share of the residual from which
+    a signal is named, None: the usual. Each signal may act otherwise in the two directions. Source:
+    cross-validation, Stone (1974); `README.md`, (10).
     """
     least = OF_ACCOUNT if least is None else least
     best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
-        swing = swinging_share(r, signals["t"], rate, block)
+        swing = periodic_share(r, signals["t"], rate, block)
         apart = swing[0] > APART + max(share for share, _ in best.values())
         if apart and not _of_the_motion(signals, rate, block):
             best["t"] = swing
@@ -91,16 +99,18 @@ def _of_the_motion(signals: Mapping[str, Array], rate: float, block: IntArray) -
     """Whether the motion itself goes at this rate [Hz], or at one of which it is a harmonic."""
     t = signals["t"]
     return any(
-        swinging_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_MOTION
+        periodic_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_MOTION
         for x in (signals[name] for name in ("y", "v") if name in signals)
         for harmonic in range(1, HARMONICS + 1)
     )
 
 
 def frequency(r: Array, t: Array) -> float:
-    """Frequency [Hz] at which a residual (n,) at times t [s] swings most; 0 where none can be told.
+    """Frequency [Hz] at which a residual (n,) at times t [s] vibrates most; 0 where none can be
+    found.
 
-    t begins anew at each log; a swing keeps its frequency over the logs, not its phase.
+    t begins anew at each log; a vibration has one frequency over the logs, not one phase. Source:
+    periodogram, Schuster, Terrestrial Magnetism 3 (1898) 13, summed over the logs.
     """
     logs = np.split(np.arange(len(t)), np.flatnonzero(np.diff(t) < 0.0) + 1)
     longest = max(float(np.ptp(t[one])) for one in logs)
@@ -114,12 +124,15 @@ def frequency(r: Array, t: Array) -> float:
         line = np.bincount(place, r[one] - np.mean(r[one]), size)
         power += np.abs(np.asarray(rfft(line, size))) ** 2
     trial = np.arange(len(power)) / (size * step)
-    told = (trial > 1.0 / longest) & (trial < 1.0 / (ROWS_IN_PERIOD * GRID_PLACES * step))
-    return float(trial[told][np.argmax(power[told])]) if np.any(told) else 0.0
+    seen = (trial > 1.0 / longest) & (trial < 1.0 / (ROWS_IN_PERIOD * GRID_PLACES * step))
+    return float(trial[seen][np.argmax(power[seen])]) if np.any(seen) else 0.0
 
 
-def swinging_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[float, Array]:
-    """As `smooth_share`, of a swing at this rate [Hz] whatever the motion does."""
+def periodic_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[float, Array]:
+    """As `smooth_share`, of a vibration at this rate [Hz] whatever the motion does.
+
+    Source: as `explained_by`, Stone (1974).
+    """
     log = np.cumsum(np.concatenate([[False], np.diff(t) < 0.0]))
     phase = 2.0 * np.pi * rate * t
     wave = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(t))])
@@ -130,7 +143,10 @@ def swinging_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[fl
 def smooth_share(
     r: Array, x: Array, up: BoolArray, block: IntArray, each: int = OVERLAPPING
 ) -> tuple[float, Array]:
-    """The better of a coarse and a fine function of one signal and the direction."""
+    """The better of a coarse and a fine function of one signal and the direction.
+
+    Source: as `explained_by`, Stone (1974).
+    """
     found = []
     for levels in BINS:
         if len(r) < each * levels:

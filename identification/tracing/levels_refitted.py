@@ -1,7 +1,7 @@
-"""Another day's friction: do two Coulomb levels, fitted anew on the begin of the test logs, let the
+"""Changed friction: do two Coulomb levels, fitted anew on the begin of the test logs, let the
 same law follow the rest of them?
 
-Equations tell what changed where sliding is all that is missing. A real machine lacks a little
+Equations show what changed where sliding is all that is missing. A real machine lacks a little
 everywhere, and there the question is one of prediction: levels that are fitted to a part of a log
 and follow what comes after it are its own, whatever else the law may lack.
 """
@@ -33,14 +33,15 @@ NO_CHANGE: tuple[tuple[Change, ...], str] = ((), "")
 
 
 def levels_refitted(
-    plant: Plant, told: Karnopp, train: Sequence[MotionLog], seen: Sequence[MotionLog],
+    plant: Plant, reported: Karnopp, train: Sequence[MotionLog], seen: Sequence[MotionLog],
     drive: Drive, rig: Rig,
 ) -> tuple[tuple[Change, ...], str]:  # fmt: skip
     """F_cp and F_cn as they are in the test logs, where these levels alone are another there, and
-    what to say of it; told: the parameters that they are told beside.
+    what to say of it; reported: the parameters beside which they are reported.
 
     None where the plant follows the test logs as it does the training logs, or the rest of a test
-    log is not followed as well once the levels are fitted on its begin.
+    log is not followed as well once the levels are fitted on its begin. Source: Nelder, Mead (1965)
+    for the search; the rule is ours: `README.md`, (9).
     """
     usual = _rms(plant, [one.log for one in train], drive)
     tests = [one.log for one in seen]
@@ -49,11 +50,11 @@ def levels_refitted(
         return NO_CHANGE
     moved = _fitted(plant, begins, drive)
     was, now = (_rms(_with(plant, x), tests, drive, BEGIN) for x in (np.zeros(2), moved))
-    if not explains_the_day(was, now, usual):
+    if not explains_the_change(was, now, usual):
         return NO_CHANGE
     sd = np.abs(_fitted(plant, tests, drive) - moved)  # by what the rest of the logs changes
     unit = units_of(rig.motion, rig.command_unit)["F_cp"]
-    levels = zip(("F_cp", "F_cn"), (told.F_cp, told.F_cn), moved, sd, strict=True)
+    levels = zip(("F_cp", "F_cn"), (reported.F_cp, reported.F_cn), moved, sd, strict=True)
     said = (
         f"with these two levels fitted on the first {BEGIN:.0%} of the test logs, the run follows"
         f" their rest within {now:.3g} {LENGTH[rig.motion]} rms in place of {was:.3g}"
@@ -66,8 +67,8 @@ def follows_worse(error: float, usual: float) -> bool:
     return error > CARRIED * usual
 
 
-def explains_the_day(was: float, now: float, usual: float) -> bool:
-    """Whether other levels take most of an error away, down to what is usual."""
+def explains_the_change(was: float, now: float, usual: float) -> bool:
+    """Whether other levels take most of an error away, down to what is usual. Ours: README, (9)."""
     return now <= EARNS * was and not follows_worse(now, usual)
 
 

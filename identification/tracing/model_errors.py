@@ -24,7 +24,10 @@ def errors_of(
     model: FittedStructure, slowest: float, steps: Sequence[Step], logs: Sequence[MotionLog],
     seen: Sequence[MotionLog], drive: Drive,
 ) -> dict[str, Errors]:  # fmt: skip
-    """Errors of a model on the training and the test logs; `slowest` [m/s]: rows that count."""
+    """Errors of a model on the training and the test logs; `slowest` [m/s]: rows that count.
+
+    Without test logs those of stretches left out: cross-validation, Stone (1974).
+    """
     own, found = model.stage, model.outcomes
     out = {}
     other = seen_by(own, steps, seen) if seen else own
@@ -53,7 +56,8 @@ def errors_of(
 def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
     """Whether the test logs are left no more than the training logs, or little of what was missing.
 
-    Several effects may stand in together for one that the library lacks, on the training logs.
+    Several effects together may be confounded with one that the library lacks, on the training
+    logs. Ours.
     """
     own, other, missing = (x.force_rms for x in (after["train"], after["test"], before["test"]))
     if own is None or other is None or missing is None:
@@ -80,7 +84,7 @@ def noise_floor(base: Mapping[str, RowFit]) -> NoiseFloor:
 class OnTest:
     """What a model leaves of the test logs: its errors, and the misfit of its free run.
 
-    misfit: None where no run is judged; 1 where noise alone is left.
+    misfit: None where no run is compared; 1 where noise alone is left.
     """
 
     errors: Errors
@@ -98,15 +102,16 @@ def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
     Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. An equation that
-    lacks much comes first: one stop that a run loses by luck is more than all the rest of it. Then
-    the run, by its misfit, which knows how far the noise of force and command walks.
+    lacks much comes first: one stop that a run loses by chance is more than all the rest of it.
+    Then the run, by its misfit, which knows how far the noise of force and command drifts. Ours:
+    `README.md`, (6).
     """
     by_equations = [_equation_share(before, after, noise, least) for least in (ASTRAY, ADEQUATE)]
     by_run = None
     if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
         by_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
-    told = (share for share in (by_equations[0], by_run, by_equations[1]) if share is not None)
-    return next(told, 0.0)
+    known = (share for share in (by_equations[0], by_run, by_equations[1]) if share is not None)
+    return next(known, 0.0)
 
 
 def _equation_share(before: OnTest, after: OnTest, noise: NoiseFloor, least: float) -> float | None:

@@ -30,7 +30,11 @@ MOTION_SHARE = 0.3  # share of a column's square that is motion and not noise, a
 def parameter_drift(
     after: FittedStructure, steps: Sequence[Step], seen: Sequence[MotionLog], rig: Rig
 ) -> tuple[Change, ...]:
-    """Parameters that differ between training and test logs, fewest that bring the error down."""
+    """Parameters that differ between training and test logs, fewest that bring the error down.
+
+    Sources: noise in a column, Fuller, Measurement Error Models (1987); the rest is ours:
+    `README.md`, (8).
+    """
     stage = seen_by(after.stage, steps, seen)
     units = units_of(rig.motion, rig.command_unit)
     out: list[Change] = []
@@ -66,8 +70,9 @@ def changes(
     """Name, value before and after, and deviation of the parameters that have changed.
 
     One is freed at a time, the one that lowers the error most, as long as it lowers it by a
-    material share and surely: parameters that a short log cannot tell apart do not all change.
-    blur (k,): square sum that noise makes of each whitened column.
+    material share and significantly: parameters that a short log cannot separate do not all change.
+    blur (k,): square sum that noise makes of each whitened column. Source: Fuller (1987), moments
+    less those of the noise.
     """
     theta = mine.fit.theta.copy()
     A, b = (rows.X / rows.sd[:, np.newaxis])[keep], (rows.b / rows.sd)[keep]
@@ -93,8 +98,8 @@ def changes(
         if not options:
             break
         left, i, step = min(options, key=lambda x: x[0])
-        sure = (now - left) / (noise * OVERLAP)
-        if sure < BEYOND_CHANCE**2 or now - left < OF_ACCOUNT * now:
+        gained = (now - left) / (noise * OVERLAP)
+        if gained < BEYOND_CHANCE**2 or now - left < OF_ACCOUNT * now:
             break
         free.append(i)
         now, best = left, theta.copy()

@@ -40,7 +40,8 @@ def predicts_worse(
 ) -> Worse | None:
     """The first horizon over which the position of these logs is predicted clearly worse after.
 
-    None where there is none, and where nothing moves.
+    None where there is none, and where nothing moves. Ours: `README.md`, (7); runs restart as in
+    multiple shooting, Bock (1983).
     """
     moving = [one for one in seen if np.any(one.signals["d"] != 0)]
     for seconds in HORIZONS:
@@ -54,7 +55,8 @@ def predicts_worse(
 
 
 def is_worse(before: float, after: float) -> bool:
-    """Whether a prediction is clearly worse than another; errors in units of the noise."""
+    """Whether a prediction is clearly worse than another; errors in units of the noise. Ours,
+    README (7)."""
     return after**2 - 1.0 > WORSE**2 * max(before**2 - 1.0, 1.0)
 
 

@@ -34,7 +34,7 @@ OF_SPEED = frozenset({"v", "reversal"})
 class RecordedRows:
     """The training logs as the estimator takes them, and what is to be said of them.
 
-    refused: why they tell nothing unless a rig imposes their motion, None where they do.
+    refused: why they identify nothing unless a rig prescribes their motion, None where they do.
     """
 
     recorded: RecordedLogs
@@ -68,13 +68,13 @@ def recorded_rows(
     driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
     drive: Drive = "command" if driven else "force"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
-    recorded, refused = _told(recorded)
+    recorded, refused = _prescribed_if_needed(recorded)
     recorded = with_clocks(recorded, said, share)
     return RecordedRows(recorded, refused, (*recorded.remarks, *remarks))
 
 
 def imposed_rows(rows: RecordedRows) -> RecordedRows:
-    """The same logs as a rig's that imposes the motion; raises NotIdentifiable as above."""
+    """The same logs as a rig's that prescribes the motion; raises NotIdentifiable as above."""
     recorded = _imposed(rows.recorded)
     _enough(recorded.logs)
     return RecordedRows(recorded, None, rows.remarks)
@@ -85,7 +85,7 @@ def _imposed(recorded: RecordedLogs) -> RecordedLogs:
 
 
 def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
-    """Whether an actuator with a logged command is to be judged too: a linear one, or one that
+    """Whether an actuator with a logged command is to be tested too: a linear one, or one that
     some effect of the library makes linear."""
     if rig.kind == "motor" or not commanded(train):
         return False
@@ -108,28 +108,28 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
     return True
 
 
-def _told(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIdentifiable | None]:
-    """The logs; imposed where only a rig's slow motion may hold enough, and then the error that
+def _prescribed_if_needed(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIdentifiable | None]:
+    """The logs; prescribed where only a rig's slow motion may hold enough, and then the error that
     they are otherwise."""
     try:
         _enough(recorded.logs)
     except NotIdentifiable as error:
         if recorded.drive != "force":
             raise
-        led = _imposed(recorded)
+        moved = _imposed(recorded)
         try:
-            _enough(led.logs)
+            _enough(moved.logs)
         except NotIdentifiable:
             raise error from None
-        return led, error
+        return moved, error
     return recorded, None
 
 
 def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library, tuple[str, ...]]:
-    """The library without effects of speed alone, where a rig kept to much the same speed; and
+    """The library without effects of speed alone, where a rig moved at much the same speed; and
     what to say of it.
 
-    There they would stand in for whatever makes one stroke differ from another.
+    There they would be confounded with whatever makes one stroke differ from another.
     """
     ratio = max(
         speed_ratio(np.concatenate([one.speed[one.up == way] for one in logs]))

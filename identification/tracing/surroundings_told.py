@@ -1,4 +1,4 @@
-"""A trace of logs whose surroundings were taken out, told of the logs as they were recorded."""
+"""A trace of logs whose surroundings were taken out, reported of the logs as they were recorded."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -54,7 +54,7 @@ def with_surroundings(
                 name: explain(logs, rig, around)
                 for name, logs in (("train", train), ("test", test or train))
             }
-        except NotIdentifiable:  # the test logs do not slide enough to tell what they explain
+        except NotIdentifiable:  # the test logs do not slide enough to show what they explain
             continue
         without, with_them = left["test"]
         if named is delay or explains_much(without**2, with_them**2):
@@ -95,10 +95,10 @@ def orders_alone(
         plant=Plant(fit.friction, fit.actuator), residuals=(), complete=False,
         left=Left(1.0, ()), remarks=(*fit.remarks, str(refused)),
     )  # fmt: skip
-    told = with_surroundings(plain, around, train, test, rig)
-    if not told.effects:
+    found = with_surroundings(plain, around, train, test, rig)
+    if not found.effects:
         raise refused
-    return replace(told, verdict="effect", complete=False)
+    return replace(found, verdict="effect", complete=False)
 
 
 def _with_named(
@@ -108,8 +108,8 @@ def _with_named(
     """The trace with these effects first among its own; left: of "train" and "test", what the
     equation leaves without them and with them.
 
-    `explained` is of all of them together. Each stood out of 0 by so many deviations that luck
-    would not, so its chance is at most the level asked for.
+    `explained` is of all of them together. Each stood out of 0 by so many deviations that chance
+    would not, so its p-value is at most the level asked for.
     """
     without, with_them = left["test"]
     known = surrounding_estimates(around)

@@ -47,9 +47,10 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
 )
 from identification.estimation.regression.force_terms import predicts_as_much
-from identification.estimation.regression.held_command import told_share
+from identification.estimation.regression.held_command import significant_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
+from identification.estimation.residual_drift import drift_size
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.surroundings import (
@@ -59,9 +60,8 @@ from identification.estimation.surroundings import (
     larger_than_friction,
     stands_out,
 )
-from identification.estimation.turn_orders import are_most, is_sure, turns
+from identification.estimation.turn_orders import are_most, is_significant, turns
 from identification.estimation.two_masses import are_two, shows_a_load
-from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.run_errors import mean_loss
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
@@ -109,7 +109,7 @@ from identification.tracing.free_run.backward_elimination import (
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.judgement import hides_friction
-from identification.tracing.levels_refitted import explains_the_day, follows_worse
+from identification.tracing.levels_refitted import explains_the_change, follows_worse
 from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.predictive_check import is_worse
@@ -288,15 +288,15 @@ def test_beyond_chance() -> None:
     it a criterion gains."""
     assert not stands_out(4.0, 1.0) and not stands_out(-4.0, 1.0)
     assert stands_out(6.25, 1.0) and stands_out(-6.25, 1.0)
-    assert is_sure(0.63, 0.1) and not is_sure(0.4, 0.1)
+    assert is_significant(0.63, 0.1) and not is_significant(0.4, 0.1)
     assert not shows(20.0) and shows(31.0)
-    assert told_share(0.4, 0.1, 1.0) == 0.0 and told_share(0.4, 0.064, 1.0) == 0.4
+    assert significant_share(0.4, 0.1, 1.0) == 0.0 and significant_share(0.4, 0.064, 1.0) == 0.4
     # A change of 20 or 31 by the rows, of which 2.5 count as one.
     assert not drifted(np.sqrt(0.5), 100) and drifted(np.sqrt(0.5), 156)
     noise = np.random.default_rng(3).standard_normal(6000)
-    assert walk_size([noise]) == 0.0
-    assert walk_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
-    assert walk_size([noise + 0.12 * np.sin(np.arange(6000) / 600.0)]) > 0.0
+    assert drift_size([noise]) == 0.0
+    assert drift_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
+    assert drift_size([noise + 0.12 * np.sin(np.arange(6000) / 600.0)]) > 0.0
 
 
 def test_chance_level() -> None:
@@ -339,7 +339,9 @@ def test_material() -> None:
     assert not drifted(0.8, 2000, level=100.0) and drifted(1.25, 2000, level=100.0)
     assert is_material(0.015, 0.009, 1.0) and not is_material(0.015, 0.0128, 1.0)
     # Nor is a share of the command's step that explains next to nothing.
-    assert told_share(0.3, 0.01, 0.008) == 0.0 and told_share(0.3, 0.01, 0.0125) == 0.3
+    assert (
+        significant_share(0.3, 0.01, 0.008) == 0.0 and significant_share(0.3, 0.01, 0.0125) == 0.3
+    )
 
 
 def rivals(gain: float, mine: float) -> int:
@@ -355,7 +357,7 @@ def test_earns() -> None:
     assert 1.0 + 6.4 < earned(11.0) < 1.0 + 10.0
     assert rivals(64.0, 64.0) == 0 and rivals(100.0, 100.0) == 1
     assert explains(1.0, 0.64) and not explains(1.0, 0.99)
-    assert explains_the_day(1.6, 1.25, 1.0) and not explains_the_day(1.6, 1.3, 1.0)
+    assert explains_the_change(1.6, 1.25, 1.0) and not explains_the_change(1.6, 1.3, 1.0)
     found = choice("spring", first=100.0, base=9.0)
     assert not useless(found, run(41.0), run(1.0 + 25.6))
     assert useless(found, run(41.0), run(1.0 + 40.0))

@@ -1,1 +1,1 @@
-"""The nine parameters from the simulated response: search, refinement, weighing."""
+"""The nine parameters from the simulated response: search, refinement, weighing (`README.md`)."""

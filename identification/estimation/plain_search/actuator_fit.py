@@ -34,7 +34,10 @@ class ActuatorFit:
 
 
 def fit_actuator(logs: Sequence[Log]) -> ActuatorFit:
-    """k1 and k2 common to all logs; each needs u [V], y [m] and F [N] on an even clock."""
+    """k1 and k2 common to all logs; each needs u [V], y [m] and F [N] on an even clock.
+
+    Source: the paper's linear actuator dF/dt = k1 u - k2 v, integrated; least squares.
+    """
     total = sum(len(log) for log in logs)
     columns = np.zeros((total, 2 + len(logs)))
     force = np.concatenate([log["F"] for log in logs])

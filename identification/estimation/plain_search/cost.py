@@ -1,9 +1,9 @@
 """Distance between a log and the simulated response, for many parameter sets at once (compiled).
 
-The run is cut into windows: one window is the free run over the whole log, many windows restart
-the model from the measured state, which keeps a wrong parameter from spoiling all that follows.
-Residuals are (y - y_m)/sigma_y and (F - F_m)/sigma_F. `drive` COMMAND integrates dF/dt = k1 u -
-k2 v; HELD_FORCE takes F from the log at every sample, with its slope in between and, where k2 > 0,
+The run is cut into windows: one window is the free run over the whole log, many windows restart the
+model from the measured state, which keeps a wrong parameter from spoiling all that follows.
+Residuals are (y - y_m)/sigma_y and (F - F_m)/sigma_F. `drive` COMMAND integrates dF/dt = k1 u - k2
+v; LOGGED_FORCE takes F from the log at every sample, with its slope in between and, where k2 > 0,
 corrected by k2 (y_m - y): the force that the actuator's stiffness gives to a body elsewhere.
 """
 
@@ -23,7 +23,7 @@ from identification.simulation.karnopp_lanes import (
 )
 from identification.simulation.karnopp_step import K1, K2
 
-COMMAND, HELD_FORCE = 0, 1
+COMMAND, LOGGED_FORCE = 0, 1
 CHUNK = 128
 START_Y, START_V, START_G = range(3)
 
@@ -42,7 +42,7 @@ class Measured:
     """One log as the kernels take it.
 
     y [m], force [N], u [V], `impulse` = h * sum of u before each sample [V s]; slopes of force and
-    position between samples for HELD_FORCE; weights 1/sigma_y, 1/sigma_F (0: not compared).
+    position between samples for LOGGED_FORCE; weights 1/sigma_y, 1/sigma_F (0: not compared).
     """
 
     h: float
@@ -117,6 +117,9 @@ def cost_kernel(
 ) -> None:
     """Cost of WIDTH parameter sets and, where `gram` is not empty, its local quadratic form.
 
+    Sources: friction, the paper's eq. (1) (Karnopp 1985); actuator, its dF/dt = k1 u - k2 v; bound
+    of a square, Geman, McClure, Bull. Int. Stat. Inst. 52 (1987) 5.
+
     p: (WIDTH, 11) rows of kernel parameters; start: (WIDTH, 3) first position, first velocity and
     the constant F + k2 y - k1 * impulse; at, at_y, at_v: the windows, the first of which starts
     from `start`. cost: (WIDTH,). gram (stretches, WIDTH, WIDTH), one a stretch of `stretch`
@@ -138,7 +141,7 @@ def cost_kernel(
             if window == 0:
                 here, v = start[i, START_Y], start[i, START_V]
             f = start[i, START_G] + p[i, K1] * impulse[first] - p[i, K2] * here
-            if drive == HELD_FORCE:
+            if drive == LOGGED_FORCE:
                 f = force[first] + p[i, K2] * (y[first] - here)
             place(s, modes, tables, p, i, here, v, f)
         for low in range(first, last, CHUNK):
@@ -175,7 +178,8 @@ def cost_of_lanes(
     cap: float,
     stretches: int,
 ) -> tuple[Array, Array]:
-    """`cost_kernel` over a log: costs (WIDTH,), and Gram matrices (stretches, WIDTH, WIDTH).
+    """`cost_kernel` (the paper's plant) over a log: costs (WIDTH,), and Gram matrices (stretches,
+    WIDTH, WIDTH).
 
     stretches: parts of the log, each with its own matrix; 0 for costs alone.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.estimation.plain_search.cost import (
     COMMAND,
-    HELD_FORCE,
+    LOGGED_FORCE,
     START_G,
     START_V,
     START_Y,
@@ -17,7 +17,6 @@ from identification.estimation.plain_search.cost import (
     RestartWindows,
     cost_of_lanes,
 )
-from identification.estimation.regression.three_step import FirstEstimate
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.progress import Halt
@@ -59,13 +58,12 @@ def signal_noise(x: Array, h: float) -> float:
 
 
 def impulse_of(log: Log) -> Array:
-    """h * (sum of the commands before each sample) [V s]."""
+    """h * (sum of the commands before each sample) [V s], the integral of a zero-order hold."""
     return log.h * np.concatenate([[0.0], np.cumsum(log["u"])[:-1]])
 
 
 def prepare_run(
     log: Log,
-    first: FirstEstimate,
     drive: Drive,
     *,
     constant: float,
@@ -76,14 +74,14 @@ def prepare_run(
     """A log for the kernels.
 
     constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; hold:
-    a held force has no slope between samples; noise: sigma of y [m] and F [N].
+    a zero-order hold has no slope between samples; noise: sigma of y [m] and F [N].
     """
     h, y, force = log.h, log["y"], log["F"]
     sigma_y, sigma_f = noise
     by_command = drive == "command"
     measured = Measured(
         h=h,
-        drive=COMMAND if by_command else HELD_FORCE,
+        drive=COMMAND if by_command else LOGGED_FORCE,
         y=y,
         force=force,
         u=log["u"] if by_command else np.zeros(len(y)),
@@ -105,7 +103,7 @@ def prepare_run(
 
 
 def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> RestartWindows:
-    """Restarts at sure rests only, at least `seconds` apart; the first one starts the log.
+    """Restarts at significant rests only, at least `seconds` apart; the first one starts the log.
 
     y: measured position [m] with noise `sigma` [m]. A restart in motion would carry the error of
     a smoothed velocity into all that follows; a rest has v = 0 and its mean position.
@@ -140,7 +138,7 @@ def total_cost(
     """Cost of parameter sets `p` (k, 11) over all runs, (k,); starts (runs, k, 3) where they vary.
 
     cap: bound of one sample's squared residual, 0 for none. Works on all cores. Raises Halted where
-    the runs' `halt` says so.
+    the runs' `halt` says so. Source of the bound: Geman, McClure (1987); `README.md`, (2), (3).
     """
     runs[0].halt.ask()
     k = len(p)

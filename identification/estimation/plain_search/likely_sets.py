@@ -19,8 +19,8 @@ from identification.estimation.plain_search.problem import Problem
 from identification.estimation.plain_search.search_bounds import Box
 from identification.progress import Halt, Progress
 
-# What walls of the likelihood add to the spread of a settled cloud, and to the minimum's where none
-# settles; chosen for the coverage on seeds 1000 to 3060 of benchmarks/nine_parameters.py.
+# What walls of the likelihood add to the spread of a converged cloud, and to the minimum's where
+# none converges; chosen for the coverage on seeds 1000 to 3060 of benchmarks/nine_parameters.py.
 ROUGH = (1.1, 1.3)
 
 
@@ -39,7 +39,11 @@ class Solution:
 def weigh_noise(
     problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int, report: Progress
 ) -> Solution:
-    """A fit that leaves noise: its level taken from the residual, then the likelihood's cloud."""
+    """A fit that leaves noise: its level taken from the residual, then the likelihood's cloud.
+
+    Source: adaptive importance sampling, Cappé et al., J. Comput. Graph. Stat. 13 (2004) 907; the
+    factors ROUGH are ours.
+    """
     runs = list(optimum.runs(problem.long_runs))
     for _ in range(4):
         runs = [reweighed(run, optimum.p) for run in optimum.runs(runs)]
@@ -51,7 +55,7 @@ def weigh_noise(
     report("weighing", 0.0)
     cloud = sample(runs, optimum, rng)
     spent += cloud.evaluations
-    if cloud.settled:
+    if cloud.converged:
         members = cloud.members[rng.choice(len(cloud.weights), 1024, p=cloud.weights)]
         rough = ROUGH[0]
     else:
@@ -71,7 +75,8 @@ def weigh_noise(
 
 
 def log_cost(runs: Sequence[FittedRun], optimum: Optimum, box: Box) -> Callable[[Array], Array]:
-    """Minus twice the log likelihood of unknowns (k, d), infinite outside `box`.
+    """Minus twice the log likelihood of unknowns (k, d), infinite outside `box`: of the paper's
+    plant with white normal noise.
 
     Walkers are halted between their steps: of what a cost raises, emcee would print a traceback.
     """

@@ -1,8 +1,8 @@
 """Local refinement: damped Gauss-Newton on finite differences, then importance sampling.
 
 The distance is piecewise smooth: it breaks wherever a parameter decides whether the body stops.
-Differences are therefore taken over about a third of a standard deviation, and the last word has
-a cloud of parameter sets weighted by their likelihood, which also gives the covariance.
+Differences are therefore taken over about a third of a standard deviation, and what counts in the
+end is a cloud of parameter sets weighted by their likelihood, which also gives the covariance.
 """
 
 from collections.abc import Sequence
@@ -19,26 +19,22 @@ from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN,
 
 TRIALS = WIDTH - 1
 FREEDOM = 8.0  # degrees of freedom of the sampling t-distribution
+NEWTON_STEPS, LEAST_COST_GAIN = 30, 1e-3  # of a refinement at most; fall of the cost that ends it
 CLOUD = 256
 REFINE_ROUNDS = 40
 MANY_RUNS = 16  # runs from which their own unknowns are eliminated one by one
-SETTLED_SHARE = 0.2  # effective share of a cloud that ends the sampling
+EFFECTIVE_SHARE = 0.2  # effective share of a cloud that ends the sampling
 STEP_WIDTHS = (0.01, 0.1, 1.0, 10.0)  # widths of the last differences, in the usual one
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """Parameters (11,), starts (runs, 3), their cost, and the quadratic form around them.
-
-    hessian (d, d) is J'J over `free` shared parameters, then each run's start; scale (d,) the
-    units in which it is written; covariance (d, d) in parameter units.
-    """
+    """Parameters (11,), starts (runs, 3) and their cost; covariance (d, d), the inverse of J'J: of
+    the `free` shared parameters, then of each run's start."""
 
     p: Array
     starts: Array
     cost: float
-    hessian: Array
-    scale: Array
     free: IntArray
     evaluations: int
     covariance: Array
@@ -61,13 +57,12 @@ def refine(
     free: IntArray,
     *,
     cap: float = 0.0,
-    iterations: int = 30,
-    tolerance: float = 1e-3,
 ) -> Optimum:
     """Nearest minimum of the cost from `p` (11,).
 
     free: indices of the shared parameters that may move; cap: bound of one sample's squared
-    residual (0: none). A weak prior (one scale) keeps what the logs do not tell near its start.
+    residual (0: none). A weak prior (one scale) holds what the logs do not identify near its start.
+    Sources: Levenberg (1944), Marquardt (1963); differences of least slope are ours.
     """
     starts = np.array([run.start for run in runs])
     scale = _scales(runs, p, free)
@@ -77,7 +72,7 @@ def refine(
     own = [len(run.open) for run in runs]
     delta = np.full(len(scale), 1e-5)
     form = _quadratic(runs, p, starts, theta, free, scale, delta, cap)
-    for _ in range(iterations):
+    for _ in range(NEWTON_STEPS):
         trials = _steps(form, theta, center, scale, prior, damping, len(free), own)
         keep_near(trials, free, p)
         sets, begun = unpack(runs, p, starts, free, trials)
@@ -92,7 +87,7 @@ def refine(
         theta = trials[best]
         delta = _spans(form.hessian, delta)
         form = _quadratic(runs, p, starts, theta, free, scale, delta, cap)
-        if gain < tolerance:
+        if gain < LEAST_COST_GAIN:
             break
     form = _gentlest(runs, p, starts, theta, free, scale, _spans(form.hessian, delta), cap)
     sets, begun = unpack(runs, p, starts, free, theta[None])
@@ -101,8 +96,6 @@ def refine(
         p=sets[0],
         starts=begun[:, 0],
         cost=form.cost,
-        hessian=form.hessian,
-        scale=scale,
         free=free,
         evaluations=spent + len(STEP_WIDTHS) * WIDTH,
         covariance=inverse * np.outer(scale, scale),
@@ -111,16 +104,12 @@ def refine(
 
 @dataclass(frozen=True)
 class Cloud:
-    """Weighted parameter sets: unknowns (k, d), weights (k,) that sum to 1, costs (k,).
-
-    `effective` is the number of sets that count; `settled` whether it was enough.
-    """
+    """Weighted parameter sets: unknowns (k, d), weights (k,) that sum to 1; `converged`: whether
+    their effective number was large enough."""
 
     members: Array
     weights: Array
-    costs: Array
-    effective: float
-    settled: bool
+    converged: bool
     evaluations: int
 
 
@@ -128,7 +117,9 @@ def sample(runs: Sequence[FittedRun], optimum: Optimum, rng: np.random.Generator
     """Parameter sets around the optimum, weighted by their likelihood.
 
     Adaptive importance sampling: a cloud drawn from a t-distribution is weighted by the likelihood
-    and shapes the next, until a fifth of a cloud counts, or after ROUNDS of them.
+    and shapes the next, until a fifth of a cloud counts, or after REFINE_ROUNDS of them. Sources:
+    Cappé, Guillin, Marin, Robert, J. Comput. Graph. Stat. 13 (2004) 907; number of sets that count,
+    Kish, Survey Sampling (1965).
     """
     theta = pack(runs, optimum.p, optimum.starts, optimum.free)
     covariance = optimum.covariance
@@ -142,14 +133,13 @@ def sample(runs: Sequence[FittedRun], optimum: Optimum, rng: np.random.Generator
         costs = np.where(np.isfinite(costs), costs, np.inf)
         weight = _weights(costs, density, 1.0)
         effective = 1.0 / float(np.sum(weight**2))
-        if effective > SETTLED_SHARE * CLOUD:
+        if effective > EFFECTIVE_SHARE * CLOUD:
             break
         softened = _tempered(costs, density, CLOUD / 6.0)
         theta = softened @ cloud
         off = cloud - theta
         covariance = 0.8 * (softened[:, None] * off).T @ off + 0.2 * covariance
-    settled = effective > SETTLED_SHARE * CLOUD
-    return Cloud(cloud, weight, costs, effective, settled, spent)
+    return Cloud(cloud, weight, effective > EFFECTIVE_SHARE * CLOUD, spent)
 
 
 def moved_optimum(

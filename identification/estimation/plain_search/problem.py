@@ -98,7 +98,6 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive, halt: Halt | None = None) 
     runs = tuple(
         prepare_run(
             log,
-            first,
             chosen,
             constant=float(actuator.constants[i]) if actuator else 0.0,
             window=window,

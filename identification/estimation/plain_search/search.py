@@ -1,4 +1,4 @@
-"""A plant of the nine parameters by search, where what the equations give leads nowhere."""
+"""A plant of the nine parameters by search, where no run follows from what the equations give."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,7 +31,8 @@ def searched_plant(
 
     drive: "command" (of a motor too) or "force"; attempt: how many have failed before, perhaps
     around a bad first estimate; halt: asked before each run. Raises NotIdentifiable where nothing
-    moves, BadLog where a signal is missing.
+    moves, BadLog where a signal is missing. Source: differential evolution, Storn, Price (1997), of
+    the paper's plant.
     """
     problem = pose(logs, rig, drive, halt)
     return plant_of(problem, _search(problem, rng, report, attempt))

@@ -1,4 +1,4 @@
-"""The box in which the global search looks, and its map to kernel parameters."""
+"""The box of the global search, and its map to kernel parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

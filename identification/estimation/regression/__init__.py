@@ -1,1 +1,1 @@
-"""The equations of a machine as weighted rows, and what they alone tell of its parameters."""
+"""The equations of a machine as weighted rows, and what they alone identify (`README.md`)."""

@@ -1,6 +1,6 @@
 """Stick limit at each breakaway: that with which a simulated body starts when the real one did.
 
-The motion after a breakaway tells its instant within a fraction of a sample, and with it the force
+The motion after a breakaway gives its instant within a fraction of a sample, and with it the force
 at which the body let go: from sliding friction and band, found before, and one number a breakaway.
 """
 
@@ -38,7 +38,8 @@ def breakaway_limits(one: MotionLog, friction: Karnopp, falls: bool = False) -> 
     """Breakaways of a log: a rest of at least 48 ms, then motion; `force` is the stick limit.
 
     friction: sliding and band as the model without effects has them; falls: with the first motion
-    the limit falls to that of `friction`, so it is no less.
+    the limit falls to that of `friction`, so it is no less. Source: stick limits of the paper's eq.
+    (1) (Karnopp 1985); their estimate is ours.
     """
     found = []
     for low, high in rest_stretches(one, 3 * samples(MEAN, one.log.h)):
@@ -82,7 +83,7 @@ def _event(
     for _ in range(NARROWED + 1):
         costs = [_cost(one, friction, falls, part, level, way, float(limit)) for limit in tried]
         left = float(np.min(costs))
-        best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # a held force jumps
+        best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # it may jump
         span = 2.0 * span / (GRID - 1)
         tried = np.linspace(max(best - span, 0.0), best + span, GRID)
     if left > UNDERSTOOD or best >= highest:
@@ -104,20 +105,20 @@ def _cost(
 ) -> float:
     """Mean square of the position's error in noise units from rest on with this stick limit [N]."""
     side = {"F_sp": limit} if way > 0 else {"F_sn": -limit}
-    held, y_m = np.zeros(0), part["y"]
+    before, y_m = np.zeros(0), part["y"]
     if falls:
         least = min(limit, friction.F_sp if way > 0 else -friction.F_sn)
         side = {"F_sp": least} if way > 0 else {"F_sn": -least}
         above = np.flatnonzero(way * part["F"] > limit)
         begin = int(above[0]) if len(above) else len(part)
         begin = begin if len(part) - begin > 1 else len(part)  # no motion in one sample
-        held = np.full(begin, level)
+        before = np.full(begin, level)
         part = Log(part.name, {key: x[begin:] for key, x in part.signals.items()})
     nine = replace(friction, **side)
     drive: Drive = "command" if one.held else "force"
     plant = Plant(nine, Motor(1.0) if one.held else None)
-    y = held
+    y = before
     if len(part):
-        y = np.append(held, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
+        y = np.append(before, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
     r: Array = (y - y_m) / max(one.noise_y, EXACT_POSITION)
     return float(np.mean(np.minimum(r**2, 1e4)))

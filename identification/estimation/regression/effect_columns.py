@@ -10,11 +10,12 @@ LEAST_LEFT_BY_LOAD = 0.1  # of the applied force, at least left to drive
 
 Values = Mapping[str, float]
 SLIDING = "f > c"  # as an equation says it
-TRIFLE = 0.05  # of an effect's largest size, by which another may lie out of bounds
+BOUND_SLACK = 0.05  # of an effect's largest size, by which another may lie out of bounds
 
 
-def equations_of(effect: Effect, by_command: bool, held: bool = False) -> tuple[str, ...]:
-    """The equations in which an effect shows. held: the command gives the force itself (a motor)"""
+def equations_of(effect: Effect, by_command: bool, held: bool) -> tuple[str, ...]:
+    """The equations in which an effect shows; held: the command gives the force itself (a
+    motor)."""
     if held and effect.place.on_command:
         return (MECHANICAL,)
     if effect.place.rubs or effect.place.drives:
@@ -58,7 +59,7 @@ def shape_params(effect: Effect) -> list[Param]:
         for p in effect.params
         if not (p.linear and in_columns(effect))
         and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
-        and p.name not in AT_REST  # no equation of sliding tells it
+        and p.name not in AT_REST  # no equation of sliding identifies it
     ]
 
 
@@ -76,14 +77,14 @@ def symbols_of(equation: str) -> set[str]:
 def admissible(effect: Effect, values: Values) -> bool:
     """Whether every parameter lies within its bounds.
 
-    One size of several, or of two directions, may lie a trifle beyond: one that is 0 comes out on
+    One size of several, or of two directions, may lie slightly beyond: one that is 0 comes out on
     either side of it.
     """
     most = max((abs(values[name]) for name in effect.linear), default=0.0)
 
     def slack(p: Param) -> float:
         if p.name == "asymmetry" and split(effect):
-            return TRIFLE
-        return TRIFLE * most if p.linear else 0.0
+            return BOUND_SLACK
+        return BOUND_SLACK * most if p.linear else 0.0
 
     return all(p.low - slack(p) <= values[p.name] <= p.high + slack(p) for p in effect.params)

@@ -50,7 +50,7 @@ from identification.simulation.effect_along_motion import (
 )
 
 BLURRED = 1e3  # times the noise, of a row that says nothing
-COMMAND_STEP = 1e-6  # of the largest command, a step by which its passing is told
+COMMAND_STEP = 1e-6  # of the largest command, a step by which its passing is found
 FLAT = 0.2  # of the time in sliding, that a command may leave a motor without force
 SLOPE_STEP = 1e-3  # of a level of friction, over which a slope is taken
 UNEXPLAINED = 1e3  # times the force to be explained
@@ -66,7 +66,7 @@ class EffectRows:
     of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
     speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
     out, and when it is crossed is not seen;
-    sliding: friction with its band, once known, by which breakaways are told exactly; falls:
+    sliding: friction with its band, once known, by which breakaways are exact; falls:
     their limit falls to that of `sliding` with the first motion;
     scales: by equation, what its rows' squares are divided by.
     """
@@ -131,7 +131,7 @@ class EffectRows:
 
     @property
     def imposed(self) -> bool:
-        """Whether the motion is imposed: a body that a rig moves is not stuck at any speed."""
+        """Whether the motion is prescribed: a body that a rig moves is not stuck at any speed."""
         return self.logs[0].imposed
 
     def scale(self, equation: str) -> float:
@@ -142,7 +142,10 @@ class EffectRows:
 def plain_rows(
     stage: EffectRows, equation: str, i: int, y: Array | None = None, u: Array | None = None
 ) -> Rows:
-    """Rows of the model without effects, of log `i`; y, u (its integral): in place of the log's."""
+    """Rows of the model without effects, of log `i`; y, u (its integral): in place of the log's.
+
+    Source: `README.md`, (2) to (6) (Messenger, Bortz 2021; the paper's actuator).
+    """
     one = stage.logs[i]
     if equation == MECHANICAL:
         rows = mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
@@ -169,7 +172,8 @@ def one_way(one: MotionLog) -> BoolArray:
 def with_effect(
     stage: EffectRows, equation: str, effect: Effect, shape: Values, i: int, rows: Rows
 ) -> Rows:
-    """`rows` of log `i` with the effect in them: columns, or transformed signals."""
+    """`rows` of log `i` with the effect in them: columns, or transformed signals, by the effect's
+    own equation (its file names the source) in weak form (Messenger, Bortz 2021)."""
     one = stage.logs[i]
     if effect.place.elastic:
         if equation == REST:
@@ -221,7 +225,7 @@ def _flattened(
     """A motor's rows with what they lose where the effect flattens their force.
 
     By the change of variable from the logged force to the one that reaches the body; where none
-    of it passes, the log tells no more than that it lies within the force's range.
+    of it passes, the log shows no more than that it lies within the force's range.
     """
     s, h, u = one.signals, one.log.h, np.asarray(one.log["u"])
     step = COMMAND_STEP * float(np.max(np.abs(u)))
@@ -245,7 +249,10 @@ def _beside(fresh: Rows, rows: Rows) -> Rows:
 def columns(
     effect: Effect, shape: Values, one: MotionLog, stage: EffectRows
 ) -> tuple[list[Array], Array]:
-    """Columns (r,) of the linear parameters, and the contribution as it is where there are none."""
+    """Columns (r,) of the linear parameters, and the contribution as it is where there are none.
+
+    Source: weak form, Messenger, Bortz (2021).
+    """
     trials = [
         {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
     ] or [dict(shape)]

@@ -33,15 +33,15 @@ from identification.signals.weak_form import (
 )
 
 WINDOW_SECONDS = 0.06  # of a window
-EXACT_SHARE = 1e-12  # of its range, to which any position is unsure
+EXACT_SHARE = 1e-12  # of its range, to which any position is uncertain
 LEAST_SAMPLES = 16  # samples in a window
 LEAST_PART = 200  # samples in a part of a log
 BEFORE_MOTION = 0.5  # s before the body moves, with which a part of a log begins
-SURE_OF_DIRECTION = 5.0  # times the velocity's noise from which its sign is sure
+SURE_OF_DIRECTION = 5.0  # times the velocity's noise from which its sign is significant
 # Hz; a slow motion needs smoothing to stand out of its noise
 IMPOSED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)
-MOSTLY_SURE = 0.9  # of the samples of imposed motion, whose direction is to be sure
-STILL_UNSURE = 0.8  # of the others, at most, that more smoothing may leave; a body at rest stays so
+MOSTLY_KNOWN = 0.9  # of the samples of prescribed motion, whose direction is to be significant
+STILL_UNKNOWN = 0.8  # of the others, at most, that more smoothing may leave: a body may rest
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
@@ -49,10 +49,10 @@ NOTHING_KNOWN = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # a body of 1 kg alone, bef
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
 OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
-CALM_SHARE = 0.9  # of the samples, those that tell the controller
-OF_WALK = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
+CALM_SHARE = 0.9  # of the samples, those that show the controller
+OF_DRIFT = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
-FEWEST_LEFT = 20  # from which what they leave tells of noise
+FEWEST_LEFT = 20  # from which what they leave shows noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +60,9 @@ class MotionLog:
     """One log with its motion, and its windows in the two equations (actuator: None without u).
 
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
-    reference: friction with which a run walks at most under the noise of the measured force; a
-    plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
-    leads the body along a path. walk: by how much a sample more may take the force away from what
+    reference: friction with which a run drifts at most under the noise of the measured force; a
+    plant that drifts more must not gain by it. rotary: y is an angle [rad]. imposed: the motion is
+    prescribed by a rig. walk: by how much a sample more may take the force away from what
     the command makes of it [N], one sigma (0: the command is exact, or there is none). halt:
     asked before every run along the log. between: the part of noise_F that no log shows, of a
     loop faster than the log [N]; jitter: of the instants of the samples [s], one sigma.
@@ -89,7 +89,8 @@ class MotionLog:
 
     @property
     def gain(self) -> float:
-        """Share of its distance to the measured force, by which a run's by command is corrected."""
+        """Share of its distance to the measured force, by which the force of a run driven by the
+        command is corrected: Kalman's steady gain of a local level (Harvey 1989)."""
         return corrected_share(self.walk, self.noise_F)
 
     def again(self, log: Log) -> "MotionLog":
@@ -109,7 +110,8 @@ class MotionLog:
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
-        """Samples (n,) in which the body surely moves, and the first, and the signals in them."""
+        """Samples (n,) in which the body moves significantly, the first, and the signals in
+        them."""
         own = self.signals["d"] != 0
         own[:1] = True  # from which time counts
         return own, {key: x[own] for key, x in self.signals.items()}
@@ -124,19 +126,22 @@ def motion_log(
     log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False,
     between: float = 0.0,
 ) -> MotionLog:  # fmt: skip
-    """A log with its motion and windows. held: the force is a command held over each period;
-    imposed: by a rig; the motion is then smoothed until most of it is sure of its direction.
-    between [N]: noise of the force beside what the log shows of it."""
+    """A log with its motion and windows.
+
+    held: the force is a zero-order hold of a command; imposed: by a rig; the motion is then
+    smoothed until most of it has a significant direction. between [N]: noise of the force beside
+    what the log shows of it. Source of the windows: weak form, Messenger, Bortz (2021).
+    """
     h = log.h
     motion = differentiate(log["y"], h)
     d = _direction(motion)
     for cutoff in IMPOSED_CUTOFFS if imposed else ():
-        if np.mean(d != 0) >= MOSTLY_SURE:
+        if np.mean(d != 0) >= MOSTLY_KNOWN:
             break
         smooth = differentiate(log["y"], h, min(cutoff, motion.cutoff))
         # Much smoothing rings where a body stops: the log itself must have gone that way.
         sure = np.where(_gone(log["y"], smooth, h) == _direction(smooth), _direction(smooth), 0.0)
-        if smooth.cutoff < motion.cutoff and np.mean(sure == 0) > STILL_UNSURE * np.mean(d == 0):
+        if smooth.cutoff < motion.cutoff and np.mean(sure == 0) > STILL_UNKNOWN * np.mean(d == 0):
             break
         motion, d = smooth, sure
     length = max(LEAST_SAMPLES, 2 * round(WINDOW_SECONDS / h / 2))
@@ -172,8 +177,8 @@ def motion_log(
         return one
     noise_F = min(noise_F, _unexplained(one))
     walk = force_random_walk(log["F"], motion.y, integral(u, h), h, 1.0 / motion.cutoff)
-    # A walk's steps are in the third differences by which the sensor's noise was seen.
-    noise_F = float(np.sqrt(max(noise_F**2 - OF_WALK * walk**2, LEAST_PART_OF_NOISE * noise_F**2)))
+    # A random walk's steps are in the third differences by which the sensor's noise was seen.
+    noise_F = float(np.sqrt(max(noise_F**2 - OF_DRIFT * walk**2, LEAST_PART_OF_NOISE * noise_F**2)))
     return replace(one, noise_F=noise_F, walk=walk)
 
 
@@ -256,8 +261,10 @@ def _unexplained(one: MotionLog) -> float:
 def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
     """Rows of the mechanical equation with the five parameters m, F_cp, F_cn, F_vp, F_vn.
 
-    theta: a first estimate of them, for the rows' noise; y: position in place of the log's [m];
-    k1: of the actuator, whose force has kinks where its command jumps.
+    theta: a first estimate of them, for the rows' noise; y: position in place of the log's [m]; k1:
+    of the actuator, whose force has kinks where its command jumps. Sources: weak form, Messenger,
+    Bortz, J. Comput. Phys. 443 (2021) 110525; inverse dynamic model, Gautier, Khalil, CDC 1988;
+    friction, the paper's eq. (1) outside its band.
     """
     w, up = one.sliding, one.up
     y = one.log["y"] if y is None else y
@@ -282,7 +289,9 @@ def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float =
 def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | None = None) -> Rows:
     """Rows of the actuator equation with k1, k2 and an offset; theta: a first estimate of them.
 
-    u: integral of the command that reaches the actuator [V s] at every sample.
+    u: integral of the command that reaches the actuator [V s] at every sample. Sources: the paper's
+    dF/dt = k1 u - k2 v, in weak form (Messenger, Bortz 2021); drift of the force by the command's
+    noise, a local level (Harvey 1989).
     """
     assert one.whole is not None
     w = one.whole
@@ -306,7 +315,8 @@ def column_noise(one: MotionLog, equation: str) -> Array:
     """Variance (r, k) that the position's noise gives each column of an equation's rows.
 
     Noise in a column draws its parameter to 0, the more the calmer the motion: without it a mass
-    in fast motion would seem to be another in slow motion.
+    in fast motion would seem to be another in slow motion. Source: Fuller, Measurement Error Models
+    (1987).
     """
     w = one.sliding if equation == MECHANICAL else one.whole
     assert w is not None
@@ -321,7 +331,7 @@ def column_noise(one: MotionLog, equation: str) -> Array:
 
 
 def integral(u: Array, h: float) -> Array:
-    """Integral of a held command up to each sample [V s]."""
+    """Integral of a command, a zero-order hold, up to each sample [V s]."""
     return h * np.concatenate([[0.0], np.cumsum(u)[:-1]])
 
 

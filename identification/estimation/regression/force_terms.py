@@ -40,7 +40,8 @@ class ForceFit:
 def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
-    that would take Coulomb friction below 0: at speeds alike it stands for anything."""
+    that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
+    cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours."""
     every = [fitted(data, used) for used in COLUMN_SETS]
     fits = [one for one in every if _may_be(one)]
     rows = stacked(data)
@@ -51,13 +52,13 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
 
 def _may_be(fit: ForceFit) -> bool:
     """Whether a body can have these parameters, and each term of speed stands out of its deviation;
-    a constant force alone may stand in F_c. A slope that may as well be none would leave the
-    Coulomb level beside it open."""
+    a constant force alone may be confounded with F_c. A slope that may as well be none would leave
+    the Coulomb level beside it open."""
     found = dict(zip(fit.used, fit.theta, strict=True))
     sd = dict(zip(fit.used, np.sqrt(np.diag(fit.covariance)), strict=True))
     shown = [(level, v) for level, v in ((1, 3), (2, 4)) if v in found]
-    sure = all(abs(found[v]) > NORMAL_95 * sd[v] and found[level] >= 0.0 for level, v in shown)
-    return sure and not found.get(0, 1.0) < 0.0
+    known = all(abs(found[v]) > NORMAL_95 * sd[v] and found[level] >= 0.0 for level, v in shown)
+    return known and not found.get(0, 1.0) < 0.0
 
 
 def predicts_as_much(left: float, least: float) -> bool:
@@ -66,7 +67,11 @@ def predicts_as_much(left: float, least: float) -> bool:
 
 
 def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
-    """Weighted least squares of these columns."""
+    """Weighted least squares of these columns.
+
+    Sources: Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; independent samples among correlated
+    ones, Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184.
+    """
     noise = np.concatenate([part.sd for part in data])
     columns = np.concatenate([part.X for part in data])[:, used]
     force = np.concatenate([part.b for part in data])

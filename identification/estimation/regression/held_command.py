@@ -3,8 +3,8 @@
 What such a log has is the command of one period of the loop; until its next sample the machine was
 given the mean of several. Where the command changes smoothly that mean is the logged one and a
 share of the step to the next, (R - 1) / (2 R) for R periods a sample, less a part of how the
-command bends. The share is a coefficient in
-the equation of motion of a motor, whose force the command is, and in that of an actuator. What the
+command bends. The share is a coefficient in the equation of motion of a motor, whose force the
+command is, and in that of an actuator. What the
 loop adds from period to period (its encoder's counts) no log shows: it is noise of a motor's force.
 """
 
@@ -30,7 +30,8 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
 
     rows: of the equation of motion of a motor, else of the actuator's, over all logs; slowest
     [m/s]: of those that count. 0 where none shows beside what the rows leave: where an effect is
-    missing the command's rate may stand in for it, and that is no share.
+    missing it may be confounded with the command's rate, and that is no share. Ours: `README.md`,
+    (13).
     """
     by_motor = logs[0].held
     rate = np.concatenate([_rate_column(one) for one in logs])
@@ -51,7 +52,8 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
 
     each = np.unique(blocks)
     apart = np.array([share_of(_least_squares(X[blocks != k], b[blocks != k])[0]) for k in each])
-    return told_share(share_of(theta), float(spread_of_left_out(apart)), 1.0 - left / without)
+    sd = float(spread_of_left_out(apart))
+    return significant_share(share_of(theta), sd, 1.0 - left / without)
 
 
 def _rate_column(one: MotionLog) -> Array:
@@ -62,7 +64,7 @@ def _rate_column(one: MotionLog) -> Array:
     return np.asarray(one.whole.first @ (one.log.h * one.log["u"]))
 
 
-def told_share(share: float, sd: float, gain: float) -> float:
+def significant_share(share: float, sd: float, gain: float) -> float:
     """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
     if share < BEYOND_CHANCE * sd or gain < MATERIAL:
         return 0.0
@@ -72,7 +74,7 @@ def told_share(share: float, sd: float, gain: float) -> float:
 def between_samples(log: Log, share: float, held: bool) -> Log:
     """The log with the mean command until the next sample in place of the logged one.
 
-    held: a motor's, so that its force is that mean too.
+    held: a motor's, so that its force is that mean too. Ours: `README.md`, (13).
     """
     if share == 0.0:
         return log
@@ -117,6 +119,7 @@ def unseen(log: Log, share: float) -> float:
     """Noise of a motor's force [N] that its loop adds between the samples of a log of means.
 
     A white part of every period's force is in the mean of R of them, of which the log has had one.
+    Ours.
     """
     if share == 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""Whether a rig leads the body along a path, whatever the model lacks, and at how many speeds."""
+"""Whether the motion is prescribed by a rig, whatever the model lacks, and at how many speeds."""
 
 from collections.abc import Sequence
 
@@ -13,11 +13,11 @@ from identification.estimation.regression.equation_rows import (
 
 # Of the force's quick changes, that inertia explains of a body that is free
 SHOWN_BY_INERTIA = 0.15
-# Of them, that inertia and damping explain of one that follows the force (imposed: 0.3)
-TOLD_BY_FORCE = 0.6
+# Of them, that inertia and damping explain of one that follows the force (prescribed: 0.3)
+SHOWN_BY_FORCE = 0.6
 NEXT = 2.0  # times their length, that neighbouring windows begin apart at most
 CHANCE_FACTOR = 25.0  # times what chance explains of noise
-LEAST_PAIRS = 30  # pairs of neighbouring windows, without which nothing tells that a rig leads it
+LEAST_PAIRS = 30  # pairs of neighbouring windows, without which nothing shows that a rig moves it
 SPEED_RANGE = (
     0.05,
     0.95,
@@ -29,8 +29,8 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
 
     Most of what a model lacks changes slowly (with place, pressure, time), and constant friction
     not at all in one direction: what is left in the differences of neighbouring windows of sliding
-    is the inertia of a body that is free, or else a rig leads it. A lag of viscous friction may
-    cancel the inertia; the force's changes then still tell those of the speed.
+    is the inertia of a body that is free, or else a rig moves it. A lag of viscous friction may
+    cancel the inertia; the force's changes then still explain those of the speed. Ours.
     """
     columns, forces, noise = [], [], 0.0
     for one in logs:
@@ -51,13 +51,13 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
     others = b - X[:, 1:] @ theta[1:]
     left = float(np.sum((others - X[:, 0] * theta[0]) ** 2))
 
-    def tells(square: float, part: float) -> bool:
-        """Whether more than luck, and this part of what is no noise, is explained of a square."""
+    def explained(square: float, part: float) -> bool:
+        """Whether more than chance, and this part of what is no noise, is explained of a square."""
         gained = square - left
         return gained > CHANCE_FACTOR * noise / len(b) and gained > part * (square - noise)
 
-    inertia = theta[0] > 0.0 and tells(float(np.sum(others**2)), SHOWN_BY_INERTIA)
-    return not (inertia or tells(float(np.sum(b**2)), TOLD_BY_FORCE))
+    inertia = theta[0] > 0.0 and explained(float(np.sum(others**2)), SHOWN_BY_INERTIA)
+    return not (inertia or explained(float(np.sum(b**2)), SHOWN_BY_FORCE))
 
 
 def speed_ratio(speed: Array) -> float:

@@ -58,14 +58,17 @@ class MotionRows:
 def motion_rows(logs: Sequence[MotionLog], theta: Array) -> list[Rows]:
     """The equation's rows of each log, in the windows that suit all of them best.
 
-    theta: a first estimate of m, F_cp, F_cn, F_vp, F_vn, for the rows' noise. Rows without any
-    where too little slides.
+    theta: a first estimate of m, F_cp, F_cn, F_vp, F_vn, for the rows' noise. None of them where
+    too little slides. Sources: weak form, Messenger, Bortz (2021); Fuller (1987) for their width.
     """
     return [one.rows for one in rows_and_windows(logs, theta)]
 
 
 def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows]:
-    """The same with their windows."""
+    """The same with their windows.
+
+    Source of what a width costs the mass: Fuller (1987), 1.1.1; the choice is ours.
+    """
     shortest = min(len(one.log) for one in logs)
     tried = [
         [rows_of_width(one, half, theta) for one in logs]
@@ -83,7 +86,10 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
 
 
 def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
-    """The rows of one log in windows of twice `half` samples; speed (r,): the mean in each."""
+    """The rows of one log in windows of twice `half` samples; speed (r,): the mean in each.
+
+    Source: weak form, Messenger, Bortz, J. Comput. Phys. 443 (2021) 110525; `README.md`, (3).
+    """
     n, h, y = len(one.log), one.log.h, np.asarray(one.log["y"])
     length = min(2 * half, n - 1)
     every = all_windows(n, length, h)

@@ -21,7 +21,6 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.weighted_rows import (
     Fitted,
     Rows,
-    non_negative,
     of_column,
     solve_rows,
     stacked,
@@ -52,8 +51,9 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     """Fit and criterion of an equation's rows.
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
-    TRIM each instead of their squared residual; the best threshold is taken. Under imposed
-    motion it slides at any speed.
+    TRIM each instead of their squared residual; the best threshold is taken. Under prescribed
+    motion it slides at any speed. Sources: Cauchy's weights, Holland, Welsch, Commun. Stat. A 6
+    (1977) 813; the trimming is ours: `README.md`, (10), (11).
     """
     scale = stage.scale(equation)
     if equation == REST:
@@ -115,15 +115,19 @@ def _of_grams(grams: Array, positive: IntArray) -> tuple[Array, Array]:
 
 
 def _not_negative(A: Array, c: Array, positive: IntArray) -> Array:
-    """Least squares (k,) of A theta = c, those in `positive` not below 0."""
+    """Least squares (k,) of A theta = c, those in `positive` not below 0: whatever comes out
+    negative is 0, and the rest solved again."""
+    at = np.arange(len(c))
+    while True:
+        theta = np.zeros(len(c))
+        theta[at] = np.linalg.lstsq(A[np.ix_(at, at)], c[at], rcond=1e-12)[0]
+        below = positive[theta[positive] < 0.0]
+        if not len(below):
+            return theta
+        at = np.setdiff1d(at, below)
 
-    def least_squares(at: IntArray) -> Array:
-        return np.asarray(np.linalg.lstsq(A[np.ix_(at, at)], c[at], rcond=1e-12)[0])
 
-    return non_negative(least_squares, len(c), positive)
-
-
-def told(stage: EffectRows, equation: str) -> bool:
+def has_rows(stage: EffectRows, equation: str) -> bool:
     """Whether the logs have enough rows of an equation."""
     rows = sum(len(part.b) for part in stage.parts[equation])
     least = FEWEST_EVENTS if equation == BREAKAWAY else 2 * (6 if equation == REST else 12)
@@ -132,16 +136,19 @@ def told(stage: EffectRows, equation: str) -> bool:
 
 
 def base_fits(stage: EffectRows) -> dict[str, RowFit]:
-    """Every equation that the logs tell, with the structure found so far."""
+    """Every equation of which the logs have enough rows, with the structure found so far."""
     return {
         equation: row_fit(stage, equation, stacked(stage.parts[equation]))
         for equation in EQUATIONS
-        if (equation != ACTUATOR or stage.by_command) and told(stage, equation)
+        if (equation != ACTUATOR or stage.by_command) and has_rows(stage, equation)
     }
 
 
 def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes."""
+    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes.
+
+    Source: iterated weighted least squares (Aitken 1936).
+    """
     found = base_fits(stage)
     for _ in range(2):
         theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta

@@ -1,8 +1,8 @@
 """Evidence in rest and breakaway: what a stuck body does, and the force at which it lets go.
 
 A stuck Karnopp body does not move at all, and lets go at F_sp or F_sn whatever came before. In
-rest the shown position against force tells elasticity; at breakaway force against the time at
-rest, place, pressure tells what the limits depend on.
+rest the shown position against force shows elasticity; at breakaway force against the time at
+rest, place, pressure shows what the limits depend on.
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ class Breakaways:
 
 
 def rest_stretches(one: MotionLog, shortest: int) -> list[tuple[int, int]]:
-    """Stretches of samples (low, high) in which the body is not sure to move."""
+    """Stretches of samples (low, high) in which the body does not move significantly."""
     still = one.signals["d"] == 0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     return [
@@ -64,10 +64,10 @@ def rests(one: MotionLog, up: float, down: float) -> Rest:
     mean = samples(MEAN, one.log.h)
     starts, number = [], []
     load = uniform_filter1d(np.asarray(one.log["F"]), mean, origin=-(mean // 2))
-    held = (load < BORNE_SHARE * up) & (load > -BORNE_SHARE * down)
+    stuck = (load < BORNE_SHARE * up) & (load > -BORNE_SHARE * down)
     for i, (low, high) in enumerate(rest_stretches(one, (LEAST_ROWS + 2) * mean)):
         own = np.arange(low + mean, high - 2 * mean + 1, mean)
-        own = own[held[own]]
+        own = own[stuck[own]]
         if len(own) >= LEAST_ROWS:
             starts.append(own)
             number.append(np.full(len(own), i))
@@ -104,7 +104,10 @@ def means(x: Array, rest: Rest, mean: int) -> Array:
 
 
 def rest_rows(one: MotionLog, rest: Rest, moved: Array | None = None) -> Rows:
-    """Rows of the shown position in rest [m], less what an effect makes of it, `moved` (n,)."""
+    """Rows of the shown position in rest [m], less what an effect makes of it, `moved` (n,).
+
+    A stuck body does not move: the paper's eq. (1); `README.md`, (5).
+    """
     y = one.log["y"] if moved is None else one.log["y"] - moved
     mean = samples(MEAN, one.log.h)
     b = means(y, rest, mean)
@@ -114,10 +117,11 @@ def rest_rows(one: MotionLog, rest: Rest, moved: Array | None = None) -> Rows:
 
 
 def breakaways(one: MotionLog, m: float) -> Breakaways:
-    """Every sure breakaway: a rest of at least 48 ms, then motion in one direction.
+    """Every significant breakaway: a rest of at least 48 ms, then motion in one direction.
 
     m: mass [kg]. The body has let go at the sample from which the rise of the force since then,
-    integrated twice, gives the motion seen; that sample's force is the limit.
+    integrated twice, gives the motion seen; that sample's force is the limit. Source: a stuck body
+    of the paper's eq. (1) (Karnopp 1985); the estimate is ours.
     """
     y, F, h = one.log["y"], one.log["F"], one.log.h
     mean, of_rate = samples(MEAN, h), samples(RATE, h)
@@ -179,18 +183,14 @@ def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None
     return float(tried[i] + np.clip(shift, -0.5, 0.5))
 
 
-def breakaway_rows(
-    one: MotionLog, events: Breakaways, columns: Sequence[Array] = (), names: tuple[str, ...] = ()
-) -> Rows:
-    """Rows of the breakaway force F_sp or -F_sn [N] with further columns (k,)."""
+def breakaway_rows(one: MotionLog, events: Breakaways) -> Rows:
+    """Rows of the breakaway force F_sp or -F_sn [N] (the paper's eq. (1)); `README.md`, (6)."""
     up = events.direction > 0
     # What is late in seeing the motion is the more, the faster the force rises.
-    X = np.column_stack([1.0 * up, -1.0 * ~up, events.direction * events.rate, *columns])
+    X = np.column_stack([1.0 * up, -1.0 * ~up, events.direction * events.rate])
     sd = np.full(len(up), scatter(events))
     block = (events.at * BLOCKS // len(one.log)).astype(np.int64)
-    return Rows(
-        events.force, X, sd, block, np.full(len(up), np.inf), ("F_sp", "-F_sn", "rate", *names)
-    )
+    return Rows(events.force, X, sd, block, np.full(len(up), np.inf), ("F_sp", "-F_sn", "rate"))
 
 
 def scatter(events: Breakaways) -> float:

@@ -20,7 +20,7 @@ from identification.signals.differentiate import Motion, differentiate
 
 NO_MOTION = 1.5  # times the noise below which a position's own spread is no motion
 FASTER_MOVES = 5.0  # times the noise of the velocity: faster samples move
-BEFORE_STOP = 0.02  # s of motion looked at before a stop
+BEFORE_STOP = 0.02  # s of motion used before a stop
 CUTOFFS = (None, 10.0, 3.0)  # Hz; slow motion needs more smoothing to stand out of its noise
 PERIODS = 40.0  # of a cut-off that a log must last
 SEARCH_FACTOR = 4.0  # the search goes this factor beyond a first estimate
@@ -31,8 +31,7 @@ FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
 class FirstEstimate:
     """Nine values in the order of karnopp.NAMES, the search's range around them, and the motion.
 
-    low, high (9,): bounds for the magnitudes; rest (n,): whether the body stands still; sliding:
-    the regression behind the first five, None where the log refuses one.
+    low, high (9,): bounds for the magnitudes; rest (n,): whether the body stands still.
     """
 
     nine: Array
@@ -40,14 +39,13 @@ class FirstEstimate:
     high: Array
     motion: Motion
     rest: NDArray[np.bool_]
-    sliding: InverseModel | None
 
 
 def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     """First estimate of the nine from position and force.
 
-    held: the force is a command held over each period. Raises NotIdentifiable where nothing in
-    the log moves.
+    held: the force is a zero-order hold of a command. Raises NotIdentifiable where nothing in the
+    log moves. Ours: the paper names three steps of a companion paper and gives none.
     """
     motion = differentiate(log["y"], log.h)
     moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
@@ -71,7 +69,7 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
         [m, coulomb_p, coulomb_n, viscous_p, viscous_n, edge_p, -edge_n, stick_p, -stick_n]
     )
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
-    # A motor's force has no ramps that would show a narrow band: do not look for one.
+    # A motor's force has no ramps that would show a narrow band: do not search one.
     narrow = fastest / (500 if held else 3000)
     low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
     high = np.array(
@@ -87,7 +85,7 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
             3 * scale,
         ]
     )
-    return FirstEstimate(nine, low, high, motion, rest, sliding)
+    return FirstEstimate(nine, low, high, motion, rest)
 
 
 def usable_cutoffs(log: Log) -> list[float | None]:
@@ -107,7 +105,7 @@ def _sliding(log: Log, held: bool) -> InverseModel | None:
 def _magnitudes(
     sliding: InverseModel | None, motion: Motion, level: float, fastest: float
 ) -> tuple[float, float, float, float, float]:
-    """Step 1, kept positive: mass and friction that could explain forces of this level."""
+    """Step 1, bounded to be positive: mass and friction that could explain forces of this level."""
     peak = float(np.quantile(np.abs(motion.a), FASTEST_QUANTILE))
     mass = level / max(peak, 1e-12)
     if sliding is None:

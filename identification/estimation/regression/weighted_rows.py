@@ -1,6 +1,6 @@
-"""Weighted rows of a regression, and their least squares with parameters never below 0."""
+"""Weighted rows of a regression, and their least squares."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,36 +48,32 @@ class Fitted:
 
 
 def stacked(parts: Sequence[Rows]) -> Rows:
-    """Rows of several logs as one regression; their blocks are kept apart."""
+    """Rows of several logs as one regression; their blocks stay separate."""
     block = np.concatenate([p.block + BLOCKS * i for i, p in enumerate(parts)])
     join = [np.concatenate([getattr(p, k) for p in parts]) for k in ("b", "X", "sd", "speed")]
     lost = sum(p.lost for p in parts)
     return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost, parts[0].positive)
 
 
-def solve_rows(
-    rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None
-) -> Fitted:
-    """Weighted least squares; `keep` (r,) masks rows out of the fit (their residual is kept).
+def solve_rows(rows: Rows, keep: BoolArray | None = None) -> Fitted:
+    """Weighted least squares; `keep` (r,) masks rows out of the fit (their residual stays).
 
-    positive: columns whose parameter is 0 where it would come out negative.
+    Source: Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42.
     """
     A, c = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
     mask = np.ones(len(c), dtype=bool) if keep is None else keep
     scale = of_column(A)
 
-    def least_squares(at: IntArray) -> Array:
-        theta = np.linalg.lstsq(A[np.ix_(mask, at)] / scale[at], c[mask], rcond=1e-10)[0]
-        return np.asarray(theta / scale[at])
-
-    none = np.zeros(0, dtype=np.int64)
-    theta = non_negative(least_squares, A.shape[1], none if positive is None else positive)
+    theta = np.linalg.lstsq(A[mask] / scale, c[mask], rcond=1e-10)[0] / scale
     residual = c - A @ theta
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
 
 
 def left_unseen(rows: Rows) -> Array:
-    """What is left (r,) of each block by the least squares of all others."""
+    """What is left (r,) of each block by the least squares of all others.
+
+    Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111.
+    """
     left = np.zeros(len(rows.b))
     for block in np.unique(rows.block):
         out = rows.block == block
@@ -86,7 +82,10 @@ def left_unseen(rows: Rows) -> Array:
 
 
 def without_each_block(rows: Rows) -> Array:
-    """Parameters (blocks, k) of the least squares without each block in turn."""
+    """Parameters (blocks, k) of the least squares without each block in turn.
+
+    Source: for the jackknife, Tukey, Annals of Mathematical Statistics 29 (1958) 614.
+    """
     blocks = np.unique(rows.block)
     return np.array([solve_rows(rows, np.asarray(rows.block != k)).theta for k in blocks])
 
@@ -104,15 +103,3 @@ def of_column(A: Array) -> Array:
     """Root mean square of each column (k,); 1 of nothing, whose parameter then comes out 0."""
     size = np.sqrt(np.mean(A**2, axis=0))
     return np.asarray(np.where(size > 0.0, size, 1.0))
-
-
-def non_negative(fit: Callable[[IntArray], Array], k: int, positive: IntArray) -> Array:
-    """Parameters (k,) of `fit` on a set of columns, those in `positive` not below 0."""
-    at = np.arange(k)
-    while True:
-        theta = np.zeros(k)
-        theta[at] = fit(at)
-        below = positive[theta[positive] < 0.0]
-        if not len(below):
-            return theta
-        at = np.setdiff1d(at, below)

@@ -1,1 +1,1 @@
-"""A plant with effects from its free run in windows that begin at measured states."""
+"""A plant with effects from its free run in windows from measured states (`README.md`)."""

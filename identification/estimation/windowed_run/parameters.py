@@ -46,7 +46,7 @@ def units_in(plant: Plant, names: Sequence[str], x: Array) -> Array:
 def wide(p: Param) -> float:
     """Factor within which a search keeps what an effect is not linear in.
 
-    The equations tell a period closely, and one far beyond the travel is another effect.
+    The equations give a period closely, and one far beyond the travel is another effect.
     """
     return PERIOD_REACH if p.role == "period" else SHAPE_REACH
 

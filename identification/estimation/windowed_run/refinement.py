@@ -45,14 +45,14 @@ from identification.thresholds import ADEQUATE, COMPLETE, NEARLY_FOLLOWED
 
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
 # where a stop comes late, no more than its own window is lost, so the minimum is wide.
-BRIEF_WINDOWS = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
-BRIEF_SAMPLES = 20  # that a brief window has at least
+APPROACH_WINDOWS = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
+APPROACH_SAMPLES = 20  # that such a window has at least
 # Of a parameter, or of so much of its unit, that it changes in them
-BRIEF_REACH, LEAST_OF_UNIT = 0.4, 0.5
-PASSING = 0.03  # share of the cost, below which a step that only leads on is the last
+APPROACH_REACH, LEAST_OF_UNIT = 0.4, 0.5
+PASSING = 0.03  # share of the cost, below which a step of an approach is the last
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 NO_USE = 0.8  # of the misfit, above which another search is of no use
-REACHED = 60.0  # misfit up to which brief windows may lead to the minimum
+REACHED = 60.0  # misfit up to which short windows may reach the minimum
 # Of `onward` at most, each to leave this share of the misfit before
 ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
 # At most, of a refinement, of one on a bristle and of a quick one
@@ -62,7 +62,7 @@ MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
 FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
-LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
+TRUST = 3.0  # times its standard deviation that the regression is trusted as a prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Refit:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the errors of `names`, (d, d)."""
+        """Of the errors of `names`, (d, d): `README.md`, (7) to (9) (Liang, Zeger 1986)."""
         return self.spread()
 
     @cached_property
@@ -129,7 +129,7 @@ class _Unknowns:
         cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, prior: Mapping[str, float],
         steps: int, little: float,
     ) -> "_Unknowns":  # fmt: skip
-        """The parameters that `prior` leaves open: a shape at its bound has no say."""
+        """The parameters that `prior` leaves open: a shape at its bound is fixed."""
         names = names_of(plant, drive)
         x0 = values_of(plant, names)
         trust = np.array([prior.get(name, np.inf) for name in names])
@@ -164,7 +164,8 @@ class _Unknowns:
         self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
         reach: Array | float = np.inf, little: float | None = None,
     ) -> Minimum:  # fmt: skip
-        """The nearest minimum over windows of so many seconds; tie: held by the regression."""
+        """The nearest minimum over windows of so many seconds; tie: with the regression as
+        prior."""
         now = self.plant_at(x)
         errors_of = judge(now, self.logs, self.drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
@@ -173,7 +174,7 @@ class _Unknowns:
 
         def bent(at: Array) -> Array:
             r = soft(errors_of(self.plant_at(at)), far)
-            pull = (self.full(at)[tied] - self.x0[tied]) / (LOOSE * self.trust[tied])
+            pull = (self.full(at)[tied] - self.x0[tied]) / (TRUST * self.trust[tied])
             return np.concatenate([r, pull]) if tie else np.asarray(r)
 
         last = self.little if little is None else little
@@ -190,10 +191,11 @@ def refit(
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
-    steps from the plant as it is, "near" goes on from there, "far" comes there through brief
-    windows, "rough" looks for the band first and goes on while much is gained, "whole" as long as
-    anything is; rescues: how often at most another band is looked for, where more than noise
-    is left.
+    steps from the plant as it is, "near" goes on from there, "far" comes there through short
+    windows, "rough" searches the band first and goes on while much is gained, "whole" as long as
+    anything is; rescues: how often at most another band is searched, where more than noise
+    is left. Sources: multiple shooting, Bock (1983); Levenberg (1944), Marquardt (1963); Cauchy's
+    weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`, (5), (7) to (9).
     """
     quick = effort == "quick"
     if effort in ("rough", "whole"):
@@ -233,7 +235,7 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
     quick, slow = effort == "quick", on_bristle(plant)
     at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
-    # follows. Elsewhere what it lacks would bend what the equations tell.
+    # follows. Elsewhere what it lacks would bias what the equations give.
     hopeless = effort == "rough" and at.mean > NEARLY_FOLLOWED
     rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
@@ -263,14 +265,14 @@ def _worse(unknowns: _Unknowns, again: Minimum, at: Minimum) -> bool:
 
 
 def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
-    """The minimum held by the regression, come to as the effort says."""
+    """The minimum with the regression as prior, approached as the effort says."""
     x = unknowns.start
     if effort in ("rough", "whole"):
         x = unknowns.refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
-    for seconds, part in BRIEF_WINDOWS if effort == "far" else ():
-        brief = max(seconds, *(BRIEF_SAMPLES * one.log.h for one in unknowns.logs))
-        reach = BRIEF_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
-        x = unknowns.refined(x, brief, False, part, reach=reach, little=PASSING).x
+    for seconds, part in APPROACH_WINDOWS if effort == "far" else ():
+        short = max(seconds, *(APPROACH_SAMPLES * one.log.h for one in unknowns.logs))
+        reach = APPROACH_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
+        x = unknowns.refined(x, short, False, part, reach=reach, little=PASSING).x
     return unknowns.refined(x, RUN_WINDOW, True, HALF_SHARE)
 
 
@@ -310,13 +312,13 @@ def _rescued(
 
 
 def briefly(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
-    """The plant refined through brief windows, with directions that may be unequal."""
+    """The plant refined through short windows, with directions that may be unequal."""
     held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     return refit(plant, logs, drive, prior=held, effort="far")
 
 
 def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
-    """The plant refined through brief windows while that helps."""
+    """The plant refined through short windows while that helps. Ours."""
     best: Refit | None = None
     left_by = misfit(plant, logs, drive)
     for _ in range(ONWARD_ROUNDS):

@@ -31,11 +31,11 @@ Judge = Callable[[Plant], Array]
 def judge(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, bristle: float = COARSE
 ) -> Judge:
-    """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
-    force) over all logs, less what the windows' unsure states account for.
+    """Errors of a plant like this one, in units of the sensors' noise: position (and, driven by the
+    command, force) over all logs, less what the windows' uncertain states account for.
 
-    Windows that this plant loses by luck (`misfit`) are left out: 0. bristle [s]: longest sub-step
-    of one.
+    Windows that this plant loses by chance (`misfit`) are left out: 0. bristle [s]: longest
+    sub-step of one. Sources: windows, Bock (1983); states, Robinson (1991): `README.md`, (1), (2).
     """
     free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
     sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
@@ -56,24 +56,28 @@ def judge(
 
 
 def _lost(plant: Plant, one: MotionLog, drive: Drive, own: Freed | None) -> BoolArray:
-    """Samples (n,) of the windows that the plant loses by luck, as far as `misfit` forgives it."""
+    """Samples (n,) of the windows that the plant loses by chance, as far as `misfit` excludes
+    them."""
     out = np.zeros(len(one.log), dtype=np.bool_)
     r = window_residual(plant, one, drive, own) if loose(plant, drive) and own else None
     if own is None or r is None or not np.all(np.isfinite(r)):
         return out
     window = window_of(own.begun, len(one.log))
     each, kept = _by_window(r[0], window, one.signals["d"] != 0)
-    spoilt = np.setdiff1d(np.flatnonzero(each > ADEQUATE), kept)
-    return np.isin(window, spoilt)
+    lost = np.setdiff1d(np.flatnonzero(each > ADEQUATE), kept)
+    return np.isin(window, lost)
 
 
 def loss(r: Array) -> float:
-    """Robust cost."""
+    """Robust cost: Cauchy's (Holland, Welsch, Commun. Stat. A 6 (1977) 813)."""
     return float(np.sum(np.log1p((r / ROBUST_FROM) ** 2)) * ROBUST_FROM**2)
 
 
 def soft(r: Array, far: float = ROBUST_FROM) -> Array:
-    """Errors whose square sum is a robust cost: those beyond `far` count ever less."""
+    """Errors whose square sum is a robust cost: those beyond `far` count ever less.
+
+    Source: Cauchy's function, Holland, Welsch (1977).
+    """
     return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far)
 
 
@@ -85,8 +89,8 @@ def misfit(
 
     Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
     longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
-    just reaches is a matter of luck and takes its window with it: the worst windows do not count,
-    unless every one is to.
+    just reaches is a matter of chance and takes its window with it: the worst windows do not count,
+    unless every one is to. Robust as Cauchy's function (Holland, Welsch 1977); `README.md`, (4).
     """
     worst = 0.0
     free = loose(plant, drive) and not every
@@ -105,8 +109,9 @@ def misfit(
 
 
 def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None = None) -> float:
-    """Robust mean square of errors (n,), 1 for noise; window (n,): numbers of the stretches of
-    which the worst do not count, of those in which the body moves (n,) at all, so many of them."""
+    """Robust mean square (Holland, Welsch 1977) of errors (n,), 1 for noise; window (n,): stretches
+    of which the worst do not count, of those in which the body moves (n,) at all, so many of
+    them."""
     if window is None:
         return loss(r) / len(r) / NOISE_LOSS
     each, kept = _by_window(r, window, moves)
@@ -118,7 +123,7 @@ def _by_window(r: Array, window: IntArray, moves: BoolArray | None) -> tuple[Arr
     square = np.log1p((r / ROBUST_FROM) ** 2) * ROBUST_FROM**2 / NOISE_LOSS
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
-    told = len(size) if moves is None else int(np.count_nonzero(np.bincount(window, moves)))
-    spoilt = round(CHANCE_WINDOWS * told)
-    kept = np.argsort(each)[: max(1, len(size) - spoilt)]
+    moving = len(size) if moves is None else int(np.count_nonzero(np.bincount(window, moves)))
+    lost = round(CHANCE_WINDOWS * moving)
+    kept = np.argsort(each)[: max(1, len(size) - lost)]
     return np.asarray(each, dtype=np.float64), kept.astype(np.int64)

@@ -32,7 +32,8 @@ SIDE_CROWD, SIDE_GENERATIONS = 24, 10
 
 
 def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: float) -> Plant:
-    """The plant at the best of a few band widths and stick limits, then of either direction."""
+    """The plant at the best of a few band widths and stick limits, then of either direction.
+    Ours."""
     p = plant.friction
     tried = [
         replace(p, dv_p=width * band, dv_n=-width * band, F_sp=more * p.F_sp, F_sn=more * p.F_sn)
@@ -48,7 +49,7 @@ def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: floa
 
 
 def by_side(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Plant:
-    """The plant with the best band and stick limit of either direction on a wide grid."""
+    """The plant with the best band and stick limit of either direction on a wide grid. Ours."""
     errors_of = judge(plant, logs, drive, SHORT_WINDOW)
     p = plant.friction
     up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(BAND_GRID, STICK_GRID)]
@@ -67,11 +68,12 @@ def widest_band(logs: Sequence[MotionLog]) -> float:
 def stick_search(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator
 ) -> Plant:
-    """The plant with the bands and stick limits that its run calls for, wherever they lie.
+    """The plant with the bands and stick limits with which its run follows, wherever they lie.
 
-    For a plant whose other parameters the equations tell: of either direction two unknowns are
+    For a plant whose other parameters the equations give: of either direction two unknowns are
     left, which are searched by themselves, first from the slowest motion that the logs show to
-    their usual speed and from the Coulomb level to several times that, then close by.
+    their usual speed and from the Coulomb level to several times that, then close by. Source:
+    differential evolution, Storn, Price (1997); the order is ours.
     """
     part = [shortened(one, PIECE) for one in logs]
     top = widest_band(part)

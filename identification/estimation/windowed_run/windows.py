@@ -1,9 +1,11 @@
-"""Free runs in windows from measured states, and errors freed of what those states are unsure of.
+"""Free runs in windows from measured states, and errors freed of the states' uncertainty.
 
-A window begins at a sure rest where one is near: the state is known there. In motion position and
-velocity are known within the sensors' noise only, and a small error of either moves the whole
-window. So the states are unknowns with that uncertainty, and the least that they leave is judged:
-r'(I + B P B')^-1 r for residuals r, B their change with the states and P the states' covariance.
+A window begins at a significant rest if one is near: the state is known there. In motion position
+and velocity are known within the sensors' noise only, and a small error of either moves the whole
+window. So the states are unknowns z of unit variance, and what their likeliest values leave counts:
+r - B z, z = (I + B'B)^-1 B'r, for residuals r and B their change with the states in units of the
+states' deviations. Sources: multiple shooting, Bock (1983); the states as random effects, Robinson,
+Statistical Science 6 (1991) 15.
 """
 
 from collections.abc import Sequence
@@ -23,7 +25,7 @@ from identification.signals.sampling import samples
 from identification.simulation.free_run import FreeRun, free_run
 
 RUN_WINDOW = 2.0  # of a window
-REST_REACH = 0.45  # of a window, within which a rest is looked for
+REST_REACH = 0.45  # of a window, within which a rest is searched
 FAST_SHARE = 0.5  # of the usual speed, at which a window begins where there is no rest near
 LATER = 2.0  # windows by which a start is put off until there is a rest
 COARSE = 5e-4  # s, sub-step of a bristle: errs by a hundredth of the noise where a spring holds it
@@ -33,9 +35,9 @@ WIDEST_CREEP = 50  # samples on either side by which a creep is seen
 ON_ONE_COUNT = 0.3  # of the position's noise, that its samples scatter by where noise is white
 AROUND = 8  # samples of a rest whose mean is the position
 WHOLE = np.inf  # seconds of a window that is the whole log
-NOISE_RUNS = 6  # runs by which the walk of a measured force's noise is seen
-RETURNS = 2  # runs until the body's place behind a transducer has settled
-PLACE_SETTLED = 1e-3  # of the position's noise, by which that place may still change
+NOISE_RUNS = 6  # runs by which the drift by a measured force's noise is seen
+RETURNS = 2  # runs until the body's place behind a transducer has converged
+PLACE_CONVERGED = 1e-3  # of the position's noise, by which that place may still change
 STATE_STEP = 0.3  # of a state's deviation, by which the change with it is taken
 
 
@@ -60,7 +62,8 @@ def starts(
 ) -> Starts:
     """Windows of about so many seconds, begun at rest where the body rests near by.
 
-    bristle [s]: longest sub-step of one.
+    bristle [s]: longest sub-step of one. Source: restarts as in multiple shooting, Bock (1983);
+    where they lie is ours.
     """
     n, h = len(one.log), one.log.h
     step = max(2, round(min(seconds / h, 2.0 * n)))
@@ -111,7 +114,8 @@ def window_run(
     """Free run in windows; None where the model cannot be followed.
 
     shift: (3, k) on y, v, F; log: driven by this one in place of its own. Raises Halted where the
-    log's `halt` says so: all refinements and searches in windows come by here.
+    log's `halt` says so: all refinements and searches in windows come by here. A force corrected by
+    the measured one: Kalman's steady gain (Harvey 1989); `README.md`, (3).
     """
     one.halt.ask()
     driven = driven_by(one, drive) if log is None else log
@@ -137,7 +141,7 @@ def window_run(
         run, shift = run_from(y), np.zeros(len(y))
         for _ in range(RETURNS if sensors else 0):  # what was measured is what is shown
             before, shift = shift, (run.shown - run.y)[np.maximum(at, 0)]
-            if np.all(np.abs(shift - before) <= PLACE_SETTLED * one.noise_y):
+            if np.all(np.abs(shift - before) <= PLACE_CONVERGED * one.noise_y):
                 break
             run = run_from(y - shift)
         return run
@@ -151,7 +155,10 @@ def driven_by(one: MotionLog, drive: Drive) -> Log:
 
 
 def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
-    """Position (and, by command, force) errors in units of the sensors' noise, (k, n)."""
+    """Position (and, driven by the command, force) errors in units of the noise, (k, n).
+
+    Source of the force's weight: steady gain of a local level, Harvey (1989); `README.md`, (3).
+    """
     out = [(run.shown - one.log["y"]) / one.noise_y]
     if drive == "command" and not one.held:
         # Beside the sensor's noise, that of the force before it was corrected.
@@ -171,7 +178,7 @@ def _rest_near(wanted: int, step: int, rests: IntArray) -> int | None:
 def _calm(one: MotionLog, wanted: int, step: int, speed: Array, enough: float) -> int:
     """Sample near `wanted` in calm motion that is fast enough [m/s], if there is any.
 
-    Near the band a state within its noise may stop or not: what is sure of itself is fast.
+    Near the band a state within its noise may stop or not: what is well known is fast.
     """
     reach, last = max(1, int(REST_REACH * step)), len(one.log) - 1
     span = np.arange(wanted - reach, min(wanted + reach, last))
@@ -182,7 +189,8 @@ def _calm(one: MotionLog, wanted: int, step: int, speed: Array, enough: float) -
 
 
 def _rests(one: MotionLog) -> IntArray:
-    """Samples in the middle of every sure rest, and the first where the log begins with one."""
+    """Samples in the middle of every significant rest, and the first where a log begins with
+    one."""
     found = []
     for low, high in rest_stretches(one, samples(LEAST_REST, one.log.h)):
         v, sd = _creep(one, low, high)
@@ -205,8 +213,8 @@ def _creep(one: MotionLog, low: int, high: int) -> tuple[float, float]:
 class Freed:
     """What takes the part of residuals away that the windows' states account for.
 
-    weight (k, n): less than 1 where the run itself is unsure; B (3, k, n): change of the weighted
-    errors with each state in units of its deviation; inverse (windows, 3, 3) of I + B'B.
+    weight (k, n): less than 1 where the run itself is uncertain; B (3, k, n): change of the
+    weighted errors with each state in units of its deviation; inverse (windows, 3, 3) of I + B'B.
     """
 
     begun: Starts
@@ -226,7 +234,7 @@ def freed_kernel(at: IntArray, B: Array, inverse: Array, r: Array) -> None:
     """Takes from the weighted errors r (k, n) what the states of their windows account for.
 
     Those of a window, from sample at[w] on, are most likely (I + B'B)^-1 B'r in units of their
-    deviations.
+    deviations (Robinson 1991).
     """
     rows, n = r.shape
     states = np.empty(3)
@@ -250,14 +258,15 @@ def freed(
 ) -> Freed | None:
     """The states' part of errors of this plant; None where it cannot be followed.
 
-    even: every error counts the same, however unsure the run is of itself there.
+    even: every error counts the same, however uncertain the run is there. Source: Robinson (1991);
+    `README.md`, (2).
     """
     base = window_run(plant, one, drive, begun)
     if base is None:
         return None
     window = window_of(begun, len(one.log))
     r = window_errors(base, one, drive)
-    weight = np.ones(r.shape) if even else _sureness(plant, one, drive, begun, base, r)
+    weight = np.ones(r.shape) if even else _weights(plant, one, drive, begun, base, r)
     B = np.zeros((3, *r.shape))
     for i in range(3):
         if not np.any(begun.sd[i]):
@@ -274,38 +283,40 @@ def freed(
     return Freed(begun, weight, B, inverse)
 
 
-def _sureness(
+def _weights(
     plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun, r: Array
 ) -> Array:
-    """Weights (k, n) of the errors: a run by a measured force walks with the force's noise.
+    """Weights (k, n) of the errors: a run by a measured force drifts with the force's noise.
 
     By a few runs with as much noise once more (of fixed seeds: a quadrature, nothing random). And
-    what a jittering clock shows of it is unsure in fast motion.
+    what a jittering clock shows of it is uncertain in fast motion.
     """
     square = np.zeros(r.shape)
     if walks(one, drive):
-        square[0] = _least_walk(plant, one, drive, begun, base)
+        square[0] = _least_drift(plant, one, drive, begun, base)
     square[0] += (one.jitter * one.signals["v"] / one.noise_y) ** 2
     return np.asarray(1.0 / np.sqrt(1.0 + square))
 
 
-def _least_walk(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
-    """As `_walk`, of the plant or of the reference, if that walks less."""
-    square = _walk(plant, one, drive, begun, base)
+def _least_drift(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
+    """As `_drift_variance`, of the plant or of the reference, if that drifts less."""
+    square = _drift_variance(plant, one, drive, begun, base)
     if one.reference is not None:
         plain = Plant(one.reference, plant.actuator)
         run = window_run(plain, one, drive, begun)
         if run is not None:
-            square = np.minimum(square, _walk(plain, one, drive, begun, run))
+            square = np.minimum(square, _drift_variance(plain, one, drive, begun, run))
     return square
 
 
 def walks(one: MotionLog, drive: Drive) -> bool:
-    """Whether a run walks away with the noise of the force that drives or corrects it."""
+    """Whether a run drifts off with the noise of the force that drives or corrects it."""
     return (drive == "force" or one.held or one.walk > 0.0) and one.noise_F > 0.0
 
 
-def _walk(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
+def _drift_variance(
+    plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun
+) -> Array:
     """Variance (n,) of a run by the force's noise, in units of the position's."""
     square = np.zeros(len(one.log))
     for seed in range(NOISE_RUNS):
@@ -335,8 +346,8 @@ def noise_errors(
 ) -> Array | None:
     """Errors (k, n), less their states' part, that every signal's noise alone makes of a run.
 
-    Noise of force and command enters the run and walks, that of the states moves whole windows,
-    that of the position is white.
+    Noise of force and command enters the run and drifts, that of the states moves whole windows,
+    that of the position is white. Draws of them make the covariance of `README.md`, (8); ours.
     """
     base = window_run(plant, one, drive, found.begun)
     noisy = _noisier(plant, one, drive, rng)
@@ -352,7 +363,10 @@ def noise_errors(
 def window_residual(
     plant: Plant, one: MotionLog, drive: Drive, found: Freed | None
 ) -> Array | None:
-    """Errors of a plant in windows less their states' part, (k, n); None: not to be followed."""
+    """Errors of a plant in windows less their states' part, (k, n); None: not to be followed.
+
+    Source: as `freed`, Robinson (1991).
+    """
     if found is None:
         return None
     run = window_run(plant, one, drive, found.begun)

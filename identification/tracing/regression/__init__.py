@@ -1,1 +1,1 @@
-"""Which effects the equations call for: rows, candidates, forward choice, significance."""
+"""Effects that the equations show (`../README.md`): rows, candidates, selection, significance."""

@@ -45,12 +45,16 @@ class EffectCandidate:
 
 
 def trial(
-    stage: EffectRows, effect: Effect, shape: Values, told_in: Sequence[str]
+    stage: EffectRows, effect: Effect, shape: Values, shown_in: Sequence[str]
 ) -> tuple[float, dict[str, RowFit]]:
-    """Criterion over the equations `told_in` with the effect at this shape, and their outcomes."""
+    """Criterion over the equations `shown_in` with the effect at this shape, and their outcomes.
+
+    Source: sizes solved within, variable projection, Golub, Pereyra, SIAM J. Numer. Anal. 10 (1973)
+    413.
+    """
     stage.logs[0].halt.ask()
     found = {}
-    for equation in told_in:
+    for equation in shown_in:
         parts = [
             with_effect(stage, equation, effect, shape, i, rows)
             for i, rows in enumerate(stage.parts[equation])
@@ -62,9 +66,12 @@ def trial(
 def best_of(
     stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]
 ) -> EffectCandidate | None:
-    """The effect at its best beside what the stage holds; None where it cannot show or stand."""
-    told_in = [e for e in equations_of(effect, stage.by_command, stage.held) if e in base]
-    if not told_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
+    """The effect at its best beside what the stage holds; None where it cannot show or stand.
+
+    Source: variable projection, Golub, Pereyra (1973); the shape by grid and Nelder, Mead (1965).
+    """
+    shown_in = [e for e in equations_of(effect, stage.by_command, stage.held) if e in base]
+    if not shown_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
         return None
     if effect.signals and not any(
         name in one.signals for one in stage.logs for name in effect.signals
@@ -80,7 +87,7 @@ def best_of(
     own = stage
 
     def score(shape: Values) -> float:
-        total, found = trial(own, effect, shape, told_in)
+        total, found = trial(own, effect, shape, shown_in)
         fair = needs_rounds(effect) or admissible(effect, with_sizes(effect, shape, found))
         return total if fair else OUT_OF_BOUNDS
 
@@ -90,17 +97,17 @@ def best_of(
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
     if half != best and score(half) < score(best) + PENALTY:
         best = half  # a harmonic had taken the whole of it
-    total, found = trial(own, effect, best, told_in)
+    total, found = trial(own, effect, best, shown_in)
     for i in range(SUBSTITUTIONS if needs_rounds(effect) else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
         if i == 0:  # the plain friction's levels had bent its shape
             best = shaped(free, bounds, best | defaults, score)
-        total, found = trial(own, effect, best, told_in)
+        total, found = trial(own, effect, best, shown_in)
     values = with_sizes(effect, best, found)
     if not admissible(effect, values):
         return None
-    gain = sum(base[e].criterion for e in told_in) - total
+    gain = sum(base[e].criterion for e in shown_in) - total
     return EffectCandidate(effect, values, found, float(gain))
 
 
@@ -108,14 +115,17 @@ def shaped(
     free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
     score: Callable[[Values], float],
 ) -> dict[str, float]:  # fmt: skip
-    """Shape parameters at their best; optional ones stay where they are unless it gains enough."""
+    """Shape parameters at their best; optional ones stay where they are unless it gains enough.
+
+    Source: Nelder, Mead (1965); the rule of optional ones is ours.
+    """
     best = dict(shape)
-    told = [i for i, p in enumerate(free) if not p.optional]
-    if told:
-        best = refined_shape([free[i] for i in told], [bounds[i] for i in told], best, score)
-    if len(told) < len(free):
+    needed = [i for i, p in enumerate(free) if not p.optional]
+    if needed:
+        best = refined_shape([free[i] for i in needed], [bounds[i] for i in needed], best, score)
+    if len(needed) < len(free):
         other = refined_shape(free, bounds, best, score)
-        if score(other) < score(best) - PENALTY * (len(free) - len(told)):
+        if score(other) < score(best) - PENALTY * (len(free) - len(needed)):
             best = other
     return best
 
@@ -131,7 +141,10 @@ def refined_shape(
     free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
     score: Callable[[Values], float],
 ) -> dict[str, float]:  # fmt: skip
-    """These parameters of the shape at the nearest minimum of `score`, within bounds."""
+    """These parameters of the shape at the nearest minimum of `score`, within bounds.
+
+    Source: Nelder, Mead, Computer Journal 7 (1965) 308.
+    """
     start = np.array([shape[p.name] for p in free])
     unit = np.where(start != 0, np.abs(start), 1.0)
     low, high = np.array(bounds).T

@@ -18,7 +18,10 @@ def row_residual(
 
 
 def left_out_residual(rows: Rows, slowest: float) -> tuple[Array, Array]:
-    """As `row_residual`, each stretch of time with the sizes that all others give."""
+    """As `row_residual`, each stretch of time with the sizes that all others give.
+
+    Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111.
+    """
     keep = rows.speed >= slowest
     r = np.zeros(len(rows.b))
     for block in np.unique(rows.block):
@@ -31,8 +34,8 @@ def left_out_residual(rows: Rows, slowest: float) -> tuple[Array, Array]:
 def left_out_error(stage: EffectRows, slowest: float) -> float:
     """Root mean square of the mechanical equation [N] on each log, fitted on all others.
 
-    Runs of one file, cut at its gaps, are left out together where there are more files. 0 where
-    there is one log only.
+    Source: cross-validation, Stone (1974). Runs of one file, cut at its gaps, are left out together
+    where there are more files. 0 where there is one log only.
     """
     parts = stage.parts[MECHANICAL]
     if len(parts) < 2:

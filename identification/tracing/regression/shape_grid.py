@@ -83,7 +83,7 @@ def _short_times(h: float) -> Array:
 
 def fewest_periods(effect: Effect, one: MotionLog) -> float:
     """Periods that the travel has to hold: of a force, such that it is seen to repeat; of a turning
-    machine (a pendulum swings no full turn) and of what friction does along the stroke, a good part
+    machine (a pendulum makes no full turn) and of what friction does along the stroke, a good part
     of one."""
     return (PENDULUM if one.rotary else REPEATS) if effect.place.drives else ALONG
 

@@ -23,8 +23,10 @@ def chance(
     """Chance that some effect of the library gains as much where none is missing.
 
     The model without the effect is given the residual that the best candidate leaves, its signs
-    drawn anew by stretches of time, which keeps its colour; the largest gain of any candidate's
-    columns in any draw is compared.
+    drawn anew by stretches of time, which preserves its colour; the largest gain of any candidate's
+    columns in any draw is compared. Sources: wild bootstrap, Wu, Annals of Statistics 14 (1986)
+    1261, Liu, Annals of Statistics 16 (1988) 1696; largest of a family, Westfall, Young,
+    Resampling-Based Multiple Testing (1993). `README.md` of `tracing`, (3).
     """
     largest = np.zeros(DRAWS)
     for equation in best.outcomes:
@@ -58,7 +60,7 @@ def chance(
 
 
 def by_luck(p_value: float) -> bool:
-    """Whether a gain of this chance where no effect is missing may be luck."""
+    """Whether a gain of this probability where no effect is missing may be chance."""
     return p_value > CHANCE_LEVEL
 
 

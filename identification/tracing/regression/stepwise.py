@@ -1,4 +1,4 @@
-"""Which effects are missing: forward choice with exchange, against a calibrated threshold."""
+"""Which effects are missing: forward selection with exchange, against a calibrated threshold."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -42,7 +42,7 @@ ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
-HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
+HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even searched
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
 FURTHER_EFFECT = "a further effect beside the first"
@@ -53,7 +53,7 @@ class Step:
     """One effect taken: the candidate, its p-value, its rivals in order, stage and base before.
 
     explained: share of what is missing that it accounts for in the free run, where that decided;
-    apart: keys of rivals that the equations do not tell from it, but the free run does.
+    apart: keys of rivals that the equations do not separate from it, but the free run does.
     """
 
     candidate: EffectCandidate
@@ -87,10 +87,12 @@ def choose(
     start: EffectRows, first: Mapping[str, RowFit], library: Library, rng: np.random.Generator,
     report: Progress, begun: Choice | None = None, most: int = MOST_EFFECTS,
 ) -> Choice:  # fmt: skip
-    """Effects that the logs call for, one after the other, each judged beside those before.
+    """Effects that the logs show, one after the other, each tested beside those before.
 
     start, first: the plain model and what it leaves, as `first_stage` gives them; begun: a choice
-    to go on from; most: effects at most. Halted, it is the choice so far.
+    to go on from; most: effects at most. Halted, it is the choice so far. Source: stepwise
+    regression, Efroymson, in Ralston, Wilf (eds.), Mathematical Methods for Digital Computers
+    (1960); orthogonal forward selection, Chen, Billings, Luo (1989); thresholds are ours.
     """
     stage, base, steps = start, first, list[Step]()
     tried: Sequence[EffectCandidate] = ()
@@ -125,8 +127,8 @@ def accepted(
         if step is None:
             return None
         after, left = settled_fits(replace(absorb(step.stage, step.candidate), scales={}))
-        told = base.keys() & left.keys()
-        if sum(left[e].criterion for e in told) <= sum(base[e].criterion for e in told):
+        both = base.keys() & left.keys()
+        if sum(left[e].criterion for e in both) <= sum(base[e].criterion for e in both):
             return step, after, left
         if all(mean_square(base[e]) <= HARDLY for e in step.candidate.outcomes):
             return None
@@ -141,7 +143,8 @@ def trusted(
     """The leading steps that carry over to logs left out, or else explain most of what is missing.
 
     Where much is left whatever is added, a term that explains a part of it lowers the training
-    error and may raise that of another run (measured on EMPS).
+    error and may raise that of another run (measured on EMPS). Source: cross-validation, Stone
+    (1974); `README.md` of `tracing`, (5).
     """
     kept: list[Step] = []
     stage, base = start, base_fits(start)
@@ -165,7 +168,7 @@ def trusted(
 
 def is_trusted(left: float, explained: float) -> bool:
     """Whether an effect carries over, or explains most; left: share of the error on logs left out,
-    explained: of what is missing."""
+    explained: of what is missing. Ours: README, (5)."""
     return left * WORSE < 1.0 or explained >= HALF_LEFT
 
 
@@ -176,7 +179,10 @@ def _report(report: Progress, turn: int, part: float) -> None:
 def polished(
     stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
 ) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
-    """Every effect kept as columns at its best beside the others; those not needed any more go."""
+    """Every effect that is in columns at its best beside the others; those not needed any more go.
+
+    Source: the backward part of stepwise regression, Efroymson (1960).
+    """
     scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
     for effect, _values in stage.chosen[:-1]:
         others = tuple(x for x in stage.chosen if x[0].key != effect.key)
@@ -218,14 +224,14 @@ def next_step(
     base: Mapping[str, RowFit],
     rng: np.random.Generator,
 ) -> Step | None:
-    """The candidate that gains most, if it is material and no luck; None where there is none."""
+    """The candidate that gains most, if it is material and significant; None without one."""
     if not found:
         return None
     scales = scales_of(found, base)
     scaled = replace(stage, scales=scales)
     base = base_fits(scaled)
     ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
-    # What explains a trifle of what is missing in its own equations must not hide the next.
+    # What explains little of what is missing in its own equations must not hide the next.
     worth = [
         c
         for c in ranked
@@ -245,7 +251,11 @@ def next_step(
 
 
 def merit(candidate: EffectCandidate) -> float:
-    """Gain less what its parameters would gain by luck."""
+    """Gain less what its parameters would gain by chance.
+
+    As Akaike's criterion (IEEE Trans. Automatic Control 19 (1974) 716) penalises a likelihood, by a
+    penalty that is calibrated on machines without an effect.
+    """
     return candidate.gain - PENALTY * len(candidate.effect.params)
 
 
@@ -318,7 +328,7 @@ def scales_of(found: Sequence[EffectCandidate], base: Mapping[str, RowFit]) -> d
 def rescaled(
     stage: EffectRows, candidate: EffectCandidate, base: Mapping[str, RowFit]
 ) -> EffectCandidate:
-    """The candidate judged at the stage's scales."""
+    """The candidate compared at the stage's scales."""
     outcomes = {e: row_fit(stage, e, o.rows) for e, o in candidate.outcomes.items()}
     gain = sum(base[e].criterion - o.criterion for e, o in outcomes.items())
     return replace(candidate, outcomes=outcomes, gain=float(gain))
@@ -341,7 +351,8 @@ def contribution_rms(
 
 
 def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
-    """Whether the effect is large enough to matter to the machine, noise apart."""
+    """Whether the effect is large enough to matter to the machine, noise apart. Ours: README,
+    (2)."""
     level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
     if candidate.effect.place.shows:
         return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
@@ -365,7 +376,7 @@ def shift_rms(candidate: EffectCandidate, stage: EffectRows, one: MotionLog) -> 
 
 
 def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
-    """The stage with the effect in it: its columns kept, or the logs' signals freed of it."""
+    """The stage with the effect in it: its columns join, or the logs' signals are freed of it."""
     effect, values = candidate.effect, candidate.values
     if not effect.place.on_signals:
         return replace(stage, chosen=(*stage.chosen, (effect, values)))

@@ -12,7 +12,6 @@ from identification.estimation.plain_search.fitted_runs import (
     rest_windows,
     total_cost,
 )
-from identification.estimation.regression.three_step import first_estimate
 from identification.log import Log
 from identification.model.plant import Actuator, Plant
 from identification.simulation.free_run import free_run
@@ -24,7 +23,6 @@ from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, ta
 def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> FittedRun:
     run = prepare_run(
         log,
-        first_estimate(log),
         "command" if by_command else "force",
         constant=0.0,
         window=window,

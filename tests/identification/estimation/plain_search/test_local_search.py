@@ -15,7 +15,6 @@ from identification.estimation.plain_search.local_search import (
     sample,
     unpack,
 )
-from identification.estimation.regression.three_step import first_estimate
 from identification.simulation.karnopp_step import DV_N, F_SN, kernel_parameters
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
 
@@ -28,7 +27,6 @@ def posed(number: int, seed: int) -> tuple[FittedRun, Array]:
     constant = float(fit_actuator([log]).constants[0])
     run = prepare_run(
         log,
-        first_estimate(log),
         "command",
         constant=constant,
         window=1.0,
@@ -64,14 +62,14 @@ def test_the_covariance_is_that_of_repeated_logs() -> None:
     assert 0.4 < np.median(ratio) < 2.5
 
 
-def test_the_cloud_settles_on_a_smooth_likelihood() -> None:
+def test_the_cloud_converges_on_a_smooth_likelihood() -> None:
     run, truth = posed(2, 3)
     optimum = refine([run], truth, FREE)
     cloud = sample([run], optimum, np.random.default_rng(1))
     assert cloud.weights.sum() == pytest.approx(1.0)
     assert np.all(cloud.members[:, DV_N] < 0)
     assert np.all(cloud.members[:, F_SN] < 0)
-    if cloud.settled:
+    if cloud.converged:
         center = pack([run], optimum.p, optimum.starts, FREE)
         shift = np.abs(cloud.weights @ cloud.members - center)
         assert np.all(shift < 3 * np.sqrt(np.diag(optimum.covariance)))

@@ -15,9 +15,7 @@ from tests.identification.plants import ACTUATOR, made_log, table
 
 def optimum(p: Array) -> Optimum:
     none = np.zeros((0, 0))
-    return Optimum(
-        p, np.zeros((1, 3)), 0.0, none, np.zeros(0), np.zeros(0, dtype=np.int64), 0, none
-    )
+    return Optimum(p, np.zeros((1, 3)), 0.0, np.zeros(0, dtype=np.int64), 0, none)
 
 
 def test_a_friction_of_nothing_that_a_step_leaves_below_zero_is_nothing() -> None:

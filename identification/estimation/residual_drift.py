@@ -1,4 +1,4 @@
-"""What a fit leaves that is small, but walks: the mark of a bad sample that no one sees.
+"""What a fit leaves that is small, but drifts: the mark of a bad sample that no one sees.
 
 A command that was logged wrong for one sample may move a motor by less than the sensor's noise, but
 for seconds. Sums over stretches show it where no single sample does. Such a part may be all of one
@@ -17,11 +17,11 @@ LEAST_SUMS = 6  # sums of a stretch
 INTERVAL_HALF = 1.96  # deviations in half of an interval
 
 
-def walk_size(residuals: Sequence[Array]) -> float:
+def drift_size(residuals: Sequence[Array]) -> float:
     """Size of the slow part of residuals (n,), in deviations of white noise; 0 where there is none.
 
     The largest over a few lengths of stretch: root of what the squares of their sums have beyond
-    those of noise.
+    those of noise. Ours.
     """
     largest, size = BEYOND_CHANCE, 0.0
     for length in SUMMED:
@@ -44,5 +44,8 @@ def _sums(r: Array, length: int) -> Array:
 
 
 def widened(samples: Array, center: Array, size: float) -> Array:
-    """Sets (k, d) about their center (d,), as wide as a part of this size may have moved them."""
+    """Sets (k, d) about their center (d,), as wide as a part of this size may have moved them.
+
+    Ours: `README.md`, (7).
+    """
     return np.asarray(center + float(np.hypot(1.0, size / INTERVAL_HALF)) * (samples - center))
