@@ -16,7 +16,9 @@ ASTRAY = 3.0  # something is missing, or a measured force's noise has drifted as
 NEARLY_FOLLOWED = 8.0  # not followed, but near
 CHANCE_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
 FORGIVEN_FROM = 4  # windows, of which chance may have spoilt one
-NO_RUN = 50.0  # a run by the measured force is not the body's own motion
+NO_RUN = (
+    50.0  # no run of the body's own motion (of a drifted log: times what the model's own leave)
+)
 LIKE = 4.0  # times the misfit of the active model, where that leaves more than noise
 
 # What the equations' rows leave, in units of their noise (blind.py, chapters.py).
@@ -70,11 +72,8 @@ FOLLOWS_AS_WELL = 1.5  # times the usual error of whole runs, up to which one is
 LEVELS_LEAVE = 0.8  # of a run's error, left at most by Coulomb levels fitted before it
 
 # What a test of a new log must be able to see, or it is inconclusive (drift.py: coarse).
-SEEN = 0.05  # of a Coulomb level, the change that it sees
-SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
+SEEN = 0.03  # of a Coulomb level, beyond the margin that does not matter: the change that it sees
 CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
-LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
-VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
 # What the equation of motion's own least squares are to a fit (real.py).
 WORSE_THAN_EQUATION = 1.05  # times what they leave of the force unseen, that a fit may leave
@@ -99,24 +98,13 @@ BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to
 # What is seen over frequency: responses, modes, a load behind its motor (response.py, notch.py).
 COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
 COHERENCE_SURE = 0.8  # coherence from which it is relied on
-AVERAGES_NEEDED = 4  # independent averages (stretches of all logs), below which it is none
 APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
-POINTS_NEEDED = 30  # of a response, in which modes are looked for
-MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
-MODE_SHARE = 0.15  # of chi-square, the same
-STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
-DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
-MOST_DAMPING = 0.3  # of what is called a resonance
-UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not identified
-POINTS_AROUND = 3  # points close to a peak on either side, that show it,
-MOSTLY_SEEN = 0.5  # and share of the frequencies there
-RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides behind a motor at rest
-LEAVES_LESS = 0.25  # mean logarithm of what is left, by which such a load has to leave less
+STANDS_OUT = 0.4  # of the response, that a resonance adds or an anti-resonance takes away
 
 # What a log identifies of a parameter, and what drives it (nine_parameters.py, chapters.py,
 # drives.py).
 SLIDES_NEEDED = 8  # windows of sliding in each direction, for an axis test
-EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
+EVENTS_NEEDED = 3  # of a kind: breakaways, crossings, averages of a spectrum, points at a peak
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
@@ -133,12 +121,9 @@ ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force 
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well
 
 # Samples excluded from a log (sound_logs.py, bad_samples.py below seed 100); times the noise.
-JUMP_FROM = 10.0  # step of a position beyond its motion, that is a jump
-SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a spike
-RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
-RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
+FAULT_FROM = 9.0  # step of a position, or distance of 1 to 3 samples, that no body can have made
+RUN_FAULT_FROM = 6.0  # the same in what a run that follows the log leaves, in its own deviations
 REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
 RESIDUAL_DRIFTS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
-PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
-SHARE_EXCLUDED = 1e-3  # of its samples, the same
+SHARE_EXCLUDED = 1e-3  # of a log, by the word of a run that follows it but for these samples
