@@ -32,11 +32,11 @@ from scipy.stats import chi2
 
 from benchmarks.blind_effects import SIZES, acting, place_of, shows
 from benchmarks.blind_machines import MACHINES, Machine, drifted, machine, simulated, stream
-from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, stage, turned
+from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, active, stage, turned
 from identification.drift.drift_result import DriftTest
 from identification.drift.drift_test import drift_test
 from identification.drift.own_logs import with_own_logs
-from identification.drift.reference_model import COULOMB, ReferenceModel, in_force
+from identification.drift.reference_model import COULOMB, ReferenceModel
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
@@ -86,7 +86,7 @@ def put_in_force(one: Machine, seed: int) -> ReferenceModel:
     log = simulated(one, (), seed, "model", MODEL).log
     fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
     fastest = float(np.quantile(np.abs(np.gradient(log["y"], log.h)), 0.99))
-    model = in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
+    model = active(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
     return with_own_logs(model, [log], np.random.default_rng(seed))
 
 
@@ -213,7 +213,7 @@ def lacking(seed: int) -> list[Outcome]:
     """Logs of a stage as it was and worn, under a model that lacks its Stribeck dip."""
     logs = [stage(seed, k) for k in range(3)]
     fit = fit_plant(logs, np.random.default_rng(seed), rig=STAGE_RIG)
-    model = in_force(fit, STAGE_RIG, key=f"stage{seed}", fastest=speed_of(logs))
+    model = active(fit, STAGE_RIG, key=f"stage{seed}", fastest=speed_of(logs))
     model = with_own_logs(model, logs, np.random.default_rng(seed))
     told = sum(one.value is not None for one in fit.estimates.values())
     print(f"  stage {seed}: {told} of 9 identified, chi-square {fit.chi_square:.3g}")
@@ -231,7 +231,7 @@ def unseen(seed: int) -> list[Outcome]:
     """Ten logs of a rotary motor whose Coulomb friction creeps up by 5 %."""
     logs = [turned(seed, k, seconds=12.0) for k in range(3)]
     fit = fit_plant(logs, np.random.default_rng(seed), rig=TURNED_RIG)
-    model = in_force(fit, TURNED_RIG, key=f"rotary{seed}", fastest=speed_of(logs))
+    model = active(fit, TURNED_RIG, key=f"rotary{seed}", fastest=speed_of(logs))
     model = with_own_logs(model, logs, np.random.default_rng(seed))
     out = []
     last: DriftTest | None = None

@@ -1,4 +1,4 @@
-"""Machines of `drift`'s hard parts, by the plain Euler steps of `outside_rig`.
+"""Machines of `drift`'s hard parts, by the plain Euler steps of `outside_rig`; active models.
 
 A motor stage with a Stribeck dip, whose model has none, behind an encoder of 1 um at 1 kHz; and a
 rotary motor whose logs are short, slow and noisy, so that they hardly tell its friction.
@@ -8,7 +8,11 @@ import numpy as np
 
 from benchmarks.outside_rig import K_A, LENGTHS, RIGS, SIZES, reference, run
 from identification.arrays import Array
+from identification.drift.reference_model import ReferenceModel
+from identification.estimation.windowed_run.parameters import values_of
 from identification.log import Log, Rig
+from identification.model.estimates import KarnoppFit
+from identification.model.plant import Plant
 
 STAGE = np.array([5.0, 8.0, 7.5, 80.0, 70.0, 0.006, -0.006, 11.0, -10.5])
 DIP, DIP_SPEED = 0.3, 0.02  # N, m/s
@@ -58,3 +62,14 @@ def turned(seed: int, number: int, drifted: float = 1.0, seconds: float = 4.0) -
     return Log(
         f"turned{number}", {"t": h * np.arange(len(r), dtype=np.float64), "y": y, "u": u, "F": F}
     )
+
+
+def active(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> ReferenceModel:
+    """A fit as the active model; fastest [m/s]: speed in its logs, 0 if unknown."""
+    plant = Plant(fit.friction, fit.actuator, fit.effects)
+    return ReferenceModel(
+        plant, fit.free, values_of(plant, fit.free), fit.covariance, rig, fit.drive,
+        chi_square=fit.chi_square, imposed=fit.imposed,
+        untold={name: one.reason or "" for name, one in fit.estimates.items() if not one.known},
+        key=key, fastest=fastest,
+    )  # fmt: skip

@@ -43,11 +43,8 @@ WORSE = 1.05  # from which it is clearly worse: than the equation of motion, tha
 CARRIED = 2.0  # of test logs over training logs, up to which a model carries over
 
 # What a test of a new log must be able to see, or it is inconclusive (drift.py: coarse).
-SEEN = 0.05  # of a Coulomb level, the change that it sees
-SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
+SEEN = 0.03  # of a Coulomb level, beyond the margin that does not matter: the change that it sees
 CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
-LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
-VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
 # What acts beside the applied force and is taken out first (real.py: rigs and cases).
 LAG_FROM = 0.4  # samples, from which motion and force are not of one instant
@@ -58,24 +55,13 @@ BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to
 # What is seen over frequency: responses, modes, a load behind its motor (response.py, notch.py).
 COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
 COHERENCE_SURE = 0.8  # coherence from which it is relied on
-AVERAGES_NEEDED = 4  # independent averages (stretches of all logs), below which it is none
 APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
-POINTS_NEEDED = 30  # of a response, in which modes are looked for
-MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
-MODE_SHARE = 0.15  # of chi-square, the same
-STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
-DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
-MOST_DAMPING = 0.3  # of what is called a resonance
-UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not identified
-POINTS_AROUND = 3  # points close to a peak on either side, that show it,
-MOSTLY_SEEN = 0.5  # and share of the frequencies there
-RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides behind a motor at rest
-LEAVES_LESS = 0.25  # mean logarithm of what is left, by which such a load has to leave less
+STANDS_OUT = 0.4  # of the response, that a resonance adds or an anti-resonance takes away
 
 # What a log identifies of a parameter, and what drives it (nine_parameters.py, chapters.py,
 # drives.py).
 SLIDES_NEEDED = 8  # windows of sliding in each direction, for an axis test
-EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
+EVENTS_NEEDED = 3  # of a kind: breakaways, crossings, averages of a spectrum, points at a peak
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to identify friction of speed alone
@@ -84,10 +70,7 @@ JITTER_FROM = 0.5  # times the position's noise at rest, that of a jittering clo
 ACTUATOR_SHARE = 0.02  # of the force, that an actuator leaves which is no linear one
 
 # Samples excluded from a log (sound_logs.py, bad_samples.py below seed 100); times the noise.
-JUMP_FROM = 10.0  # step of a position beyond its motion, that is a jump
-SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a spike
-RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
-RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
+FAULT_FROM = 9.0  # step of a position, or distance of 1 to 3 samples, that no body can have made
+RUN_FAULT_FROM = 6.0  # the same in what a run that follows the log leaves, in its own deviations
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
-PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
-SHARE_EXCLUDED = 1e-3  # of its samples, the same
+SHARE_EXCLUDED = 1e-3  # of a log, by the word of a run that follows it but for these samples

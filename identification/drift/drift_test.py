@@ -4,7 +4,7 @@ The log's own parameters come from its fit, begun from the active model (`log_es
 change counts by how far it lies beyond a practical margin, and beyond how much the machine varies
 from log to log anyhow, in the covariance of everything that is unsure: the log's fit and the
 model's (`single_log`). How sure both are is estimated by the model's own logs where it left more
-than noise of them (`own_misfit`): a machine that it never followed has not changed for that. A
+than noise of them (`own_logs`): a machine that it never followed has not changed for that. A
 second statistic over the logs since the model became active (`mewma`) finds what changes slowly.
 
 A log that no parameters bring the model to follow is said to have another structure; that is no
@@ -23,21 +23,19 @@ from identification.drift.drift_result import DriftTest, DriftVerdict, FoundBy, 
 from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
 from identification.drift.mewma import (
     DriftState,
-    Mean,
     chart_limit,
     fresh_state,
     mean_change,
     taken_in,
     variation,
 )
-from identification.drift.own_misfit import own_misfit
-from identification.drift.practical_margin import discriminated, explained_change, moved
+from identification.drift.own_logs import own_misfit
+from identification.drift.practical_margin import Change
 from identification.drift.reference_model import COULOMB, ReferenceModel
-from identification.drift.single_log import LogChange, detectable_alone, detectable_together
+from identification.drift.single_log import LogChange, detectable_together
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
-from identification.model.karnopp import NAMES
-from identification.thresholds import SEEN, SEEN_MARGINS, VANISHED
+from identification.thresholds import SEEN
 
 Z_95 = float(norm.isf(0.025))
 
@@ -74,7 +72,7 @@ class DriftSettings:
     def to_be_seen(self) -> float:
         """Relative change that a log must be able to show, or it is inconclusive on the
         parameter."""
-        return max(SEEN, SEEN_MARGINS * self.margin)
+        return self.margin + SEEN
 
 
 def drift_test(
@@ -110,7 +108,7 @@ def estimate_under_test(
     model: ReferenceModel, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""
-    change, own, _ = relative_change(model, found)
+    change, own = relative_change(model, found)
     misfit = own_misfit(model)
     if misfit.has_lost_its_way(found.chi_square):
         why = (
@@ -120,10 +118,11 @@ def estimate_under_test(
         )
         return _silent(log, "not_judged", why, {}, found, state)
     own = misfit.of_log(own, found.chi_square)
-    in_force = misfit.of_model(model.covariance / np.outer(model.scales, model.scales))
+    of_model = misfit.of_model(model.relative_covariance)
     varied = variation(state, settings.variation)
-    measured = own + in_force
-    reasons = _inconclusive(model, found, log, (change, measured + np.diag(varied)), settings)
+    measured = own + of_model
+    sd = np.sqrt(np.diag(measured) + varied)
+    reasons = _inconclusive(model, found, log, sd, settings.widest)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
         first = next(iter(reasons.values()), "")
@@ -131,11 +130,10 @@ def estimate_under_test(
         return _silent(log, "not_judged", why, reasons, found, state)
     at = np.flatnonzero(told)
     here = LogChange(
-        tuple(int(i) for i in at), change[at], measured[np.ix_(at, at)], varied[at],
-        settings.margin,
-    )  # fmt: skip
+        tuple(at.tolist()), change[at], measured[np.ix_(at, at)], varied[at], settings.margin
+    )
     after = taken_in(state, change, own, told, settings.smoothing, varied)
-    over = mean_change(after, in_force, settings.margin)
+    over = mean_change(after, of_model, settings.margin)
     tests = _tests(here, over, settings)
     by = tests.found_by
     which, unsure = _moved(model, over if by == "mean" else here.nearer, here) if by else ((), ())
@@ -166,7 +164,7 @@ class _Tests:
     """The three statistics of a log: of all parameters, of the largest one, of the mean."""
 
     here: LogChange
-    over: Mean
+    over: Change
     single: Statistic
     alone: Statistic
     mean: Statistic
@@ -180,17 +178,11 @@ class _Tests:
 
     def could_have_seen(self, names: Sequence[str]) -> dict[str, float]:
         """Smallest change of each parameter of the log that one of the three sees."""
-        here, over = self.here, self.over
-        of_log = np.min(
-            [
-                detectable_alone(here, self.alone.threshold),
-                np.maximum(
-                    detectable_together(here.beyond_margin, self.single.threshold),
-                    detectable_together(here.beyond_usual, self.single.threshold),
-                ),
-            ],
-            axis=0,
+        here, over, square = self.here, self.over, self.single.threshold
+        together = np.maximum(
+            *(detectable_together(one, square) for one in (here.beyond_margin, here.beyond_usual))
         )
+        of_log = np.minimum(here.detectable_alone(self.alone.threshold), together)
         lasting = dict(zip(over.at, detectable_together(over, self.mean.threshold), strict=True))
         return {
             names[i]: float(min(size, lasting.get(i, np.inf)))
@@ -198,22 +190,20 @@ class _Tests:
         }
 
 
-def _tests(here: LogChange, over: Mean, settings: DriftSettings) -> _Tests:
+def _tests(here: LogChange, over: Change, settings: DriftSettings) -> _Tests:
     """The statistics: half of the false alarms are the mean's, a quarter each of the others'."""
     d, quarter = len(here.at), 0.25 / settings.run_length
     largest = float(np.max(here.alone) ** 2)
-    alone = Statistic(
-        largest, float(chi2.isf(quarter / d, 1)), min(1.0, d * float(chi2.sf(largest, 1))), d
-    )
-    mean = _statistic(
-        over, chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
-    )
-    return _Tests(here, over, _statistic(here.nearer, float(chi2.isf(quarter, d))), alone, mean)
+    p_value = min(1.0, d * float(chi2.sf(largest, 1)))
+    alone = Statistic(largest, float(chi2.isf(quarter / d, 1)), p_value, d)
+    limit = chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
+    single = _statistic(here.nearer, float(chi2.isf(quarter, d)))
+    return _Tests(here, over, single, alone, _statistic(over, limit))
 
 
-def at_bound(change: float) -> bool:
-    """Whether a friction parameter or a mass has vanished by its fit, which none does."""
-    return change <= -VANISHED
+def _statistic(found: Change, threshold: float) -> Statistic:
+    d = len(found.at)
+    return Statistic(found.square, threshold, float(chi2.sf(found.square, d)), d)
 
 
 def too_coarse(
@@ -226,14 +216,11 @@ def too_coarse(
     """
     limit = settings.to_be_seen
     asked = [name for name in COULOMB if name in model.names and name not in model.untold]
-    sizes = [seen.get(name, float("inf")) for name in asked]
-    if asked and max(sizes) <= limit:
+    if max([seen.get(name, np.inf) for name in asked] or [min(seen.values())]) <= limit:
         return ""
-    if not asked and min(seen.values()) <= limit:
-        return ""
-    names = asked or list(seen)
     said = ", ".join(
-        f"{name} {100 * seen[name]:.2g} %" if name in seen else f"{name} none" for name in names
+        f"{name} {100 * seen[name]:.2g} %" if name in seen else f"{name} none"
+        for name in asked or seen
     )
     return (
         f"{log}: no alarm, but a change of {100 * limit:.3g} % is below the minimum detectable"
@@ -243,38 +230,28 @@ def too_coarse(
 
 
 def _inconclusive(
-    model: ReferenceModel, found: LogEstimate, log: str, seen: tuple[Array, Array],
-    settings: DriftSettings,
-) -> dict[str, str]:  # fmt: skip
-    """Parameters on which this log is inconclusive, with the reason; seen: the change (d,) and its
-    covariance (d, d)."""
-    change, covariance = seen
+    model: ReferenceModel, found: LogEstimate, log: str, deviations: Array, widest: float
+) -> dict[str, str]:
+    """Parameters on which this log is inconclusive, with the reason; deviations (d,) of their
+    changes, and the widest that is allowed."""
     out: dict[str, str] = {}
-    for i, name in enumerate(model.names):
-        sd = float(np.sqrt(covariance[i, i]))
+    for name, sd in zip(model.names, deviations, strict=True):
         if name in model.untold:
             out[name] = f"not identified in the active model ({model.untold[name]})"
-        elif name not in found.names:
-            out[name] = found.untold.get(name, f"{log}: not identifiable from this log")
         elif name in found.untold:
             out[name] = found.untold[name]
-        elif name in NAMES and at_bound(float(change[i])):
-            out[name] = f"{log}: found next to 0, where a fit's deviation says nothing of it"
-        elif not sd <= settings.widest:
+        elif name not in found.names:
+            out[name] = f"{log}: not identifiable from this log"
+        elif not sd <= widest:
             out[name] = (
                 f"{log}: a change of it is known to {100 * sd:.2g} % only, at most"
-                f" {100 * settings.widest:.2g} % needed; excite it more, or log for longer"
+                f" {100 * widest:.2g} % needed; excite it more, or log for longer"
             )
     return {**{n: r for n, r in model.untold.items() if n not in model.names}, **out}
 
 
-def _statistic(found: Mean, threshold: float) -> Statistic:
-    square = found.distance.square
-    return Statistic(square, threshold, float(chi2.sf(square, len(found.at))), len(found.at))
-
-
 def _moved(
-    model: ReferenceModel, found: Mean, log: LogChange
+    model: ReferenceModel, found: Change, log: LogChange
 ) -> tuple[tuple[Shift, ...], tuple[str, ...]]:
     """Parameters that surely changed, largest first, by how much on this log; and the names of
     those that may have.
@@ -282,51 +259,43 @@ def _moved(
     The mean over the logs, where that found it, lags behind what drifts: it names the parameters,
     and sizes them only where this log is inconclusive on them or shows less.
     """
-    here = log.nearer
-    chosen = moved(found.change, found.covariance, found.margin)
-    sure, unsure = discriminated(found.change, found.covariance, found.margin, chosen)
-    names = {found.at[k] for k in sure}
-    size_here = dict(zip(here.at, np.abs(here.change).tolist(), strict=True))
-    size_mean = dict(zip(found.at, np.abs(found.change).tolist(), strict=True))
-    sized = here if all(size_here.get(i, 0.0) >= size_mean[i] for i in names) else found
-    all_moved = {found.at[k] for k in chosen}
+    chosen = found.moved()
+    sure, unsure = found.discriminated(chosen)
+    names, all_moved = ({found.at[k] for k in some} for some in (sure, chosen))
+    here, mean = (
+        dict(zip(one.at, np.abs(one.change).tolist(), strict=True)) for one in (log.nearer, found)
+    )
+    sized = log.nearer if all(here.get(i, 0.0) >= mean[i] for i in names) else found
     explain = tuple(k for k, i in enumerate(sized.at) if i in all_moved)
-    size, covariance = explained_change(sized.change, sized.covariance, sized.margin, explain)
+    size, covariance = sized.explained(explain)
     out = [
-        _shift(model, sized.at[k], float(size[n]), float(np.sqrt(covariance[n, n])))
-        for n, k in enumerate(explain)
+        _shift(model, sized.at[k], *each)
+        for k, *each in zip(explain, size.tolist(), _deviations(covariance), strict=True)
         if sized.at[k] in names
     ]
     shifts = tuple(sorted(out, key=lambda one: -abs(one.change)))
     return shifts, tuple(model.names[found.at[k]] for k in unsure)
 
 
-def _shifts(model: ReferenceModel, found: Mean) -> dict[str, Shift]:
+def _shifts(model: ReferenceModel, found: Change) -> dict[str, Shift]:
     """Every tested parameter by itself."""
-    sd = np.sqrt(np.diag(found.covariance))
-    return {
-        model.names[i]: _shift(model, i, float(found.change[k]), float(sd[k]))
-        for k, i in enumerate(found.at)
-    }
+    each = zip(found.at, found.change.tolist(), _deviations(found.covariance), strict=True)
+    return {model.names[i]: _shift(model, i, change, sd) for i, change, sd in each}
+
+
+def _deviations(covariance: Array) -> list[float]:
+    return [float(sd) for sd in np.sqrt(np.diag(covariance))]
 
 
 def _shift(model: ReferenceModel, i: int, change: float, sd: float) -> Shift:
-    scale = float(model.scales[i])
-    before = float(model.values[i])
-    sign = -1.0 if before < 0 else 1.0
-    name = model.names[i]
+    """The shift of parameter i, of relative change and deviation."""
+    name, before = model.names[i], float(model.values[i])
+    scale, before_sd = float(model.scales[i]), float(np.sqrt(model.covariance[i, i]))
+    after = before + (-scale if before < 0 else scale) * change
     return Shift(
-        name=name,
-        unit=model.units[name],
-        before=before,
-        before_sd=float(np.sqrt(model.covariance[i, i])),
-        after=before + sign * scale * change,
-        after_sd=scale * sd,
-        change=change,
-        sd=sd,
-        low=change - Z_95 * sd,
-        high=change + Z_95 * sd,
-    )
+        name, model.units[name], before, before_sd, after, scale * sd, change, sd,
+        low=change - Z_95 * sd, high=change + Z_95 * sd,
+    )  # fmt: skip
 
 
 def _silent(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array
 from identification.drift.reference_model import ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
@@ -61,30 +61,22 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
     return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
 
 
-def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array, BoolArray]:
-    """Change (d,) of the model's parameters in their scales, positive where the size grows, its
-    covariance (d, d) without the model's own error, and which of them (d,) the log identifies."""
-    sign = np.where(model.values < 0, -1.0, 1.0)
-    factor = sign / model.scales
-    place = {name: i for i, name in enumerate(found.names)}
-    d = len(model.names)
-    change, covariance, told = np.zeros(d), np.zeros((d, d)), np.zeros(d, dtype=np.bool_)
-    at = [(i, place[name]) for i, name in enumerate(model.names) if name in place]
-    rows, columns = [i for i, _ in at], [k for _, k in at]
-    change[rows] = (found.values[columns] - model.values[rows]) * factor[rows]
-    outer = np.outer(factor, factor)
-    covariance[np.ix_(rows, rows)] = (
-        found.covariance[np.ix_(columns, columns)] * outer[np.ix_(rows, rows)]
-    )
-    told[rows] = [
-        found.names[k] not in found.untold and model.names[i] not in model.untold for i, k in at
-    ]
-    return change, covariance, told
+def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array]:
+    """Change (d,) of the model's parameters in their scales, positive where the size grows, and its
+    covariance (d, d) without the model's own error; 0 of what the log's fit does not have."""
+    change, covariance = np.zeros(len(model.names)), np.zeros((len(model.names),) * 2)
+    rows = [i for i, name in enumerate(model.names) if name in found.names]
+    columns = [found.names.index(model.names[i]) for i in rows]
+    factor = np.where(model.values[rows] < 0, -1.0, 1.0) / model.scales[rows]
+    change[rows] = (found.values[columns] - model.values[rows]) * factor
+    own = found.covariance[np.ix_(columns, columns)]
+    covariance[np.ix_(rows, rows)] = own * np.outer(factor, factor)
+    return change, covariance
 
 
-def allowed_misfit(in_force: float) -> float:
-    """Misfit up to which a log's run is followed; in_force: what the model left of its own."""
-    return ASTRAY * max(in_force, 1.0)
+def allowed_misfit(active: float) -> float:
+    """Misfit up to which a log's run is followed; active: what the model left of its own."""
+    return ASTRAY * max(active, 1.0)
 
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:

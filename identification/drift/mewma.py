@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
 from identification.arrays import Array, BoolArray
-from identification.drift.practical_margin import Distance, beyond_margin
+from identification.drift.practical_margin import Change
 from identification.errors import BadModel
 
 RINGS = 60  # states of the Markov chain
@@ -69,7 +69,8 @@ def variation(state: DriftState, stated: float) -> Array:
     """Variance (d,) of the machine's parameters from log to log, relative.
 
     The stated standard deviation counts as PRIOR_LOGS differences of successive logs, beside those
-    that were seen. Differences of neighbours hold little of a slow drift.
+    that were seen. Differences of neighbours hold little of a slow drift: von Neumann and others,
+    Ann. Math. Statist. 12 (1941) 153.
     """
     squares, pairs = np.array(state.squares), np.array(state.pairs, dtype=np.float64)
     weight = PRIOR_LOGS + pairs
@@ -110,37 +111,18 @@ def taken_in(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Mean:
-    """The mean change (k,) over the logs, its covariance (k, k), margin (k,), and which of the
-    state's parameters these are."""
+def mean_change(state: DriftState, model: Array, margin: float) -> Change:
+    """The mean change, as far as logs have tested it; model (d, d): covariance of the active
+    model's own error, which does not average out.
 
-    at: tuple[int, ...]
-    change: Array
-    covariance: Array
-    margin: Array
-
-    @property
-    def distance(self) -> Distance:
-        """How far the mean lies beyond the margin."""
-        return beyond_margin(self.change, self.covariance, self.margin)
-
-
-def mean_change(state: DriftState, in_force: Array, margin: float) -> Mean:
-    """The mean change, as far as logs have tested it; in_force (d, d): the model's own error.
-
-    While few logs have been seen only a part of the weight is reached: change, margin and error
-    are those of the part.
+    While few logs have been seen only a part of the weight is reached: change and error are those
+    of the part.
     """
-    weight = np.array(state.weight)
-    at = np.flatnonzero(weight > 0)
-    w = weight[at]
-    grid = np.ix_(at, at)
-    covariance = np.array(state.covariance)[grid] + np.outer(w, w) * in_force[grid]
-    return Mean(
-        tuple(int(i) for i in at), np.array(state.mean)[at] / w,
-        covariance / np.outer(w, w), np.full(len(at), margin),
-    )  # fmt: skip
+    at = np.flatnonzero(np.array(state.weight) > 0)
+    w, grid = np.array(state.weight)[at], np.ix_(at, at)
+    covariance = np.array(state.covariance)[grid] / np.outer(w, w) + model[grid]
+    numbers = tuple(int(i) for i in at)
+    return Change(numbers, np.array(state.mean)[at] / w, covariance, np.full(len(at), margin))
 
 
 def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
@@ -149,13 +131,12 @@ def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
     parameters: number of them; smoothing: the weight of the newest log. Of a chart whose logs have
     unit covariance; a margin only makes alarms rarer.
     """
-    low = float(chi2.isf(0.5, parameters))
-    high = float(chi2.isf(1e-3 / run_length, parameters))
-    return float(
-        brentq(
-            lambda h: np.log(mean_run(parameters, smoothing, h) / run_length), low, high, rtol=1e-4
-        )
-    )
+    low, high = (float(chi2.isf(x, parameters)) for x in (0.5, 1e-3 / run_length))
+
+    def too_long(square: float) -> float:
+        return float(np.log(mean_run(parameters, smoothing, square) / run_length))
+
+    return float(brentq(too_long, low, high, rtol=1e-4))
 
 
 def mean_run(parameters: int, smoothing: float, square: float) -> float:

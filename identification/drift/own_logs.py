@@ -6,17 +6,18 @@ logs that the model comes from; each is estimated alone, in the same way as a ne
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.stats import chi2
 
 from identification.arrays import Array
 from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
 from identification.drift.reference_model import OwnLogs, ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.log import Log
-from identification.thresholds import COMPLETE
+from identification.thresholds import ADEQUATE, ASTRAY, CHANCE_LEVEL, COMPLETE, HOPELESS
 
 LOG_PARTS = 3  # stretches of a single log
 LEAST_STRETCH = 3.0  # s, of a stretch that is informative by itself
@@ -33,9 +34,8 @@ def with_own_logs(
     parts = len(logs) == 1
     if parts and model.chi_square <= COMPLETE:
         return model
-    tried = _stretches(logs[0]) if parts else list(logs)
     found = []
-    for log in tried:
+    for log in _stretches(logs[0]) if parts else logs:
         try:
             found.append(estimate_log(model, log, rng))
         except NotIdentifiable:
@@ -54,22 +54,18 @@ def own_logs_of(
     model: ReferenceModel, found: Sequence[LogEstimate], parts: bool = False
 ) -> OwnLogs:
     """How far the estimates of a model's own logs, two at least, lie from it."""
-    scale = np.outer(model.scales, model.scales)
     changes, apart = [], []
     for one in found:
-        change, own, told = relative_change(model, one)
+        change, own = relative_change(model, one)
+        told = np.array([n in one.names and n not in one.untold and n not in model.untold
+                         for n in model.names], dtype=np.bool_)  # fmt: skip
         at = np.flatnonzero(told)
-        both = (own + model.covariance / scale)[np.ix_(at, at)]
+        both = (own + model.relative_covariance)[np.ix_(at, at)]
         square = float(change[at] @ np.linalg.solve(both, change[at])) if len(at) else 0.0
         apart.append(square / max(len(at), 1))
         changes.append(np.where(told, change, np.nan))
-    return OwnLogs(
-        names=model.names,
-        scatter=_root_mean_square(changes),
-        apart=tuple(apart),
-        left=tuple(one.chi_square for one in found),
-        parts=parts,
-    )
+    left = tuple(one.chi_square for one in found)
+    return OwnLogs(model.names, _root_mean_square(changes), tuple(apart), left, parts)
 
 
 def _root_mean_square(rows: Sequence[Array]) -> tuple[float | None, ...]:
@@ -78,3 +74,63 @@ def _root_mean_square(rows: Sequence[Array]) -> tuple[float | None, ...]:
     square = np.sum(np.where(known, np.square(rows), 0.0), axis=0)
     count = np.sum(known, axis=0)
     return tuple(float(np.sqrt(s / n)) if n else None for s, n in zip(square, count, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class OwnMisfit:
+    """What a model's own logs say of the covariances of a log's and of the model's fit.
+
+    factor: on both; scatter (d,): variance of each parameter that its own logs show, relative;
+    logs: number of them; left: misfit that fits of one of them leave, at most, infinite where that
+    is not known.
+    """
+
+    factor: float
+    scatter: Array
+    logs: int
+    left: float
+
+    def has_lost_its_way(self, misfit: float) -> bool:
+        """Whether a log's fit leaves so much beside those of the model's own logs that it says
+        nothing of the parameters."""
+        return misfit > HOPELESS * self.left
+
+    def of_log(self, own: Array, misfit: float) -> Array:
+        """Covariance (d, d) of a log's errors, by that of its fit and the misfit this leaves.
+
+        A fit that leaves more than those of the model's own logs is near to losing its way, or the
+        log has something more in it: it says as much less of the parameters.
+        """
+        lost = max(1.0, misfit / (ASTRAY * self.left))
+        return lost * _at_least(self.factor * own, self.scatter)
+
+    def of_model(self, own: Array) -> Array:
+        """Covariance (d, d) of the model's errors, by that of its fit."""
+        return _at_least(self.factor * own, self.scatter / self.logs)
+
+
+def _at_least(covariance: Array, variance: Array) -> Array:
+    """The covariance (d, d) with variances of at least these (d,)."""
+    return np.asarray(covariance + np.diag(np.maximum(variance - np.diag(covariance), 0.0)))
+
+
+def own_misfit(model: ReferenceModel) -> OwnMisfit:
+    """Of the model's own logs; nothing where it left noise alone, or they are not known.
+
+    These logs were among those that the model was fitted on: a new one lies farther from it, as
+    one that is left out does. Their distance is that of a few, and could be small by chance: so it
+    is taken as large as it may well be. A fit that leaves noise alone is never surer than it says.
+    """
+    found, d = model.own_logs, len(model.names)
+    if found is None:
+        return OwnMisfit(1.0, np.zeros(d), 1, float("inf"))
+    n, known = len(found.left), dict(zip(found.names, found.scatter, strict=True))
+    left_out = (n + 1.0) / (n - 1.0)
+    factor = left_out * float(np.mean(found.apart))
+    if model.chi_square <= ADEQUATE:
+        factor = max(1.0, factor)
+    else:
+        freedom = (n - 1.0) * max(1, sum(x is not None for x in found.scatter))
+        factor *= freedom / float(chi2.ppf(CHANCE_LEVEL, freedom))
+    scatter = np.array([known.get(name) or 0.0 for name in model.names])
+    return OwnMisfit(factor, left_out * scatter**2, n, max(*found.left, 1.0))

@@ -2,10 +2,13 @@
 
 A change counts by how far it lies outside the box of changes that do not matter, measured in the
 covariance of what is known. So a change must be both sure and larger than the margin: a long log
-makes no negligible change significant, and a poor log none of its accidents.
+makes no negligible change significant, and a poor log none of its accidents. Sources: distance to a
+set of means as a test, Kudo, Biometrika 50 (1963) 403; least squares in a box, Stark, Parker,
+Computational Statistics 10 (1995) 129.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -17,95 +20,93 @@ from identification.thresholds import CHANCE_LEVEL
 
 
 @dataclass(frozen=True, eq=False)
-class Distance:
-    """Square distance of changes to the margin's box, and the nearest point (d,) of the box."""
+class Change:
+    """Changes (k,) of the parameters numbered `at`, their covariance (k, k), and the margin (k,)
+    within which each does not matter."""
 
-    square: float
-    nearest: Array
+    at: tuple[int, ...]
+    change: Array
+    covariance: Array
+    margin: Array
 
+    @cached_property
+    def square(self) -> float:
+        """How far it lies beyond the margin; without a change beyond it at most chi-square of k
+        degrees in distribution (Kudo 1963)."""
+        return self.without(())
 
-def beyond_margin(
-    change: Array, covariance: Array, margin: Array, free: tuple[int, ...] = ()
-) -> Distance:
-    """Least (change - x)' covariance^-1 (change - x) over x with |x| <= margin.
+    def without(self, free: tuple[int, ...]) -> float:
+        """The same where these entries may be of any size."""
+        return self._nearest(free)[0]
 
-    change, margin (d,), covariance (d, d); free: indices of x without a bound. Without any true
-    change beyond the margin it is at most chi-square of d - len(free) degrees in distribution.
-    """
-    if not len(change):
-        return Distance(0.0, np.zeros(0))
-    A = np.linalg.inv(np.linalg.cholesky(covariance))
-    if not np.any(margin) and not free:
-        return Distance(float(np.sum((A @ change) ** 2)), np.zeros(len(change)))
-    bound = margin.astype(np.float64).copy()
-    bound[list(free)] = np.inf
-    inside = np.clip(change, -bound, bound)
-    if np.array_equal(inside, change):
-        return Distance(0.0, inside)
-    # A margin of no width is a box all the same to the solver, if a very thin one.
-    bound = np.maximum(bound, 1e-12)
-    found = lsq_linear(A, A @ change, bounds=(-bound, bound), method="bvls", tol=1e-12)
-    return Distance(float(np.sum((A @ (change - found.x)) ** 2)), np.asarray(found.x))
+    def moved(self) -> tuple[int, ...]:
+        """The fewest entries that explain the change, largest gain first.
 
+        The others may lie anywhere within the margin. One at a time is set free, the one that
+        brings the distance down most, as long as it does so surely; then those are taken back that
+        the rest makes needless. Parameters that a log cannot separate do not all move.
+        """
+        d, left = len(self.at), self.square
+        chosen: list[int] = []
+        while left > 0.0 and len(chosen) < d:
+            tried = {i: self.without((*chosen, i)) for i in range(d) if i not in chosen}
+            best = min(tried, key=lambda i: tried[i])
+            if left - tried[best] < self._sure and chosen:
+                break
+            chosen.append(best)
+            left = tried[best]
+        for i in tuple(chosen):
+            rest = tuple(j for j in chosen if j != i)
+            more = self.without(rest)
+            if rest and more - left < self._sure:
+                chosen.remove(i)
+                left = more
+        return tuple(chosen)
 
-def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
-    """Indices of the fewest parameters whose change explains `change` (d,), largest gain first.
+    def discriminated(self, chosen: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Those of `chosen` that surely moved, and the group of which others may have instead.
 
-    The others may lie anywhere within the margin. One at a time is set free, the one that brings
-    the distance down most, as long as it does so surely; then those are taken back that the rest
-    makes needless. Parameters that a log cannot separate do not all move.
-    """
-    d = len(change)
-    sure = float(chi2.isf(CHANCE_LEVEL / max(d, 1), 1))
-    chosen: list[int] = []
-    left = beyond_margin(change, covariance, margin).square
-    while left > 0.0 and len(chosen) < d:
-        tried = {
-            i: beyond_margin(change, covariance, margin, (*chosen, i)).square
-            for i in range(d)
-            if i not in chosen
-        }
-        best = min(tried, key=lambda i: tried[i])
-        if left - tried[best] < sure and chosen:
-            break
-        chosen.append(best)
-        left = tried[best]
-    for i in tuple(chosen):
-        without = tuple(j for j in chosen if j != i)
-        if without and beyond_margin(change, covariance, margin, without).square - left < sure:
-            chosen.remove(i)
-            left = beyond_margin(change, covariance, margin, without).square
-    return tuple(chosen)
-
-
-def discriminated(
-    change: Array, covariance: Array, margin: Array, chosen: tuple[int, ...]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Those of `chosen` that surely moved, and the group of which others may have in their place.
-
-    Surely: beyond the margin by its own deviation, in which what goes together with the others is.
-    Of the rest nobody can say: with them go the parameters that would explain the change as well.
-    """
-    d = len(change)
-    square = float(chi2.isf(CHANCE_LEVEL / max(d, 1), 1))
-    beyond = np.maximum(np.abs(change) - margin, 0.0) ** 2 / np.diag(covariance)
-    sure = tuple(i for i in chosen if beyond[i] >= square)
-    unsure = [i for i in chosen if i not in sure]
-    left = beyond_margin(change, covariance, margin, chosen).square
-    group = {*unsure, *(i for i in range(d) if unsure and beyond[i] >= square and i not in sure)}
-    for i, j in product(unsure, range(d)):
-        if j not in chosen:
+        Surely: beyond the margin by its own deviation, in which what goes together with the others
+        is. Of the rest nobody can say: with them go those that would explain the change as well.
+        """
+        beyond = np.maximum(np.abs(self.change) - self.margin, 0.0) ** 2
+        surely = beyond >= self._sure * np.diag(self.covariance)
+        sure = tuple(i for i in chosen if surely[i])
+        unsure = [i for i in chosen if not surely[i]]
+        left = self.without(chosen)
+        d = range(len(self.at))
+        group = {*unsure, *(i for i in d if unsure and surely[i] and i not in sure)}
+        for i, j in product(unsure, d):
             other = (*(k for k in chosen if k != i), j)
-            if beyond_margin(change, covariance, margin, other).square - left < square:
+            if j not in chosen and self.without(other) - left < self._sure:
                 group.add(j)
-    return sure, tuple(sorted(group))
+        return sure, tuple(sorted(group))
 
+    def explained(self, chosen: tuple[int, ...]) -> tuple[Array, Array]:
+        """Change (c,) of the chosen entries and its covariance (c, c), the others in the margin."""
+        at = list(chosen)
+        precision = np.linalg.inv(self.covariance)[np.ix_(at, at)]
+        return self._nearest(chosen)[1][at], np.linalg.inv(precision)
 
-def explained_change(
-    change: Array, covariance: Array, margin: Array, chosen: tuple[int, ...]
-) -> tuple[Array, Array]:
-    """Change (k,) of the chosen parameters and its covariance (k, k), the others in the margin."""
-    at = list(chosen)
-    found = beyond_margin(change, covariance, margin, chosen).nearest[at]
-    precision = np.linalg.inv(covariance)[np.ix_(at, at)]
-    return found, np.linalg.inv(precision)
+    @property
+    def _sure(self) -> float:
+        """Gain in square distance of one entry of k that is no chance (Bonferroni)."""
+        return float(chi2.isf(CHANCE_LEVEL / max(len(self.at), 1), 1))
+
+    def _nearest(self, free: tuple[int, ...]) -> tuple[float, Array]:
+        """Least (change - x)' covariance^-1 (change - x) over x with |x| <= margin, unbounded in
+        the entries `free`, and that x (k,)."""
+        if not len(self.change):
+            return 0.0, np.zeros(0)
+        bound = np.array(self.margin, dtype=np.float64)
+        bound[list(free)] = np.inf
+        inside = np.clip(self.change, -bound, bound)
+        if np.array_equal(inside, self.change):
+            return 0.0, inside
+        A = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        if not np.any(bound):
+            return float(np.sum((A @ self.change) ** 2)), inside
+        # A margin of no width is a box all the same to the solver, if a very thin one.
+        bound = np.maximum(bound, 1e-12)
+        found = lsq_linear(A, A @ self.change, bounds=(-bound, bound), method="bvls", tol=1e-12)
+        return float(np.sum((A @ (self.change - found.x)) ** 2)), np.asarray(found.x)

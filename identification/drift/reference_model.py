@@ -8,9 +8,9 @@ import numpy as np
 from identification.arrays import Array, frozen
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.model.estimates import Drive, KarnoppFit
+from identification.model.estimates import Drive
 from identification.model.karnopp import VISCOUS_NAMES
-from identification.model.plant import Actuator, Plant, units_of
+from identification.model.plant import Plant, units_of
 
 COULOMB = ("F_cp", "F_cn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
@@ -93,25 +93,25 @@ class ReferenceModel:
         A force below a tenth of the largest friction force is compared with that tenth; so is
         a viscous one, at the fastest speed of the model's logs.
         """
-        size = np.abs(self.values)
-        largest = max(abs(getattr(self.plant.friction, name)) for name in FORCES)
-        for i, name in enumerate(self.names):
-            if name in FORCES:
-                size[i] = max(size[i], LEAST_FORCE * largest)
-            if name in VISCOUS_NAMES and self.fastest > 0:
-                size[i] = max(size[i], LEAST_FORCE * largest / self.fastest)
-            if "." in name:
-                size[i] = max(size[i], self._least_of_effect(name))
+        size = np.maximum(np.abs(self.values), [self._least(name) for name in self.names])
         return np.where(size > 0, size, 1.0)
 
-    def _least_of_effect(self, name: str) -> float:
-        """Size below which an effect's parameter is small; an asymmetry is a share by itself."""
+    def _least(self, name: str) -> float:
+        """Size below which a parameter is small; an effect's asymmetry is a share by itself."""
         key, _, own = name.partition(".")
-        if own == "asymmetry":
-            return 1.0
-        effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
-        param = next(p for p in effect.params if p.name == own)
-        return LEAST_EFFECT * abs(param.typical)
+        if own:
+            effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
+            param = next(p for p in effect.params if p.name == own)
+            return 1.0 if own == "asymmetry" else LEAST_EFFECT * abs(param.typical)
+        least = LEAST_FORCE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
+        if name in VISCOUS_NAMES:
+            return least / self.fastest if self.fastest > 0 else 0.0
+        return least if name in FORCES else 0.0
+
+    @property
+    def relative_covariance(self) -> Array:
+        """Covariance (d, d) of the parameters' errors in their scales."""
+        return self.covariance / np.outer(self.scales, self.scales)
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -120,25 +120,3 @@ class ReferenceModel:
         for acting in self.plant.effects:
             found |= {f"{acting.key}.{p.name}": p.unit for p in acting.effect.params}
         return found
-
-
-def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> ReferenceModel:
-    """The model of a fit as the active one; fastest [m/s]: speed in its logs, 0 if unknown."""
-    untold = {n: e.reason or "" for n, e in fit.estimates.items() if not e.known}
-    friction = fit.friction
-    every = {name: float(getattr(friction, name)) for name in fit.free if hasattr(friction, name)}
-    if isinstance(fit.actuator, Actuator):
-        every |= {"k1": fit.actuator.k1, "k2": fit.actuator.k2}
-    return ReferenceModel(
-        plant=Plant(friction, fit.actuator, fit.effects),
-        names=fit.free,
-        values=np.array([every[name] for name in fit.free]),
-        covariance=fit.covariance,
-        rig=rig,
-        drive=fit.drive,
-        chi_square=fit.chi_square,
-        imposed=fit.imposed,
-        untold=untold,
-        key=key,
-        fastest=fastest,
-    )

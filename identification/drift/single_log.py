@@ -2,7 +2,8 @@
 
 It shows drift where it is neither: surely beyond the margin that does not matter, and beyond what
 the machine varies from log to log. Tested over all parameters together, which finds a change of
-many, and of each on its own, which finds a change of one.
+many, and of each on its own, which finds a change of one. What a test can see is its limit and so
+many deviations more: Currie, Anal. Chem. 40 (1968) 586.
 """
 
 from dataclasses import dataclass
@@ -13,11 +14,11 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from identification.arrays import Array
-from identification.drift.mewma import Mean
-from identification.drift.practical_margin import beyond_margin
+from identification.drift.practical_margin import Change
 from identification.thresholds import CHANCE_TO_SEE
 
 WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looked for
+SURELY_SEEN = float(norm.ppf(CHANCE_TO_SEE))  # deviations beyond its limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,69 +36,61 @@ class LogChange:
     margin: float
 
     @cached_property
-    def beyond_margin(self) -> Mean:
+    def beyond_margin(self) -> Change:
         """The change as one of a machine that stays within the margin on every day."""
-        return Mean(self.at, self.change, self.measured, np.full(len(self.at), self.margin))
+        return Change(self.at, self.change, self.measured, np.full(len(self.at), self.margin))
 
     @cached_property
-    def beyond_usual(self) -> Mean:
+    def beyond_usual(self) -> Change:
         """The change as one of a machine that has not changed but for what it varies by."""
         covariance = self.measured + np.diag(self.varied)
-        return Mean(self.at, self.change, covariance, np.zeros(len(self.at)))
+        return Change(self.at, self.change, covariance, np.zeros(len(self.at)))
 
     @cached_property
-    def nearer(self) -> Mean:
+    def nearer(self) -> Change:
         """That of the two which explains the change better."""
-        one, other = self.beyond_margin, self.beyond_usual
-        return one if one.distance.square <= other.distance.square else other
+        return min(self.beyond_margin, self.beyond_usual, key=lambda one: one.square)
 
-    @cached_property
+    @property
     def alone(self) -> Array:
         """Deviations (k,) by which each parameter on its own is beyond both."""
-        size = np.abs(self.change)
-        beyond = np.maximum(size - self.margin, 0.0) / self.measured_sd
-        return np.asarray(np.minimum(beyond, size / self.sd))
+        size, (measured, usual) = np.abs(self.change), self._deviations
+        return np.minimum(np.maximum(size - self.margin, 0.0) / measured, size / usual)
+
+    def detectable_alone(self, square: float) -> Array:
+        """Smallest change (k,) of each parameter that its own test sees, with a power of
+        CHANCE_TO_SEE (Currie 1968).
+
+        square: threshold of the largest of `alone`, squared. The power is over the errors of the
+        log and the model: the parameter lies by so much from the model's on the day of the log.
+        """
+        limit, (measured, usual) = np.sqrt(square), self._deviations
+        beyond = self.margin + (limit + SURELY_SEEN) * measured
+        return np.asarray(np.maximum(beyond, limit * usual + SURELY_SEEN * measured))
 
     @property
-    def measured_sd(self) -> Array:
-        """Standard deviations (k,) of the errors alone."""
-        return np.sqrt(np.diag(self.measured))
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviations (k,) of the change of a machine that has not changed."""
-        return np.sqrt(np.diag(self.beyond_usual.covariance))
+    def _deviations(self) -> tuple[Array, Array]:
+        """Standard deviations (k,) of the errors alone, and of the change of a machine that has not
+        changed."""
+        square = np.diag(self.measured)
+        return np.sqrt(square), np.sqrt(square + self.varied)
 
 
-def detectable_alone(found: LogChange, square: float) -> Array:
-    """Smallest change (k,) of each parameter that its own test sees, with a power of CHANCE_TO_SEE.
-
-    square: threshold of the largest of `alone`, squared. The power is over the errors of the log
-    and the model: the parameter lies by so much from the model's on the day of the log.
-    """
-    limit, more = np.sqrt(square), float(norm.ppf(CHANCE_TO_SEE))
-    beyond = found.margin + (limit + more) * found.measured_sd
-    return np.asarray(np.maximum(beyond, limit * found.sd + more * found.measured_sd))
-
-
-def detectable_together(found: Mean, square: float) -> Array:
+def detectable_together(found: Change, square: float) -> Array:
     """Smallest change (k,) of one parameter that the test of all together sees, or at most that.
 
     square: its threshold. By how far the change lies from the margin's box without errors: errors
     bring it nearer by more than a normal deviation once in 1 / (1 - CHANCE_TO_SEE) at most.
     """
-    needed = (np.sqrt(square) + float(norm.ppf(CHANCE_TO_SEE))) ** 2
-    return np.array([_first_beyond(found, i, needed) for i in range(len(found.at))])
+    needed = (np.sqrt(square) + SURELY_SEEN) ** 2
 
+    def smallest(one: Array) -> float:
+        def missing(size: float) -> float:
+            moved = Change(found.at, size * one, found.covariance, found.margin)
+            return float(moved.square - needed)
 
-def _first_beyond(found: Mean, i: int, square: float) -> float:
-    """Change of parameter `i` alone whose square distance to the box is `square`."""
-    one = np.zeros(len(found.at))
-    one[i] = 1.0
+        if missing(WIDEST_SEEN) < 0.0:
+            return float("inf")
+        return float(brentq(missing, float(one @ found.margin), WIDEST_SEEN, rtol=1e-3))
 
-    def missing(size: float) -> float:
-        return beyond_margin(size * one, found.covariance, found.margin).square - square
-
-    if missing(WIDEST_SEEN) < 0.0:
-        return float("inf")
-    return float(brentq(missing, float(found.margin[i]), WIDEST_SEEN, rtol=1e-3))
+    return np.array([smallest(one) for one in np.eye(len(found.at))])

@@ -34,16 +34,15 @@ from identification.signals.steps import (
     LONGEST_SMALL,
     deviations,
     jump_size,
+    line_weights,
     outstanding,
-    slope_weights,
     steps_between,
 )
 from identification.thresholds import (
     BEYOND_CHANCE,
     HOPELESS,
     NEARLY_FOLLOWED,
-    RUN_JUMP_FROM,
-    RUN_SPIKE_FROM,
+    RUN_FAULT_FROM,
 )
 
 RUN_SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
@@ -57,7 +56,7 @@ MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single sample
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
 # Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
 SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
-DRIFTS_OVER = 0.5  # s, over which what a command's noise adds up to passes for one bad sample
+DRIFTS_OVER = 0.17  # s, over which what a command's noise adds up to passes for one bad sample
 SHIFT_STEPS = 3  # to the likeliest value in place of a bad one
 FARTHEST_SHIFT = 20.0  # times the drive's roughness, the longest of these steps
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
@@ -173,7 +172,7 @@ def _without_spikes(r: Array, seen: Array, noisier: Array) -> tuple[Array, BoolA
         height = deviations(seen, length)[0]
         for i in range(length):
             shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
-    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r / noisier) * noisier
+    off = np.abs(r - level) > RUN_FAULT_FROM * _spread(r / noisier) * noisier
     off &= shown > SIGNAL_SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -190,8 +189,8 @@ def _jumps(r: Array, begun: Starts) -> IntArray:
     steps = steps_between(r, RUN_SIDES, CLEAR_OF_ERRORS)
     for k in begun.at.tolist():
         steps[max(k - RUN_SIDES[0], 0) : k + RUN_SIDES[0]] = 0.0
-    least = RUN_JUMP_FROM * _spread(r)
-    return np.asarray(outstanding(steps, least), dtype=np.int64)
+    least = RUN_FAULT_FROM * _spread(r) * np.linalg.norm(line_weights(RUN_SIDES[-1])[0])
+    return np.asarray(outstanding(steps, float(least)), dtype=np.int64)
 
 
 def _side(k: int, begun: Starts, n: int) -> int:
@@ -239,7 +238,7 @@ class _Driven:
         if not isinstance(actuator, Actuator):
             return 0.0
         noise = one.walk / (actuator.k1 * one.log.h)
-        return RUN_JUMP_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
+        return RUN_FAULT_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
 
     def by(self, x: Array) -> Log:
         """The log with this drive (n,)."""
@@ -296,7 +295,7 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
     now, before, found = x, loss(r), list[BadSamples]()
     near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
     if driven.drive == "force":  # which has noise, so that every run by it drifts off
-        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_SPIKE_FROM * driven.one.noise_F)
+        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_FAULT_FROM * driven.one.noise_F)
     else:
         tried = [*_candidates(x, SEEN_FROM), *_kicks(r[0], x)]
     for first, length, rough in tried:
@@ -333,7 +332,7 @@ def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
         return []
     size, way = np.full(len(r), np.inf), np.zeros(len(r))
     for side in BENT:
-        weights = slope_weights(side)
+        weights = line_weights(side)[1]
         bent = np.correlate(r, weights, mode="valid") / (_spread(r) * np.linalg.norm(weights))
         here = slice(side - 1, len(r) - side)
         size[here] = np.minimum(size[here], np.abs(bent))

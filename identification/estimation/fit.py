@@ -58,13 +58,13 @@ from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, wi
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_driven
 from identification.signals.one_way import ONE_WAY_WHY
+from identification.signals.steps import LONGEST_SMALL
 from identification.thresholds import (
     ACTUATOR_SHARE,
     COMPLETE,
     HOPELESS,
     MATERIAL,
     NEARLY_FOLLOWED,
-    PLACES_EXCLUDED,
     SHARE_EXCLUDED,
     WORSE,
 )
@@ -255,8 +255,7 @@ def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
         by_log.setdefault(one.log, []).append(one.samples)
     lengths = {one.log.name: len(one.log) for one in logs}
     return all(
-        len(found) <= PLACES_EXCLUDED
-        and sum(found) <= max(PLACES_EXCLUDED, SHARE_EXCLUDED * lengths.get(name, 0))
+        sum(found) <= max(LONGEST_SMALL, SHARE_EXCLUDED * lengths.get(name, 0))
         for name, found in by_log.items()
     )
 

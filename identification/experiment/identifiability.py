@@ -6,10 +6,12 @@ in windows from measured states, are the information that the log holds. Bands a
 a first plant may be far off, so what is promised is wider than the information alone would have it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from identification.effects._base import Acting
 from identification.effects._library import Library
 from identification.errors import UserError
 from identification.estimation.plain_search.actuator_fit import fit_actuator
@@ -17,8 +19,8 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.run_errors import judge
 from identification.estimation.windowed_run.windows import RUN_WINDOW
-from identification.experiment.information import information
-from identification.experiment.structures import discriminated, sought, structures
+from identification.experiment.information import Information, information
+from identification.experiment.structures import discriminated, sought
 from identification.model.estimates import NORMAL_95
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
@@ -53,11 +55,8 @@ def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
 
     Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
     """
-    plant = first_plant(recorded)
-    try:
-        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
-        told = information(plant, errors_of, recorded.drive, lost=np.inf)
-    except UserError:
+    told = _information(first_plant(recorded), recorded)
+    if told is None:
         return {}
     relative = np.sqrt(np.diag(told.covariance)) / told.unit
     least = NO_SURER if recorded.by_command else NO_SURER_CHAOTIC
@@ -93,11 +92,20 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
     y = np.concatenate([log["y"] for log in recorded.plain])
     stroke = (float(np.min(y)), float(np.max(y)))
     rivals = [sought(one, plant, stroke) for one in library.values() if not one.signals]
-    try:
-        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
-        told = structures(plant, rivals, errors_of, recorded.drive, lost=np.inf)
-    except UserError:
+    told = _information(plant, recorded, rivals)
+    if told is None:
         return {}
     own = range(len(told.names) - len(rivals))
     place = {one.key: len(own) + i for i, one in enumerate(rivals)}
     return {key: float(np.sqrt(discriminated(told.matrix, at, own))) for key, at in place.items()}
+
+
+def _information(
+    plant: Plant, recorded: RecordedLogs, rivals: Sequence[Acting] = ()
+) -> Information | None:
+    """What the logs' runs in windows identify of the plant; None where it cannot follow them."""
+    try:
+        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
+        return information(plant, errors_of, recorded.drive, rivals, lost=np.inf)
+    except UserError:
+        return None

@@ -2,16 +2,19 @@
 
 Residuals in units of the sensors' noise have the sensitivities J with the parameters, these in
 units of their own values; J'J is then the information, and its inverse the covariance that no
-unbiased estimator beats (Cramer, Rao). Stops and breakaways are in it as the exact run has them: a
-stick limit shows in nothing but when the body leaves.
+unbiased estimator beats (Rao, Bull. Calcutta Math. Soc. 37 (1945) 81; Cramer, Mathematical Methods
+of Statistics (1946), chapter 32). Stops and breakaways are in it as the exact run has them: a stick
+limit shows in nothing but when the body leaves. An effect that the machine may have is a direction
+beside the parameters.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.estimation.gauss_newton import jacobian
 from identification.estimation.recorded_logs import RecordedLogs
@@ -23,7 +26,7 @@ from identification.estimation.windowed_run.parameters import (
     values_of,
 )
 from identification.estimation.windowed_run.refinement import MOTOR_WINDOW
-from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, judge
+from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, judge, soft
 from identification.estimation.windowed_run.windows import RUN_WINDOW, WHOLE, walks
 from identification.log import Log
 from identification.model.estimates import Drive
@@ -37,6 +40,7 @@ LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to b
 LASTING_SHARE = 0.1  # of a sensitivity, by which it may differ to either side over that step
 # in units of the noise, difference of both sides from which a run is sensitive to chance
 BY_CHANCE = 3.0
+FAR_CHANGE = 10.0  # in units of the noise, from which what an effect changes counts less
 NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which it is not followed
 
 
@@ -82,17 +86,26 @@ class Information:
 
 
 def information(
-    plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = NOT_FOLLOWED
-) -> Information:
+    plant: Plant, errors_of: Errors, drive: Drive, rivals: Sequence[Acting] = (), *,
+    lost: float = NOT_FOLLOWED,
+) -> Information:  # fmt: skip
     """What the runs with these errors (n,), in units of the sensors' noise, identify of the plant,
-    as far as it is to be counted on (`lasting_jacobian`).
+    as far as it is to be counted on (`lasting_jacobian`), and behind its parameters of each rival
+    effect at its size, by the rival's key.
 
-    lost: error of the plant itself from which a sample says nothing. A shape of an effect that is
-    at its default is not asked for, as in a fit.
+    plant: without the rivals; lost: error of the plant itself from which a sample says nothing. A
+    shape of an effect that is at its default is not asked for, as in a fit. A rival that changes
+    nothing has zeros.
     """
     names, x, unit = unknowns(plant, drive)
     J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
-    return Information(names, unit, J.T @ J, loose)
+    columns, here = [J], errors_of(plant) if rivals else np.zeros(0)
+    for one in rivals:
+        changed = errors_of(replace(plant, effects=(*plant.effects, one))) - here
+        changed = np.where(np.isfinite(changed), changed, 0.0)
+        columns.append(soft(changed, FAR_CHANGE)[:, np.newaxis])
+    both, every = np.hstack(columns), (*names, *(one.key for one in rivals))
+    return Information(every, np.append(unit, np.ones(len(rivals))), both.T @ both, loose)
 
 
 def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:

@@ -5,28 +5,16 @@ what discriminates it. Atkinson, Fedorov, Biometrika 62 (1975) 57: T-optimality 
 rest."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.effects._base import Acting, Effect, Param
-from identification.estimation.windowed_run.parameters import plant_with
-from identification.estimation.windowed_run.run_errors import soft
-from identification.experiment.information import (
-    NOT_FOLLOWED,
-    Errors,
-    Information,
-    lasting_jacobian,
-    unknowns,
-)
-from identification.model.estimates import Drive
 from identification.model.plant import Plant
 
 NO_EFFECT = "no effect"
 SOUGHT_SIZE = 0.15  # of the Coulomb level, force of an effect that is looked for
 END_PLACES = {"y_p": 0.6, "y_n": -0.6}  # of half the stroke, places at which its ends begin
-FAR_CHANGE = 10.0  # in units of the noise, from which what an effect changes counts less
 DIRECTION_RIDGE = 1e-9  # of the information's scale, below which a direction is rounding
 
 
@@ -55,30 +43,6 @@ def sought(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Acting:
 def _is_force(p: Param) -> bool:
     """Whether a parameter is the size of a force."""
     return p.linear and p.unit in ("N", "N m")
-
-
-def structures(
-    plant: Plant, rivals: Sequence[Acting], errors_of: Errors, drive: Drive,
-    *, lost: float = NOT_FOLLOWED,
-) -> Information:  # fmt: skip
-    """What runs identify of the plant's parameters and, behind them, of each rival at its size.
-
-    plant: without the rivals; lost: as of `information`. names: the plant's parameters, then the
-    rivals' keys; one that changes nothing has zeros.
-    """
-    names, x, unit = unknowns(plant, drive)
-    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
-    here = errors_of(plant)
-    columns = [J]
-    for one in rivals:
-        changed = errors_of(replace(plant, effects=(*plant.effects, one))) - here
-        changed = np.where(np.isfinite(changed), changed, 0.0)
-        columns.append(soft(changed, FAR_CHANGE)[:, np.newaxis])
-    both = np.hstack(columns)
-    keys = tuple(one.key for one in rivals)
-    return Information(
-        (*names, *keys), np.concatenate([unit, np.ones(len(keys))]), both.T @ both, loose
-    )
 
 
 def discriminated(matrix: Array, one: int, others: Sequence[int]) -> float:

@@ -30,10 +30,10 @@ from identification.arrays import Array, BoolArray
 from identification.frequency.stretches import INDEPENDENT, REACHES, Band, ComplexArray
 from identification.thresholds import (
     APART_SHARE,
-    AVERAGES_NEEDED,
     CHANCE_LEVEL,
     COHERENCE_SEEN,
     COHERENCE_SURE,
+    EVENTS_NEEDED,
 )
 
 DEGREE = 2  # of a response over its neighbours
@@ -82,7 +82,7 @@ class Response:
         """Where the logs show it: enough averages, and more coherence than chance gives, (k,)."""
         free = np.maximum(self.averages - 1.0, 1e-9)
         luck = 1.0 - CHANCE_LEVEL ** (1.0 / free)
-        enough = self.averages >= AVERAGES_NEEDED
+        enough = self.averages >= EVENTS_NEEDED
         return np.asarray(enough & (self.coherence >= np.maximum(COHERENCE_SEEN, luck)))
 
     @property

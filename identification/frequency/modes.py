@@ -4,7 +4,7 @@
 
 is acceleration by force: a rigid body with viscous friction, elastic modes, and what modes beyond
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
-projection). Modes are added one by one while each explains far more than chance; reported are those
+projection). Modes are added one by one while each explains more than chance; reported are those
 that stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal
 form, Ewins, Modal Testing, 2nd ed. (2000), chapter 4; variable projection, Golub, Pereyra, SIAM J.
 Numer. Anal. 10 (1973) 413.
@@ -20,18 +20,9 @@ from scipy.optimize import least_squares
 from identification.arrays import Array
 from identification.frequency.estimate import Response
 from identification.frequency.stretches import ComplexArray
+from identification.model.estimates import NORMAL_95
 from identification.model.size import Size
-from identification.thresholds import (
-    DEEP,
-    MODE_GAINS,
-    MODE_SHARE,
-    MOST_DAMPING,
-    MOSTLY_SEEN,
-    POINTS_AROUND,
-    POINTS_NEEDED,
-    STANDING_OUT,
-    UNSURE_PEAK,
-)
+from identification.thresholds import EVENTS_NEEDED, PENALTY, STANDS_OUT
 
 MOST_MODES = 4
 HERTZ_BEGUN = 48  # frequencies with which a mode's search begins
@@ -40,6 +31,7 @@ SEARCHED_FROM = 3  # of these, the best
 STRUCTURE_ERROR = 0.02  # of the magnitude, that the form itself may be off
 AROUND_PEAK = 0.1  # of its frequency, within which points on either side show a peak
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
+OF_A_MODE = 3  # parameters: w_i, z_i, b_i
 SHARED = 16.0  # points that are of the same stretches and neighbours, and count as one
 OF_A_BIN = 0.5  # by which windows may shift a peak
 LONGEST_MODE_LAG = 0.05  # s
@@ -85,7 +77,7 @@ class Modes:
 def fit_modes(response: Response) -> Modes | None:
     """The modes that a response (acceleration by force) shows; None where it shows too little."""
     use = response.seen
-    if np.count_nonzero(use) < POINTS_NEEDED:
+    if np.count_nonzero(use) < SHARED * EVENTS_NEEDED:
         return None
     f, H = response.f[use], response.H[use]
     weight = 1.0 / (np.abs(H) * np.hypot(response.sd[use], STRUCTURE_ERROR))
@@ -172,13 +164,13 @@ def _earns(data: _Data, before: Array, after: Array) -> bool:
     was, now = data.chi(before), data.chi(after)
     free = 2 * len(data.f) - 3 - 3 * ((len(after) - 2) // 2)
     apart = all(_apart(after[-2:], after[k : k + 2]) for k in range(2, len(before), 2))
-    return apart and explains_far_more(was, now, free)
+    return apart and explains_more(was, now, free)
 
 
-def explains_far_more(was: float, now: float, free: int) -> bool:
+def explains_more(was: float, now: float, free: int) -> bool:
     """Whether chi-square falls by more than chance; free: points less parameters."""
-    gained = (was - now) / max(now / max(free, 1), 1.0)
-    return gained > MODE_GAINS and was - now > MODE_SHARE * was
+    gained = (was - now) / max(now / max(free, 1), 1.0) / SHARED
+    return gained > PENALTY * OF_A_MODE
 
 
 def _apart(one: Array, other: Array) -> bool:
@@ -187,46 +179,34 @@ def _apart(one: Array, other: Array) -> bool:
 
 
 def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
-    """Whether a mode is a resonance that the points show: lightly damped and large enough."""
-    w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
+    """Whether a mode is a resonance that the points show."""
+    w = np.exp(p[2 + 2 * k])
     parts = (_columns(p, np.array([w / (2.0 * np.pi)])) * theta)[0]
     own, rest = abs(parts[1 + k]), abs(np.sum(np.delete(parts, 1 + k)))
-    return swings(z) and is_large(own, rest) and _shown(data, w / (2.0 * np.pi))
-
-
-def swings(damping: float) -> bool:
-    """Whether so much damping is that of a resonance."""
-    return bool(abs(damping) < MOST_DAMPING)
+    return is_large(own, rest) and _shown(data, w / (2.0 * np.pi))
 
 
 def is_large(own: float, rest: float) -> bool:
     """Whether what a mode adds stands out of the rest of the response."""
-    return bool(own > STANDING_OUT * rest)
+    return bool(own > STANDS_OUT * rest)
 
 
 def is_deep(left: float, rigid: float) -> bool:
     """Whether an anti-resonance leaves little of the rigid body's response."""
-    return bool(left < DEEP * rigid)
+    return bool(left < (1.0 - STANDS_OUT) * rigid)
 
 
 def is_sharp(one: Peak) -> bool:
-    """Whether the frequency of a peak is told."""
-    return one.frequency.sd < UNSURE_PEAK * one.frequency.value
+    """Whether the 95 % interval of a peak's frequency lies where points show it."""
+    return NORMAL_95 * one.frequency.sd < AROUND_PEAK * one.frequency.value
 
 
 def _shown(data: _Data, f: float) -> bool:
     """Whether points lie close to a frequency on either side."""
     for low, high in (((1.0 - AROUND_PEAK) * f, f), (f, (1.0 + AROUND_PEAK) * f)):
-        there = np.count_nonzero((data.f >= low) & (data.f <= high))
-        might = np.count_nonzero((data.every >= low) & (data.every <= high))
-        if not are_there(int(there), int(might)):
+        if np.count_nonzero((data.f >= low) & (data.f <= high)) < EVENTS_NEEDED:
             return False
     return True
-
-
-def are_there(there: int, might: int) -> bool:
-    """Whether so many points of those that might be there show a peak."""
-    return there >= max(POINTS_AROUND, MOSTLY_SEEN * might)
 
 
 def _told(data: _Data, p: Array) -> Modes:
@@ -299,7 +279,7 @@ def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list
         f, damping = abs(zero) / (2.0 * np.pi), -zero.real / abs(zero)
         parts = (_columns(p, np.array([f])) * theta)[0]
         deep = is_deep(abs(np.sum(parts)), abs(parts[0]))
-        if not (deep and swings(damping) and _shown(data, f)):
+        if not (deep and _shown(data, f)):
             continue
         near = _zero_spread(data, p, zero, misfit)
         out.append(Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1])))

@@ -16,7 +16,7 @@ from scipy.signal.windows import hann
 
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
-from identification.thresholds import AVERAGES_NEEDED
+from identification.thresholds import EVENTS_NEEDED
 
 ComplexArray = NDArray[np.complex128]
 
@@ -57,11 +57,11 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
         length = LEAST_CYCLES_SEEN / lowest
         there = sum(max(0.0, d / length - 1.0) / (1.0 - STRETCH_OVERLAP) + 1.0 for d in durations
                     if d >= length)  # fmt: skip
-        if there < AVERAGES_NEEDED:
+        if there < EVENTS_NEEDED:
             raise BadSpecification(
                 f"lowest frequency {lowest:g} Hz: stretches of {length:.3g} s needed, {there:.0f}"
-                f" in {whole:.3g} s of logs, at least {AVERAGES_NEEDED} needed; log longer, or ask"
-                f" for at least {LEAST_CYCLES_SEEN * AVERAGES_NEEDED / whole:.2g} Hz"
+                f" in {whole:.3g} s of logs, at least {EVENTS_NEEDED} needed; log longer, or ask"
+                f" for at least {LEAST_CYCLES_SEEN * EVENTS_NEEDED / whole:.2g} Hz"
             )
     if length < FEWEST_IN_STRETCH * fastest:
         raise NotIdentifiable(

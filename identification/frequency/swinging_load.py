@@ -37,7 +37,7 @@ from identification.frequency.stretches import (
     hold,
 )
 from identification.model.resonance import load_acceleration
-from identification.thresholds import LEAVES_LESS, RESTS_AT_LEAST
+from identification.thresholds import EARNS
 
 LOAD_HERTZ_TRIED = 20  # anti-resonances tried, on a scale of ratios
 DAMPING_TRIED = 0.02
@@ -76,7 +76,7 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
 
     runs: their `linear` force that of one mass [kg] where they rest.
     """
-    if not rests_enough(float(np.mean(np.concatenate([one.where for one in rests])))):
+    if not any(np.any(one.where) for one in rests):
         return None
     names = ("a", "linear", *instruments_of(runs))
     both = _longest(list(zip(runs, rests, strict=True)))
@@ -106,14 +106,9 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
     return load if inside and leaves_less(left, none) else None
 
 
-def rests_enough(share: float) -> bool:
-    """Whether a body rests in so large a share of the samples that a load may hide there."""
-    return share >= RESTS_AT_LEAST
-
-
 def leaves_less(left: float, none: float) -> bool:
     """Whether a load leaves clearly less than none, mean logarithms both."""
-    return none - left > LEAVES_LESS
+    return left < none + float(np.log(EARNS))
 
 
 def _longest(both: list[tuple[Recording, Rests]]) -> list[tuple[Recording, Rests]]:

@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d
 
 from identification.arrays import Array
 from identification.signals.differentiate import resolution
-from identification.thresholds import JUMP_FROM, SPIKE_FROM
+from identification.thresholds import FAULT_FROM
 
 LINE_SIDES = (2, 4, 8)  # samples to either side, through which the lines are laid
 JUMP_NEAR = 16  # samples around a jump that belong to it
@@ -72,8 +72,9 @@ def local_noise(x: Array) -> Array:
 
 
 @lru_cache
-def _line_weights(side: int) -> tuple[Array, Array]:
-    """Weights (2 side,) of the jump in the middle and of the change of slope there."""
+def line_weights(side: int) -> tuple[Array, Array]:
+    """Weights (2 side,) of the jump between lines through `side` samples each, and of the change of
+    their slope."""
     x = np.arange(side) + 0.5
     ahead = np.linalg.pinv(np.column_stack([np.ones(side), x]))
     height = np.concatenate([-ahead[0][::-1], ahead[0]])
@@ -94,7 +95,7 @@ def steps_between(
     way = np.zeros(n - 1)
     bend = np.zeros(n - 1)
     for side in sides:
-        height, slope = _line_weights(side)
+        height, slope = line_weights(side)
         here = slice(side - 1, n - side)
         found = np.correlate(x, height, mode="valid")
         least[here] = np.minimum(least[here], np.abs(found))
@@ -134,7 +135,7 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
     gap = maximum_filter1d(period, 2 * LINE_SIDES[-1] + 1) > WHOLE_PERIODS * float(
         np.median(period)
     )
-    found = outstanding(np.where(gap, 0.0, steps_between(y)), JUMP_FROM * white_noise(y))
+    found = outstanding(np.where(gap, 0.0, steps_between(y)), FAULT_FROM * white_noise(y))
     # What changes the speed elsewhere within a sample may do so here, from rest to rest.
     change = np.where(gap[1:] | gap[:-1], 0.0, np.abs(np.diff(y, 2)))
     for k in found.tolist():
@@ -161,14 +162,9 @@ def outstanding(steps: Array, least: float) -> NDArray[np.intp]:
     return np.sort(order[:count])
 
 
-def slope_weights(side: int) -> Array:
-    """Weights (2 side,) of the change of slope between lines through `side` samples each."""
-    return _line_weights(side)[1]
-
-
 def jump_size(y: Array, at: int, side: int = LINE_SIDES[-1]) -> float:
     """By how much the position jumps after sample `at`, from lines through `side` samples each."""
-    height, _ = _line_weights(side)
+    height, _ = line_weights(side)
     return float(height @ y[at - side + 1 : at + side + 1])
 
 
@@ -211,6 +207,6 @@ def small_spikes(x: Array) -> NDArray[np.bool_]:
     noise = local_noise(x)
     for length in range(1, LONGEST_SMALL + 1) if np.all(noise > 0.0) else ():
         height, own = deviations(x, length)
-        for first in np.flatnonzero(height > SPIKE_FROM * np.maximum(noise, own)):
+        for first in np.flatnonzero(height > FAULT_FROM * np.maximum(noise, own)):
             out[first : first + length] = True
     return out

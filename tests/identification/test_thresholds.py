@@ -14,11 +14,10 @@ from scipy.stats import norm
 
 from identification import thresholds
 from identification.arrays import Array, IntArray
-from identification.drift.drift_test import DriftSettings, at_bound, too_coarse
+from identification.drift.drift_test import DriftSettings, too_coarse
 from identification.drift.log_estimate import LogEstimate, allowed_misfit
-from identification.drift.mewma import Mean
-from identification.drift.own_misfit import OwnMisfit
-from identification.drift.practical_margin import moved
+from identification.drift.own_logs import OwnMisfit
+from identification.drift.practical_margin import Change
 from identification.drift.reference_model import ReferenceModel
 from identification.drift.single_log import detectable_together
 from identification.effects._base import Param
@@ -67,22 +66,11 @@ from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
 from identification.experiment.information import Information
 from identification.frequency.estimate import Response, is_apart
-from identification.frequency.modes import (
-    Peak,
-    are_there,
-    explains_far_more,
-    fit_modes,
-    is_deep,
-    is_large,
-    is_sharp,
-    swings,
-)
+from identification.frequency.modes import explains_more, fit_modes, is_deep, is_large
 from identification.frequency.stretches import bands
-from identification.frequency.swinging_load import leaves_less, rests_enough
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.model.size import Size
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_random_walk import shows
@@ -95,7 +83,7 @@ from identification.signals.steps import (
     steps_between,
     white_noise,
 )
-from identification.thresholds import JUMP_FROM
+from identification.thresholds import FAULT_FROM
 from identification.tracing.dependence import dependence
 from identification.tracing.free_run.backward_elimination import (
     Setting,
@@ -250,6 +238,8 @@ def test_hopeless() -> None:
     equation that does is that of a machine which no model follows."""
     assert not is_no_run(20.0) and is_no_run(31.0)
     assert not rough({MECHANICAL: leaving(20.0)}) and rough({MECHANICAL: leaving(31.0)})
+    misfit = OwnMisfit(1.0, np.zeros(1), 3, 20.0)
+    assert not misfit.has_lost_its_way(20.0 * 20.0) and misfit.has_lost_its_way(31.0 * 20.0)
 
 
 def test_inert() -> None:
@@ -271,6 +261,9 @@ def test_penalty() -> None:
     (step,), samples = choice("spring").steps, 2000
     assert has_no_part(1.0 + 16.0 / samples, 1.0, step, setting(2.0))
     assert not has_no_part(1.0 + 25.0 / samples, 1.0, step, setting(2.0))
+    # A mode has three, and sixteen neighbouring points count as one.
+    assert explains_more(100.0 + 600.0, 100.0, 1000)
+    assert not explains_more(100.0 + 380.0, 100.0, 1000)
     # An exponent leaves its default only where the log calls for another one.
     free = [Param("delta", "1", 0.5, 4.0, 2.0, "exponent", default=2.0)]
 
@@ -304,8 +297,9 @@ def test_chance_level() -> None:
     assert not by_luck(0.008)
     assert by_luck(0.0125)
     # The second of two: chances of 0.4 % and 0.7 %, half of the level for each of them.
-    assert moved(np.array([9.0, 2.9]), np.eye(2), np.zeros(2)) == (0, 1)
-    assert moved(np.array([9.0, 2.7]), np.eye(2), np.zeros(2)) == (0,)
+    both = Change((0, 1), np.array([9.0, 2.9]), np.eye(2), np.zeros(2))
+    assert both.moved() == (0, 1)
+    assert replace(both, change=np.array([9.0, 2.7])).moved() == (0,)
 
 
 def test_searched() -> None:
@@ -514,33 +508,14 @@ def test_seen() -> None:
 
     One that would not judges nothing.
     """
-    fine = DriftSettings(margin=0.01)  # by which less would have to be seen
-    assert says_none(0.04, fine) and says_none(0.04, DriftSettings())
-    assert not says_none(0.0625, fine) and not says_none(0.0625, DriftSettings())
-
-
-def test_seen_margins() -> None:
-    """The same where so much more than 5 % does not matter."""
-    assert says_none(0.16, DriftSettings(margin=0.08))
-    assert not says_none(0.25, DriftSettings(margin=0.08))
-
-
-def test_lost_fit() -> None:
-    """A fit that leaves so much more than those of the model's own logs has lost its way."""
-    misfit = OwnMisfit(1.0, np.zeros(1), 3, 20.0)
-    assert not misfit.has_lost_its_way(80.0 * 20.0)
-    assert misfit.has_lost_its_way(125.0 * 20.0)
-
-
-def test_vanished() -> None:
-    """A parameter that is all but gone by its fit is not judged; one that lost most of it is."""
-    assert not at_bound(-0.8)
-    assert at_bound(-0.995)
+    for margin in (0.0, 0.02, 0.08):
+        assert says_none(margin + 0.024, DriftSettings(margin=margin))
+        assert not says_none(margin + 0.0375, DriftSettings(margin=margin))
 
 
 def test_chance_to_see() -> None:
     """Of the smallest change that a test sees, nine in ten are found."""
-    size = float(detectable_together(Mean((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
+    size = float(detectable_together(Change((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
     assert norm.sf(3.0 - size) == pytest.approx(0.9, abs=0.005)
 
 
@@ -549,6 +524,21 @@ def test_events_needed(name: str) -> None:
     """Fewer breakaways tell no stick limit, and fewer crossings no band."""
     assert not told(name, 0.01, 2)
     assert told(name, 0.01, 3)
+
+
+def test_events_needed_over_frequency() -> None:
+    """Full coherence of fewer averages is luck, and fewer stretches are none; a response of fewer
+    points that count by themselves is no ground to say that there are no modes."""
+    assert response_of(0.999, 3.8).seen[0] and not response_of(0.999, 2.4).seen[0]
+    assert bands([5.0, 5.0], [1e-3, 1e-3], 3.0)
+    with pytest.raises(BadSpecification, match=r"2 in .* at least 3 needed"):
+        bands([3.0], [1e-3], 3.0)
+    for points, shown in ((38, False), (60, True)):
+        one = np.ones(points)
+        found = Response(
+            np.linspace(1.0, 20.0, points), one.astype(np.complex128), 0.99 * one, 50.0 * one
+        )
+        assert (fit_modes(found) is not None) is shown
 
 
 def test_widest_sd() -> None:
@@ -591,20 +581,17 @@ def smooth(size: float, at: int, length: int) -> Array:
     return y
 
 
-def test_jump_from() -> None:
-    """A position that steps by so many deviations has jumped."""
+def test_fault_from() -> None:
+    """A position that steps by so many deviations has jumped; a sample that is so far from its
+    neighbours is no sample of the body."""
 
     def jumps(size: float) -> bool:
         y = smooth(0.0, 0, 0)
         y[2000:] += size - jump_size(y, 1999)  # by the widest lines, of which noise has its part
-        return bool(len(outstanding(steps_between(y), JUMP_FROM * white_noise(y))))
+        return bool(len(outstanding(steps_between(y), FAULT_FROM * white_noise(y))))
 
     assert not jumps(6.5)
-    assert jumps(16.0)
-
-
-def test_spike_from() -> None:
-    """A sample that is so far from its neighbours is no sample of the body."""
+    assert jumps(12.5)
     assert not np.any(small_spikes(smooth(7.0, 2000, 1)))
     assert np.any(small_spikes(smooth(13.0, 2000, 1)))
 
@@ -616,17 +603,14 @@ def rest(size: float, length: int) -> Array:
     return r
 
 
-def test_run_jump_from() -> None:
-    """What stays off a run by a few deviations has jumped."""
-    assert not len(contradicted._jumps(rest(3.0, 1000), BEGUN))
-    assert len(contradicted._jumps(rest(5.0, 1000), BEGUN))
-
-
 STEADY = np.ones(2000)  # a clock that does not jitter
 
 
-def test_run_spike_from() -> None:
-    """A single error of a run of so many deviations is the sensor's."""
+def test_run_fault_from() -> None:
+    """What stays off a run by a few deviations has jumped; a single error of so many deviations is
+    the sensor's."""
+    assert not len(contradicted._jumps(rest(3.0, 1000), BEGUN))
+    assert len(contradicted._jumps(rest(5.0, 1000), BEGUN))
     small, large = rest(4.0, 1), rest(9.0, 1)
     assert not np.any(contradicted._without_spikes(small, small, STEADY)[1])
     assert np.any(contradicted._without_spikes(large, large, STEADY)[1])
@@ -682,22 +666,14 @@ def contradicted_at(*lengths: int) -> list[BadSamples]:
     ]
 
 
-def test_places_excluded() -> None:
-    """A run that contradicts a log in more places than these is a wrong model."""
-    logs = [seen(made(3))]
-    logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
-    assert are_few(contradicted_at(1, 1, 1, 1), logs)
-    assert are_few(contradicted_at(1, 1, 1, 1, 1), logs)
-    assert not are_few(contradicted_at(1, 1, 1, 1, 1, 1), logs)
-
-
 def test_share_excluded() -> None:
-    """Nor is more of a log than this share set aside for it."""
+    """A run that contradicts more of a log than this share is a wrong model."""
     logs = [seen(made(3))]
     logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
     assert len(logs[0].log) == 10_000
-    assert are_few(contradicted_at(8), logs)
+    assert are_few(contradicted_at(8), logs) and are_few(contradicted_at(*[1] * 8), logs)
     assert not are_few(contradicted_at(12), logs)
+    assert not are_few(contradicted_at(*[1] * 12), logs)
 
 
 def test_orders_from() -> None:
@@ -749,71 +725,15 @@ def test_coherence_sure() -> None:
     assert response_of(0.9, 100.0).sure[0] and not response_of(0.7, 100.0).sure[0]
 
 
-def test_averages_needed() -> None:
-    """Full coherence of few averages is luck; the same number of stretches is asked of the logs."""
-    assert response_of(0.999, 5.0).seen[0] and not response_of(0.999, 3.2).seen[0]
-    assert bands([5.0, 5.0], [1e-3, 1e-3], 3.0)
-    with pytest.raises(BadSpecification, match=r"3 in .* at least 4 needed"):
-        bands([4.0], [1e-3], 3.0)
-
-
 def test_apart_share() -> None:
     found = is_apart(np.array([0.008, 0.0125]), np.ones(2))
     assert found.tolist() == [False, True]
 
 
-def test_points_needed() -> None:
-    """A response of fewer points shows no modes, and is no ground to say that there are none."""
-    for points, shown in ((24, False), (38, True)):
-        f = np.linspace(1.0, 20.0, points)
-        one = Response(
-            f, np.ones(points, dtype=np.complex128), np.full(points, 0.99), np.full(points, 50.0)
-        )
-        assert (fit_modes(one) is not None) is shown
-
-
-def test_mode_gains() -> None:
-    """In units of what is left a point: 1 at least."""
-    assert explains_far_more(175.0, 100.0, 200) and not explains_far_more(148.0, 100.0, 200)
-
-
-def test_mode_share() -> None:
-    assert explains_far_more(1e4, 0.8e4, 10_000) and not explains_far_more(1e4, 0.88e4, 10_000)
-
-
-def test_standing_out() -> None:
-    assert is_large(0.31, 1.0) and not is_large(0.2, 1.0)
-
-
-def test_deep() -> None:
-    assert is_deep(0.48, 1.0) and not is_deep(0.75, 1.0)
-
-
-def test_most_damping() -> None:
-    assert swings(0.24) and swings(-0.24) and not swings(0.375)
-
-
-def test_unsure_peak() -> None:
-    """A frequency that is told to 1 %."""
-    for sd, told in ((0.32, True), (0.5, False)):
-        assert is_sharp(Peak("resonance", Size(40.0, sd), Size(0.02, 0.01))) is told
-
-
-def test_points_around() -> None:
-    assert are_there(3, 4) and not are_there(2, 3)
-    assert not are_there(2, 2)
-
-
-def test_mostly_seen() -> None:
-    assert are_there(12, 20) and not are_there(8, 20)
-
-
-def test_rests_at_least() -> None:
-    assert rests_enough(0.0375) and not rests_enough(0.024)
-
-
-def test_leaves_less() -> None:
-    assert leaves_less(-0.32, 0.0) and not leaves_less(-0.2, 0.0)
+def test_stands_out() -> None:
+    """A resonance adds so much to the response, an anti-resonance takes it away."""
+    assert is_large(0.5, 1.0) and not is_large(0.32, 1.0)
+    assert is_deep(0.5, 1.0) and not is_deep(0.68, 1.0)
 
 
 def test_slides_needed() -> None:
@@ -824,5 +744,6 @@ def test_every_threshold_has_a_test() -> None:
     """A new number is held on either side too: by `test_<its name>` above."""
     numbers = {f"test_{name.lower()}" for name in vars(thresholds) if name.isupper()}
     tests = {name for name in globals() if name.startswith("test_")}
-    assert tests - numbers == {"test_every_threshold_has_a_test"}
+    more = {"test_every_threshold_has_a_test", "test_events_needed_over_frequency"}
+    assert tests - numbers == more
     assert numbers - tests == set()

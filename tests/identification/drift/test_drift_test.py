@@ -6,12 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.drift_machines import active
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest
 from identification.drift.drift_test import DriftSettings, drift_test, estimate_under_test
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
-from identification.drift.reference_model import ReferenceModel, in_force
+from identification.drift.reference_model import ReferenceModel
 from identification.effects._library import built_in
 from identification.errors import BadSpecification
 from identification.estimation.fit import fit_plant
@@ -28,7 +29,7 @@ NINE = table(2)
 @cache
 def model() -> ReferenceModel:
     fit = fit_plant([made_log(NINE, seed=1)], np.random.default_rng(1), rig=FORCE)
-    return in_force(fit, FORCE, key="first", fastest=0.2)
+    return active(fit, FORCE, key="first", fastest=0.2)
 
 
 def verdict_on(log: Log, last: DriftTest | None = None) -> DriftTest:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.drift.mewma import Mean
-from identification.drift.single_log import LogChange, detectable_alone, detectable_together
+from identification.drift.practical_margin import Change
+from identification.drift.single_log import LogChange, detectable_together
 
 MEASURED = 1e-6 * np.array([[4.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 25.0]])
 VARIED = np.full(3, 1e-4)
@@ -17,14 +17,14 @@ def of(change: list[float], varied: float = 1e-4) -> LogChange:
 
 def test_a_change_within_the_margin_is_none_however_little_the_machine_varies() -> None:
     found = of([0.019, -0.015, 0.0], varied=1e-8)
-    assert found.nearer.distance.square == 0.0
+    assert found.nearer.square == 0.0
     assert np.all(found.alone == 0.0)
 
 
 def test_what_the_machine_varies_by_is_none_however_well_it_is_measured() -> None:
     found = of([0.03, 0.0, 0.0])
-    assert found.beyond_margin.distance.square > SQUARE
-    assert found.nearer.distance.square < SQUARE
+    assert found.beyond_margin.square > SQUARE
+    assert found.nearer.square < SQUARE
     assert found.alone[0] == pytest.approx(0.03 / np.sqrt(1.04e-4))
 
 
@@ -36,7 +36,7 @@ def test_margin_and_variation_do_not_add_up() -> None:
 def test_the_smallest_change_is_seen_as_often_as_is_said() -> None:
     rng = np.random.default_rng(1)
     errors = rng.multivariate_normal(np.zeros(3), MEASURED, 400)
-    sizes = detectable_alone(of([0.0, 0.0, 0.0]), SQUARE)
+    sizes = of([0.0, 0.0, 0.0]).detectable_alone(SQUARE)
     for i, size in enumerate(sizes):
         changed = size * np.eye(3)[i]
         alarms = [of(list(changed + error)).alone[i] ** 2 > SQUARE for error in errors]
@@ -47,15 +47,13 @@ def test_all_together_see_the_smallest_change_at_least_as_often() -> None:
     rng = np.random.default_rng(2)
     errors = rng.multivariate_normal(np.zeros(3), MEASURED, 200)
     margin = np.full(3, 0.02)
-    sizes = detectable_together(Mean((0, 1, 2), np.zeros(3), MEASURED, margin), SQUARE)
+    sizes = detectable_together(Change((0, 1, 2), np.zeros(3), MEASURED, margin), SQUARE)
     for i, size in enumerate(sizes):
         changed = size * np.eye(3)[i]
-        squares = [
-            Mean((0, 1, 2), changed + error, MEASURED, margin).distance.square for error in errors
-        ]
+        squares = [Change((0, 1, 2), changed + error, MEASURED, margin).square for error in errors]
         assert np.mean(np.array(squares) > SQUARE) > 0.86
 
 
 def test_a_change_that_nothing_shows_is_never_seen() -> None:
-    blind = Mean((0,), np.zeros(1), np.array([[1e4]]), np.array([0.02]))
+    blind = Change((0,), np.zeros(1), np.array([[1e4]]), np.array([0.02]))
     assert detectable_together(blind, SQUARE)[0] == np.inf

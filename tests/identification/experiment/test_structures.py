@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
-from identification.experiment.information import rests_of, run_errors
-from identification.experiment.structures import discriminated, sought, structures
+from identification.experiment.information import information, rests_of, run_errors
+from identification.experiment.structures import discriminated, sought
 from tests.identification.experiment.test_information import MOTOR, H, pulses
 
 STROKE = (-0.2, 0.1)
@@ -28,7 +28,7 @@ def test_a_law_is_told_better_from_another_place_than_from_its_like() -> None:
     errors = run_errors(log, log["y"], rests_of(v, H, 0.5), 1e-5, 0.0)
     keys = ("stribeck", "nonlinear_viscous", "spring")
     rivals = [sought(built_in()[key], MOTOR, STROKE) for key in keys]
-    told = structures(MOTOR, rivals, errors, "command")
+    told = information(MOTOR, errors, "command", rivals)
     assert told.names[-3:] == keys
     own = tuple(range(len(told.names) - 3))
     place = {key: told.names.index(key) for key in keys}

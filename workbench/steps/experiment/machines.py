@@ -19,7 +19,6 @@ from identification.experiment.information import (
     rests_of,
     run_errors,
 )
-from identification.experiment.structures import structures
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.plant import Actuator, Motor, Plant
@@ -97,10 +96,7 @@ class Bench:
         own = self.fitted(plant)
 
         def told(run: LoopRun) -> Information:
-            errors_of = self.errors(plant, run)
-            if rivals:
-                return structures(own, rivals, errors_of, self.drive)
-            return information(own, errors_of, self.drive)
+            return information(own, self.errors(plant, run), self.drive, rivals)
 
         whole = self.by_command and isinstance(plant.actuator, Actuator)
         return Machine(lambda r: self.run(plant, r), told, whole)
