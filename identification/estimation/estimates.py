@@ -153,8 +153,7 @@ def normal_samples(values: Array, sd: Array) -> Array:
 
 
 def silent_reason(name: str, events: Events, log: str) -> str | None:
-    """Reason why the events of the log do not identify a parameter, if so, and what to add to
-    it."""
+    """Reason why a log's events do not identify a parameter, if so, and what to add to it."""
     if name not in NAMES or name == "m":
         return None
     side = 1 if name.endswith("n") else 0
@@ -189,8 +188,7 @@ def _scale(name: str, events: Events) -> float:
 
 def _beside(name: str, value_of: Mapping[str, float], events: Events) -> float:
     """Size at which a term of sliding friction would be as large as the term beside it, 0 where
-    there is none: a viscous term is known where it is significantly smaller than the Coulomb
-    force."""
+    there is none: a viscous term is known where it is far below the Coulomb force."""
     side = 1 if name.endswith("n") else 0
     fastest = events.fastest[side]
     if name.startswith("F_v") and fastest > 0:

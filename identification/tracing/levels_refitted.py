@@ -68,7 +68,7 @@ def follows_worse(error: float, usual: float) -> bool:
 
 
 def explains_the_change(was: float, now: float, usual: float) -> bool:
-    """Whether other levels take most of an error away, down to what is usual. Ours: README, (9)."""
+    """Whether other levels take most of an error away, down to what is usual. Ours."""
     return now <= EARNS * was and not follows_worse(now, usual)
 
 

@@ -55,8 +55,7 @@ def predicts_worse(
 
 
 def is_worse(before: float, after: float) -> bool:
-    """Whether a prediction is clearly worse than another; errors in units of the noise. Ours,
-    README (7)."""
+    """Whether a prediction is clearly worse than another; errors in units of the noise. Ours."""
     return after**2 - 1.0 > WORSE**2 * max(before**2 - 1.0, 1.0)
 
 

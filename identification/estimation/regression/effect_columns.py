@@ -14,8 +14,7 @@ BOUND_SLACK = 0.05  # of an effect's largest size, by which another may lie out 
 
 
 def equations_of(effect: Effect, by_command: bool, held: bool) -> tuple[str, ...]:
-    """The equations in which an effect shows; held: the command gives the force itself (a
-    motor)."""
+    """The equations in which an effect shows; held: the force is a motor's, by its command."""
     if held and effect.place.on_command:
         return (MECHANICAL,)
     if effect.place.rubs or effect.place.drives:

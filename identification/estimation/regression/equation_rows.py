@@ -110,8 +110,7 @@ class MotionLog:
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
-        """Samples (n,) in which the body moves significantly, the first, and the signals in
-        them."""
+        """Samples (n,) in which the body clearly moves, the first, and the signals in them."""
         own = self.signals["d"] != 0
         own[:1] = True  # from which time counts
         return own, {key: x[own] for key, x in self.signals.items()}

@@ -164,8 +164,7 @@ class _Unknowns:
         self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
         reach: Array | float = np.inf, little: float | None = None,
     ) -> Minimum:  # fmt: skip
-        """The nearest minimum over windows of so many seconds; tie: with the regression as
-        prior."""
+        """The nearest minimum over windows of so many seconds; tie: the regression is the prior."""
         now = self.plant_at(x)
         errors_of = judge(now, self.logs, self.drive, seconds, bristle)
         # While most is far off, what is far off must still pull.

@@ -32,8 +32,7 @@ SIDE_CROWD, SIDE_GENERATIONS = 24, 10
 
 
 def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: float) -> Plant:
-    """The plant at the best of a few band widths and stick limits, then of either direction.
-    Ours."""
+    """The plant at the best of a few band widths and stick limits, then of a direction. Ours."""
     p = plant.friction
     tried = [
         replace(p, dv_p=width * band, dv_n=-width * band, F_sp=more * p.F_sp, F_sn=more * p.F_sn)

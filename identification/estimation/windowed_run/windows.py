@@ -1,6 +1,6 @@
 """Free runs in windows from measured states, and errors freed of the states' uncertainty.
 
-A window begins at a significant rest if one is near: the state is known there. In motion position
+A window begins at a clear rest if one is near: the state is known there. In motion position
 and velocity are known within the sensors' noise only, and a small error of either moves the whole
 window. So the states are unknowns z of unit variance, and what their likeliest values leave counts:
 r - B z, z = (I + B'B)^-1 B'r, for residuals r and B their change with the states in units of the
@@ -189,8 +189,7 @@ def _calm(one: MotionLog, wanted: int, step: int, speed: Array, enough: float) -
 
 
 def _rests(one: MotionLog) -> IntArray:
-    """Samples in the middle of every significant rest, and the first where a log begins with
-    one."""
+    """Samples in the middle of every clear rest, and the first where a log begins with one."""
     found = []
     for low, high in rest_stretches(one, samples(LEAST_REST, one.log.h)):
         v, sd = _creep(one, low, high)

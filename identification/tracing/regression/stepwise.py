@@ -168,7 +168,7 @@ def trusted(
 
 def is_trusted(left: float, explained: float) -> bool:
     """Whether an effect carries over, or explains most; left: share of the error on logs left out,
-    explained: of what is missing. Ours: README, (5)."""
+    explained: of what is missing. Ours: `../README.md`, (5)."""
     return left * WORSE < 1.0 or explained >= HALF_LEFT
 
 
@@ -351,8 +351,7 @@ def contribution_rms(
 
 
 def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
-    """Whether the effect is large enough to matter to the machine, noise apart. Ours: README,
-    (2)."""
+    """Whether the effect is large enough to matter to the machine, noise apart. Ours."""
     level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
     if candidate.effect.place.shows:
         return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
