@@ -131,7 +131,7 @@ def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
     parameters: number of them; smoothing: the weight of the newest log. Of a chart whose logs have
     unit covariance; a margin only makes alarms rarer.
     """
-    low, high = chi2.isf([0.5, 1e-3 / run_length], parameters)
+    low, high = (float(chi2.isf(p, parameters)) for p in (0.5, 1e-3 / run_length))
 
     def too_long(square: float) -> float:
         return float(np.log(mean_run(parameters, smoothing, square) / run_length))

@@ -582,7 +582,8 @@ def test_events_needed_over_frequency() -> None:
         bands([3.0], [1e-3], 3.0)
     for points, shown in ((38, False), (60, True)):
         one = np.ones(points)
-        found = Response(np.linspace(1.0, 20.0, points), one + 0j, 0.99 * one, 50.0 * one)
+        H = one.astype(np.complex128)
+        found = Response(np.linspace(1.0, 20.0, points), H, 0.99 * one, 50.0 * one)
         assert (fit_modes(found) is not None) is shown
 
 
