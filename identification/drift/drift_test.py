@@ -180,7 +180,8 @@ class _Tests:
         """Smallest change of each parameter of the log that one of the three sees."""
         here, over, square = self.here, self.over, self.single.threshold
         together = np.maximum(
-            *(detectable_together(one, square) for one in (here.beyond_margin, here.beyond_usual))
+            detectable_together(here.beyond_margin, square),
+            detectable_together(here.beyond_usual, square),
         )
         of_log = np.minimum(here.detectable_alone(self.alone.threshold), together)
         lasting = dict(zip(over.at, detectable_together(over, self.mean.threshold), strict=True))

@@ -14,8 +14,7 @@ from identification.model.plant import Plant, units_of
 
 COULOMB = ("F_cp", "F_cn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
-LEAST_EFFECT = 0.1  # of an effect's typical parameter, below which one is small
-LEAST_FORCE = 0.1  # of the largest friction force, below which a force is small
+SMALL_BESIDE = 0.1  # of the largest friction force, or of an effect's typical parameter
 
 
 @dataclass(frozen=True)
@@ -102,8 +101,8 @@ class ReferenceModel:
         if own:
             effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
             param = next(p for p in effect.params if p.name == own)
-            return 1.0 if own == "asymmetry" else LEAST_EFFECT * abs(param.typical)
-        least = LEAST_FORCE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
+            return 1.0 if own == "asymmetry" else SMALL_BESIDE * abs(param.typical)
+        least = SMALL_BESIDE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
         if name in VISCOUS_NAMES:
             return least / self.fastest if self.fastest > 0 else 0.0
         return least if name in FORCES else 0.0

@@ -18,7 +18,6 @@ from identification.drift.practical_margin import Change
 from identification.thresholds import CHANCE_TO_SEE
 
 WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looked for
-SURELY_SEEN = float(norm.ppf(CHANCE_TO_SEE))  # deviations beyond its limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +63,9 @@ class LogChange:
         square: threshold of the largest of `alone`, squared. The power is over the errors of the
         log and the model: the parameter lies by so much from the model's on the day of the log.
         """
-        limit, (measured, usual) = np.sqrt(square), self._deviations
-        beyond = self.margin + (limit + SURELY_SEEN) * measured
-        return np.asarray(np.maximum(beyond, limit * usual + SURELY_SEEN * measured))
+        limit, more, (measured, usual) = np.sqrt(square), _surely(), self._deviations
+        beyond = self.margin + (limit + more) * measured
+        return np.asarray(np.maximum(beyond, limit * usual + more * measured))
 
     @property
     def _deviations(self) -> tuple[Array, Array]:
@@ -76,13 +75,18 @@ class LogChange:
         return np.sqrt(square), np.sqrt(square + self.varied)
 
 
+def _surely() -> float:
+    """Deviations beyond its limit at which a test alarms with the chance CHANCE_TO_SEE."""
+    return float(norm.ppf(CHANCE_TO_SEE))
+
+
 def detectable_together(found: Change, square: float) -> Array:
     """Smallest change (k,) of one parameter that the test of all together sees, or at most that.
 
     square: its threshold. By how far the change lies from the margin's box without errors: errors
     bring it nearer by more than a normal deviation once in 1 / (1 - CHANCE_TO_SEE) at most.
     """
-    needed = (np.sqrt(square) + SURELY_SEEN) ** 2
+    needed = (float(np.sqrt(square)) + _surely()) ** 2
 
     def smallest(one: Array) -> float:
         def missing(size: float) -> float:
