@@ -15,11 +15,8 @@ FEW_VALUES = 8  # values of a signal (a switch, a gear) that are each a level of
 MOST_SIGNALS = 3  # signals named
 OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
 SECOND_SIGNAL = 0.15  # share of what is left that a second signal must explain
-APART = 0.1  # of the residual, that a vibration in time must explain beyond any signal: a periodic
-# motion makes all that depends on place or speed periodic as well
 FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length resolves
 GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
-OF_MOTION = 0.1  # of the motion, that a vibration at a rate explains where the rate is its own
 HARMONICS = 3  # of a motion, in which what depends on it may vibrate
 SWINGS = 200  # rows; of fewer, the frequency that fits best does so by chance
 ROWS_IN_PERIOD = 4.0  # rows in a period
@@ -76,7 +73,8 @@ def dependence(
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
         swing = periodic_share(r, signals["t"], rate, block)
-        apart = swing[0] > APART + max(share for share, _ in best.values())
+        # A periodic motion makes all that depends on place or speed periodic as well.
+        apart = swing[0] > OF_ACCOUNT + max(share for share, _ in best.values())
         if apart and not _of_the_motion(signals, rate, block):
             best["t"] = swing
         else:
@@ -99,7 +97,7 @@ def _of_the_motion(signals: Mapping[str, Array], rate: float, block: IntArray) -
     """Whether the motion itself goes at this rate [Hz], or at one of which it is a harmonic."""
     t = signals["t"]
     return any(
-        periodic_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_MOTION
+        periodic_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_ACCOUNT
         for x in (signals[name] for name in ("y", "v") if name in signals)
         for harmonic in range(1, HARMONICS + 1)
     )
