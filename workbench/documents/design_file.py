@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from design.cascade import CascadeGains
+from design.feed_forward import FeedForward
 from design.pid import PIDGains
 from design.schedule import Over
 from design.series_filters import FilterKind, SeriesFilter
@@ -41,6 +42,16 @@ from workbench.documents.drive import (
 from workbench.documents.plain import plain
 
 DESIGN_SCHEMA = "design/2"
+# A value's numbers by name, each with its unit; None: it has no such number.
+Numbers = Mapping[str, Estimate | None]
+# The unit of each, or the name of one that hangs on the machine, as `FileUnits` has it.
+FRICTION_AHEAD = {"F_cp": "force", "F_cn": "force", "F_vp": "viscous", "F_vn": "viscous"}
+UNITS_OF: Mapping[type, Mapping[str, str]] = {
+    PIDGains: {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
+    CascadeGains: {"k_v": "1/s", "k_p": "damping", "T_n": "s", "eps": "s", "v_ff": "1"},
+    FeedForward: {**FRICTION_AHEAD, "band": "speed", "m": "mass", "most": "force"},
+}
+POLE_UNITS = {"w_n": "rad/s", "zeta": "1"}
 
 
 @dataclass(frozen=True)
@@ -53,28 +64,6 @@ class _LinearFile:
     m: Estimate | None
     F_v: Estimate | None
     resonance: Mapping[str, Estimate] | None = None
-
-
-@dataclass(frozen=True)
-class GainsFile:
-    k_R: Estimate
-    T_i: Estimate
-    T_d: Estimate
-    eps: Estimate
-    b: Estimate
-    c: Estimate
-
-
-@dataclass(frozen=True)
-class CascadeFile:
-    """`CascadeGains` as a result has them, and k_p in the unit of the drive's command."""
-
-    k_v: Estimate
-    k_p: Estimate
-    T_n: Estimate
-    eps: Estimate
-    v_ff: Estimate
-    k_p_command: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -92,43 +81,24 @@ class SeriesFile:
 
 
 @dataclass(frozen=True)
-class FeedForwardFile:
-    """`FeedForward` as a result has it."""
-
-    F_cp: Estimate
-    F_cn: Estimate
-    F_vp: Estimate
-    F_vn: Estimate
-    band: Estimate
-    m: Estimate
-    most: Estimate
-
-
-@dataclass(frozen=True)
-class _DominantFile:
-    w_n: Estimate
-    zeta: Estimate
-
-
-@dataclass(frozen=True)
 class ControllerFile:
     R: tuple[float, ...]
     S: tuple[float, ...]
     T: tuple[float, ...]
     h: Estimate
-    dominant: _DominantFile
+    dominant: Numbers
     auxiliary: tuple[tuple[float, float], ...]
     reference_rate: Estimate
     reference_lag: Estimate
     margins: MarginValues
     overshoot: float
     missed: tuple[str, ...]
-    gains: GainsFile | None = None
+    gains: Numbers | None = None
     note: str | None = None
     law: LawFile | None = None
-    cascade: CascadeFile | None = None
+    cascade: Numbers | None = None
     filter: SeriesFile | None = None
-    feed_forward: FeedForwardFile | None = None
+    feed_forward: Numbers | None = None
     reference_acceleration: Estimate | None = None
 
 
@@ -142,22 +112,11 @@ class ScheduledFile:
 
 
 @dataclass(frozen=True)
-class SchedulePoint:
-    """Where a row of a schedule holds, and the friction that a P-PI feeds forward there."""
-
-    at: Estimate
-    F_cp: Estimate
-    F_cn: Estimate
-    F_vp: Estimate
-    F_vn: Estimate
-
-
-@dataclass(frozen=True)
 class ScheduleFile:
     """`GainSchedule` as a result has it."""
 
     over: Over
-    points: tuple[SchedulePoint, ...]
+    points: tuple[Numbers, ...]
     pid: ScheduledFile | None = None
     p_pi: ScheduledFile | None = None
 
@@ -203,6 +162,19 @@ class FileUnits:
     stiffness: str
     friction: Mapping[str, str]
     drive: DriveUnits
+
+    def by_name(self, names: Mapping[str, str]) -> dict[str, str]:
+        """The unit of each number, where they are said as in `UNITS_OF`."""
+        own = {
+            "length": self.length,
+            "speed": self.speed,
+            "stiffness": self.stiffness,
+            "force": self.drive.force,
+            "damping": f"{self.drive.force} s/{self.length}",
+            "viscous": self.friction["F_vp"],
+            "mass": self.friction["m"],
+        }
+        return {name: own.get(unit, unit) for name, unit in names.items()}
 
     @classmethod
     def of(cls, motion: Motion, command: str | None) -> "FileUnits":
@@ -262,7 +234,6 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
 
 def _schedule_file(found: Design, table: GainSchedule, units: FileUnits) -> ScheduleFile:
     names = schedule_units(table.over, units)
-    rows = [(at, *friction) for at, friction in zip(table.at, table.friction, strict=True)]
 
     def of(name: Structure) -> ScheduledFile | None:
         one = table.controllers.get(name)
@@ -272,66 +243,65 @@ def _schedule_file(found: Design, table: GainSchedule, units: FileUnits) -> Sche
         return ScheduledFile(tuple(points), one.recommended, one.why)
 
     points = tuple(
-        SchedulePoint(*(Estimate(v, unit) for v, (_, unit) in zip(row, names, strict=True)))
-        for row in rows
+        _with_units(dict(zip(names, (at, *friction), strict=True)), names)
+        for at, friction in zip(table.at, table.friction, strict=True)
     )
     return ScheduleFile(table.over, points, of("pid"), of("p-pi"))
 
 
-def schedule_units(over: Over, units: FileUnits) -> list[tuple[str, str]]:
-    """Names and units of a schedule's row."""
-    force, friction = units.drive.force, units.friction
-    at = {"place": units.length, "load": force, "direction": "1"}[over]
-    viscous = [(name, friction[name]) for name in ("F_vp", "F_vn")]
-    return [("at", at), ("F_cp", force), ("F_cn", force), *viscous]
+def schedule_units(over: Over, units: FileUnits) -> dict[str, str]:
+    """Units of a schedule's row by name."""
+    at = {"place": "length", "load": "force", "direction": "1"}[over]
+    return units.by_name({"at": at, **FRICTION_AHEAD})
 
 
-def _gains_file(gains: PIDGains, units: FileUnits) -> GainsFile:
-    return GainsFile(
-        **{name: Estimate(getattr(gains, name), unit) for name, unit in gain_units(units)}
-    )
+def _with_units(values: Mapping[str, float], units: Mapping[str, str]) -> dict[str, Estimate]:
+    return {name: Estimate(values[name], unit) for name, unit in units.items()}
+
+
+def _numbers(value: object, units: FileUnits) -> dict[str, Estimate] | None:
+    """A value of `UNITS_OF` as it is written; None for None."""
+    if value is None:
+        return None
+    return _with_units(vars(value), units.by_name(UNITS_OF[type(value)]))
 
 
 def _controller_file(
     one: Controller, command: Command | None, output: Output, units: FileUnits
 ) -> ControllerFile:
-    w_n, zeta = one.dominant
     reason = None if one.rate is not None else "no limit of force or command to keep"
     return ControllerFile(
         R=one.R,
         S=one.S,
         T=one.T,
         h=Estimate(one.h, "s"),
-        dominant=_DominantFile(Estimate(w_n, "rad/s"), Estimate(zeta, "1")),
+        dominant=_with_units(dict(zip(POLE_UNITS, one.dominant, strict=True)), POLE_UNITS),
         auxiliary=one.auxiliary,
         reference_rate=Estimate(one.rate, units.speed, reason=reason),
         reference_lag=Estimate(one.lag, "s"),
         margins=one.margins,
         overshoot=one.overshoot,
         missed=one.missed,
-        gains=None if one.gains is None else _gains_file(one.gains, units),
+        gains=_numbers(one.gains, units),
         note=one.note,
         law=law_file(one.law(command), output, command.limit, units.drive) if command else None,
         cascade=None if one.cascade is None else _cascade_file(one.cascade, command, units),
         filter=None if one.series is None else _series_file(one.series),
-        feed_forward=None if one.feed_forward is None else FeedForwardFile(
-            **{name: Estimate(getattr(one.feed_forward, name), unit)
-               for name, unit in feed_forward_units(units)}
-        ),
+        feed_forward=_numbers(one.feed_forward, units),
         reference_acceleration=None if one.acceleration is None else Estimate(
             one.acceleration, f"{units.length}/s^2"
         ),
     )  # fmt: skip
 
 
-def _cascade_file(gains: CascadeGains, command: Command | None, units: FileUnits) -> CascadeFile:
+def _cascade_file(gains: CascadeGains, command: Command | None, units: FileUnits) -> Numbers:
+    """Its gains, and k_p in the unit of the drive's command."""
     per = command.force_per_command if command else None
-    values = {name: Estimate(getattr(gains, name), unit) for name, unit in cascade_units(units)}
     own = None
     if command and per and command.unit != units.drive.force:
         unit = f"{command.unit} s/{units.length}"
         own = Estimate(gains.k_p / per, unit)
-    return CascadeFile(**values, k_p_command=own)
+    return {**(_numbers(gains, units) or {}), "k_p_command": own}
 
 
 def _series_file(one: SeriesFilter) -> SeriesFile:
@@ -340,24 +310,3 @@ def _series_file(one: SeriesFilter) -> SeriesFile:
         one.kind, Estimate(one.frequency, "Hz"), Estimate(one.numerator, "1"),
         Estimate(one.denominator, "1"), Estimate(one.width, "Hz"), one.depth_db, made.b, made.a,
     )  # fmt: skip
-
-
-def cascade_units(units: FileUnits) -> list[tuple[str, str]]:
-    """Names and units of a cascade's gains."""
-    per_speed = f"{units.drive.force} s/{units.length}"
-    return [("k_v", "1/s"), ("k_p", per_speed), ("T_n", "s"), ("eps", "s"), ("v_ff", "1")]
-
-
-def feed_forward_units(units: FileUnits) -> list[tuple[str, str]]:
-    """Names and units of a feed-forward's numbers."""
-    force, friction = units.drive.force, units.friction
-    viscous = [(name, friction[name]) for name in ("F_vp", "F_vn")]
-    return [
-        ("F_cp", force), ("F_cn", force), *viscous, ("band", units.speed), ("m", friction["m"]),
-        ("most", force),
-    ]  # fmt: skip
-
-
-def gain_units(units: FileUnits) -> list[tuple[str, str]]:
-    times = [(name, "s") for name in ("T_i", "T_d", "eps")]
-    return [("k_R", units.stiffness), *times, ("b", "1"), ("c", "1")]

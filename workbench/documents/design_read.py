@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from design.pid import PIDGains
 from design.series_filters import SeriesFilter
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
+from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import converted, in_unit
 from workbench.documents.contradictions import refuse_apart, refuse_unequal
 from workbench.documents.design import (
@@ -25,18 +27,15 @@ from workbench.documents.design import (
 )
 from workbench.documents.design_file import (
     DESIGN_SCHEMA,
-    CascadeFile,
+    POLE_UNITS,
+    UNITS_OF,
     ControllerFile,
     DesignFile,
-    FeedForwardFile,
     FileUnits,
-    GainsFile,
+    Numbers,
     ScheduleFile,
     SeriesFile,
     as_file,
-    cascade_units,
-    feed_forward_units,
-    gain_units,
     schedule_units,
     units_of,
 )
@@ -51,6 +50,9 @@ from workbench.documents.drive import (
 )
 from workbench.documents.model import used
 from workbench.documents.reading import Stored, read_result
+
+Value = TypeVar("Value")
+DERIVED = ("k_p_command",)  # numbers that a file has for its reader alone
 
 
 def read_design(path: Path | Stored) -> Design:
@@ -77,7 +79,7 @@ def _pairs(written: object, ours: object, where: str) -> Iterator[tuple[str, Est
         yield where, written, ours
     elif isinstance(written, Mapping) and isinstance(ours, Mapping):
         for key, one in written.items():
-            yield from _pairs(one, ours[key], f"{where}.{key}")
+            yield from _pairs(one, ours.get(key), f"{where}.{key}")
     elif is_dataclass(written):
         for each in fields(written):
             place = f"{where}.{each.name}" if where else each.name
@@ -169,7 +171,7 @@ def _schedule(found: ScheduleFile, units: FileUnits) -> GainSchedule:
     """The schedule; raises BadModel where a controller has not one at every point."""
     names = schedule_units(found.over, units)
     rows = [
-        [number(getattr(one, name), unit, f"schedule.points[{k}].{name}") for name, unit in names]
+        tuple(_numbers(one, names, f"schedule.points[{k}]").values())
         for k, one in enumerate(found.points)
     ]
     controllers = dict[Structure, ScheduledController]()
@@ -191,7 +193,9 @@ def _schedule(found: ScheduleFile, units: FileUnits) -> GainSchedule:
 
 
 def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller:
-    dominant, rate = one.dominant, one.reference_rate
+    rate, dominant = one.reference_rate, _numbers(one.dominant, POLE_UNITS, f"{where}.dominant")
+    for name, value in dominant.items():
+        positive(Estimate(value, POLE_UNITS[name]), POLE_UNITS[name], f"{where}.dominant.{name}")
     if rate.value is None and not rate.reason:
         raise BadModel(f"[{where}.reference_rate] is null; it needs a 'reason'")
     at = f"{where}.reference_rate"
@@ -200,36 +204,44 @@ def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller
         S=one.S,
         T=one.T,
         h=positive(one.h, "s", f"{where}.h"),
-        dominant=(
-            positive(dominant.w_n, "rad/s", f"{where}.dominant.w_n"),
-            positive(dominant.zeta, "1", f"{where}.dominant.zeta"),
-        ),
+        dominant=(dominant["w_n"], dominant["zeta"]),
         auxiliary=one.auxiliary,
         margins=one.margins,
         rate=None if rate.value is None else positive(rate, units.speed, at),
         lag=number(one.reference_lag, "s", f"{where}.reference_lag"),
         overshoot=one.overshoot,
         missed=one.missed,
-        gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
+        gains=_read(PIDGains, one.gains, units, f"{where}.gains"),
         note=one.note,
         W=None if one.law is None else one.law.W,
-        cascade=None if one.cascade is None else _cascade(one.cascade, units, f"{where}.cascade"),
+        cascade=_read(CascadeGains, one.cascade, units, f"{where}.cascade"),
         series=None if one.filter is None else _series(one.filter, one.h, f"{where}.filter"),
-        feed_forward=None if one.feed_forward is None else _feed_forward(
-            one.feed_forward, units, f"{where}.feed_forward"
-        ),
+        feed_forward=_read(FeedForward, one.feed_forward, units, f"{where}.feed_forward"),
         acceleration=None if one.reference_acceleration is None else positive(
             one.reference_acceleration, f"{units.length}/s^2", f"{where}.reference_acceleration"
         ),
     )  # fmt: skip
 
 
-def _cascade(found: CascadeFile, units: FileUnits, where: str) -> CascadeGains:
-    values = {
-        name: number(getattr(found, name), unit, f"{where}.{name}")
-        for name, unit in cascade_units(units)
-    }
-    return CascadeGains(**values)
+def _read(kind: type[Value], found: Numbers | None, units: FileUnits, where: str) -> Value | None:
+    """A value of `UNITS_OF`, None for None; raises BadModel where a number is missing."""
+    if found is None:
+        return None
+    return kind(**_numbers(found, units.by_name(UNITS_OF[kind]), where))
+
+
+def _numbers(found: Numbers, units: Mapping[str, str], where: str) -> dict[str, float]:
+    """The numbers of these names; raises BadModel where one is missing or is not known."""
+    for name in found:
+        if name not in units and name not in DERIVED:
+            raise BadModel(f"[{where}] unknown key {name!r}{nearest(name, units)}")
+    out = {}
+    for name, unit in units.items():
+        one = found.get(name)
+        if one is None:
+            raise BadModel(f"[{where}] has no {name!r}; add it, or run the command again")
+        out[name] = number(one, unit, f"{where}.{name}")
+    return out
 
 
 def _series(found: SeriesFile, h: Estimate, where: str) -> SeriesFilter:
@@ -249,22 +261,6 @@ def _series(found: SeriesFile, h: Estimate, where: str) -> SeriesFilter:
                 " again"
             )
     return one
-
-
-def _feed_forward(found: FeedForwardFile, units: FileUnits, where: str) -> FeedForward:
-    values = {
-        name: number(getattr(found, name), unit, f"{where}.{name}")
-        for name, unit in feed_forward_units(units)
-    }
-    return FeedForward(**values)
-
-
-def _gains(found: GainsFile, units: FileUnits, where: str) -> PIDGains:
-    values = {
-        name: number(getattr(found, name), unit, f"{where}.{name}")
-        for name, unit in gain_units(units)
-    }
-    return PIDGains(**values)
 
 
 def _nine(found: Estimate, name: str, units: FileUnits) -> Estimate:
