@@ -119,7 +119,7 @@ def tune_cascade(
     for one in filters:
         found += [(score, gains, one) for score, gains in _tried(seen, m, goals, one, v_ff)]
     found.sort(key=lambda each: -each[0])
-    best = _first_kept(seen, goals, found)
+    best = _first_admissible(seen, goals, found)
     if best is None:
         raise BadSpecification(
             "no P-PI cascade stabilizes these plants with the margins asked for; ask for less"
@@ -129,7 +129,7 @@ def tune_cascade(
         for score, gains in _tried(seen, m, goals, best.series, v_ff, near=best.gains)
     ]
     again.sort(key=lambda each: -each[0])
-    finer = _first_kept(seen, goals, again)
+    finer = _first_admissible(seen, goals, again)
     if finer is not None and not finer.missed and finer.bandwidth > best.bandwidth:
         return finer
     return best
@@ -167,14 +167,14 @@ def _tried(
         for number, P in enumerate(seen.P):
             L = P * C
             distance = np.abs(1.0 + L)
-            kept = np.min(distance, axis=1) >= goals.modulus
+            admissible = np.min(distance, axis=1) >= goals.modulus
             if number == 0:
-                kept &= _delay_borne(seen.f * h, L) >= goals.delay
+                admissible &= _delay_borne(seen.f * h, L) >= goals.delay
                 if goals.effort is not None:
                     effort = np.max(np.abs(C) / distance, axis=1)
-                    kept &= effort <= 10.0 ** (goals.effort / 20.0)
-            C, T_n, k_v = C[kept], T_n[kept], k_v[kept]
-            wide = np.minimum(wide[kept], _first_above(seen.f, 1.0 / distance[kept]))
+                    admissible &= effort <= 10.0 ** (goals.effort / 20.0)
+            C, T_n, k_v = C[admissible], T_n[admissible], k_v[admissible]
+            wide = np.minimum(wide[admissible], _first_above(seen.f, 1.0 / distance[admissible]))
             if not len(C):
                 break
         for bandwidth, T, k in zip(wide, T_n, k_v, strict=True):
@@ -212,7 +212,7 @@ def _points(
     ]
 
 
-def _first_kept(
+def _first_admissible(
     seen: _Evaluated, goals: Goals, found: Sequence[tuple[float, CascadeGains, SeriesFilter | None]]
 ) -> TunedCascade | None:
     """The first that is stable on all plants and meets the goals, as they are given exactly.
@@ -220,17 +220,17 @@ def _first_kept(
     Where none does, the first that is stable; None where none is.
     """
     spare: TunedCascade | None = None
-    looked_at = 0
+    tried = 0
     for _, gains, series in found:
         rst = in_series(gains.rst(seen.h), PASS if series is None else series.filter)
         if not all(_stable(A, B, rst) for A, B in seen.plants):
             continue
-        looked_at += 1
+        tried += 1
         one = _exactly(seen, goals, gains, series, rst)
         if not one.missed:
             return one
         spare = spare or one
-        if looked_at >= EVALUATED_EXACTLY:
+        if tried >= EVALUATED_EXACTLY:
             break
     return spare
 

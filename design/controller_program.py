@@ -134,13 +134,13 @@ def controller_program(
     output = Signal("u", units.command, "command")
     known = _named_law(law, ahead)
     kinds = _Kinds(ahead, law.position == SCHEDULED_LAW)
-    kept = _named_memory(memory, kinds)
-    taken = {one.name for one in (*known, *kept) if isinstance(one, NamedArray)}
-    slots = {slot for one in (*known, *kept) if isinstance(one, NamedArray) for slot in one.slots}
+    cells = _named_memory(memory, kinds)
+    taken = {one.name for one in (*known, *cells) if isinstance(one, NamedArray)}
+    slots = {slot for one in (*known, *cells) if isinstance(one, NamedArray) for slot in one.slots}
     named = {one.name for one in known if isinstance(one, Constant)}
     reader = KernelReader([one.name for one in inputs], taken | slots | named)
     given = [Variable(one.name) for one in inputs]
-    result = as_expression(reader.read(servo_step, (Law(*known), Memory(*kept), *given, 0.0)))
+    result = as_expression(reader.read(servo_step, (Law(*known), Memory(*cells), *given, 0.0)))
     statements = tuple(reader.statements)
     if result != Variable(output.name):
         statements = (*statements, Assign(Variable(output.name), result))

@@ -71,13 +71,13 @@ class DrawnPlants:
         )
         return tuple(
             f"{what} on {100 * share:.0f} % of the machines drawn, {100 * self.probability:g} asked"
-            for kept, what in every
-            if (share := self.share(kept)) < self.probability
+            for met, what in every
+            if (share := self.share(met)) < self.probability
         )
 
-    def share(self, kept: NDArray[np.bool_]) -> float:
+    def share(self, met: NDArray[np.bool_]) -> float:
         """The share of all plants, the lost ones among them, that keep something, by plant (k,)."""
-        return float(np.sum(kept)) / (len(self.A) + self.lost)
+        return float(np.sum(met)) / (len(self.A) + self.lost)
 
 
 @dataclass(frozen=True, eq=False)

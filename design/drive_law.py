@@ -87,10 +87,10 @@ def forgetting(S: Array, time: float | None, h: float) -> Array:
         return S
     if time == 0.0:
         return np.where(np.arange(len(S)) == 0, 1.0, 0.0)
-    left, kept = trim(S), np.ones(1)
+    left, forgetting = trim(S), np.ones(1)
     while left.size > 1 and abs(left.sum()) < 1e-9 * np.abs(left).sum():
         left = divide(left, INTEGRATOR)[0]
-        kept = np.convolve(kept, [1.0, -math.exp(-h / time)])
-    W = np.convolve(left, kept)
+        forgetting = np.convolve(forgetting, [1.0, -math.exp(-h / time)])
+    W = np.convolve(left, forgetting)
     W[0] = 1.0  # but for the rounding of the division
     return np.pad(W, (0, len(S) - len(W)))

@@ -30,7 +30,9 @@ def simulate_effect_loop(
     or a needed signal is missing.
     """
     # In `simulate_loop` a motor's controller knows of a clipped command, another's is not.
-    told = 0.0 if cascade.force is None else None
+    tracking_time = 0.0 if cascade.force is None else None
     limit = cascade.control_limit
-    servo = Servo(cascade.position, cascade.force, friction, control_limit=limit, anti_windup=told)
+    servo = Servo(
+        cascade.position, cascade.force, friction, control_limit=limit, anti_windup=tracking_time
+    )
     return simulate_servo(plant, servo, reference, h, noise=noise, start=start, signals=signals)

@@ -167,14 +167,14 @@ class KernelReader:
                 if given or (isinstance(value, Variable) and value.name in self._inputs):
                     frame.means[name] = value
                 else:
-                    frame.means[name] = self._kept(name, value, frame)
+                    frame.means[name] = self._variable(name, value, frame)
             case ast.Subscript(value=array, slice=index):
                 place = self._value(array, frame).entry(self._value(index, frame))
                 self._emit(place, as_expression(value))
             case _:
                 raise _unsayable(target, frame)
 
-    def _kept(self, name: str, value: Any, frame: Frame) -> Variable:
+    def _variable(self, name: str, value: Any, frame: Frame) -> Variable:
         """The value as a variable of the kernel's own."""
         value = as_expression(value)
         if name not in frame.own:
@@ -211,7 +211,7 @@ class KernelReader:
         self._in_use.add(name)
         before = {**frame.means, name: index}
         frame.means = dict(before)
-        inside = self._aside(self._ending(body, frame))
+        inside = self._read(self._ending(body, frame))
         self._in_use.remove(name)
         if any(frame.means[key] != value for key, value in before.items()):
             raise BadModel("a loop that changes what is known has no form in a program")
@@ -225,12 +225,12 @@ class KernelReader:
         blocks = []
         for body in branches:
             frame.means = dict(start)
-            blocks.append(self._aside(self._ending(body, frame)))
+            blocks.append(self._read(self._ending(body, frame)))
             ends.append(frame.means)
         frame.means = {name: ends[0][name] for name in ends[0] if name in ends[1]}
         for name in [key for key in frame.means if ends[0][key] != ends[1][key]]:
             for at, end in enumerate(ends):
-                blocks[at] += self._aside(lambda n=name, e=end: self._kept(n, e[n], frame))  # type: ignore[misc]
+                blocks[at] += self._read(lambda n=name, e=end: self._variable(n, e[n], frame))  # type: ignore[misc]
             frame.means[name] = frame.own[name]
         self.statements.append(Choice(condition, blocks[0], blocks[1]))
 
@@ -241,12 +241,12 @@ class KernelReader:
         start, blocks = frame.means, []
         for value in values:
             frame.means = dict(start)
-            blocks.append(self._aside(lambda v=value: self._kept(name, v(), frame)))  # type: ignore[misc]
+            blocks.append(self._read(lambda v=value: self._variable(name, v(), frame)))  # type: ignore[misc]
         frame.means = start
         self.statements.append(Choice(condition, blocks[0], blocks[1]))
         return frame.own[name]
 
-    def _aside(self, read: Callable[[], object]) -> tuple[Statement, ...]:
+    def _read(self, read: Callable[[], object]) -> tuple[Statement, ...]:
         """The statements that come with reading something."""
         outside, self.statements = self.statements, []
         read()

@@ -176,18 +176,18 @@ def simulate_loops(
     _refuse_effects(plants)
     loop, p = prepared_loop(plants, cascade, reference, h, noise, start)
     traces, _ = _many(p, loop, h, (0, 0), record=True)
-    keep = traces[:, :, : len(plants)]
-    y, F = keep[RECORD_Y], keep[RECORD_F]
+    recorded = traces[:, :, : len(plants)]
+    y, F = recorded[RECORD_Y], recorded[RECORD_F]
     return LoopRun(
         t=h * np.arange(len(loop.reference), dtype=np.float64),
         r=loop.reference,
         y=y,
-        v=keep[RECORD_V],
+        v=recorded[RECORD_V],
         F=F,
         y_measured=y + loop.noise.y,
         F_measured=F + loop.noise.F,
-        u=keep[RECORD_U],
-        mode=keep[RECORD_MODE].astype(np.int64),
+        u=recorded[RECORD_U],
+        mode=recorded[RECORD_MODE].astype(np.int64),
     )
 
 

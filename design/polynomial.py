@@ -45,14 +45,14 @@ def check_period(h: float) -> float:
 def trim(c: Array, tolerance: float = 0.0) -> Array:
     """`c` without trailing coefficients of at most `tolerance` times the largest; at least one."""
     size = np.abs(c)
-    kept = np.flatnonzero(size > tolerance * size.max())
-    return c[: kept[-1] + 1] if kept.size else c[:1]
+    nonzero = np.flatnonzero(size > tolerance * size.max())
+    return c[: nonzero[-1] + 1] if nonzero.size else c[:1]
 
 
 def leading_zeros(c: Array) -> int:
     """The delay in samples: how many leading coefficients are zero (all, for the zero one)."""
-    kept = np.flatnonzero(c)
-    return int(kept[0]) if kept.size else int(c.size)
+    nonzero = np.flatnonzero(c)
+    return int(nonzero[0]) if nonzero.size else int(c.size)
 
 
 def multiply(*factors: Array) -> Array:
@@ -99,19 +99,19 @@ def evaluate(c: Array, z: ComplexArray | Array | complex) -> ComplexArray:
 
 def roots(c: Array) -> ComplexArray:
     """The roots as values of z, roots at z = 0 and at infinity (pure delay) left out."""
-    kept = np.flatnonzero(c)
-    if kept.size < 2:
+    nonzero = np.flatnonzero(c)
+    if nonzero.size < 2:
         return np.zeros(0, dtype=np.complex128)
-    found = np.roots(c[kept[0] : kept[-1] + 1])
+    found = np.roots(c[nonzero[0] : nonzero[-1] + 1])
     return np.asarray(found, dtype=np.complex128)
 
 
 def largest_root(c: Array) -> float:
     """|z| of the largest root, 0 where there is none; as `roots`, without their order."""
-    kept = np.flatnonzero(c)
-    if kept.size < 2:
+    nonzero = np.flatnonzero(c)
+    if nonzero.size < 2:
         return 0.0
-    c = c[kept[0] : kept[-1] + 1]
+    c = c[nonzero[0] : nonzero[-1] + 1]
     companion = np.eye(c.size - 1, k=-1)
     companion[0] = -c[1:] / c[0]
     return float(np.abs(np.linalg.eigvals(companion)).max())

@@ -173,7 +173,7 @@ def tracking_polynomial(
 
 
 def reference_model(model: Sequence[float] | None, h: float) -> tuple[Array, Array]:
-    """(B_m, A_m) of the tracking model (w_n [rad/s], zeta) held over h [s]; (1, 1) for None.
+    """(B_m, A_m) of the tracking model (w_n [rad/s], zeta), sampled every h [s]; (1, 1) for None.
 
     The zero-order-hold equivalent of w_n^2/(s^2 + 2 zeta w_n s + w_n^2) without its sample of
     delay, which the plant's own delay stands for. Raises BadSpecification as for dominant poles.

@@ -25,7 +25,7 @@ LEADS = 11  # parts of the lag tried that T takes off by a lead, 0 to 1
 WEIGHTS = 21  # set-point weights b tried, 0 to 1
 DERIVATIVE_WEIGHTS = (0.0, 0.5, 1.0)  # c
 LAG_WEIGHT = 2.0  # the lag is paid on every motion, a limited speed on the largest step only
-SETTLED_AFTER = 12.0  # time constants of the slowest pole; then a response has ended
+RESPONSE_LENGTH = 12.0  # time constants of the slowest pole; then a response has ended
 MOST_SAMPLES = 20_000
 NEGLIGIBLE = 1e-3  # |z| of a pole that is over within a sample
 
@@ -81,10 +81,10 @@ def followed(
     """
     loops = [loop for A, B in plants if (loop := _loop(A, B, controller))]
     found = [_judged(loops, T, controller.h, demand) for T in candidates]
-    kept = [one for one in found if one.overshoot <= demand.overshoot]
-    if not kept:
+    admissible = [one for one in found if one.overshoot <= demand.overshoot]
+    if not admissible:
         return min(found, key=lambda one: one.overshoot)
-    return min(kept, key=lambda one: LAG_WEIGHT * one.lag + _travel(demand.step, one.rate))
+    return min(admissible, key=lambda one: LAG_WEIGHT * one.lag + _travel(demand.step, one.rate))
 
 
 def rst_candidates(
@@ -162,8 +162,8 @@ def _loop(A: Array, B: Array, controller: RST) -> _Loop | None:
     radius = float(np.abs(closed_loop_poles(A, B, controller)[:1]).max(initial=NEGLIGIBLE))
     if radius >= 1.0:
         return None
-    settled = max(-SETTLED_AFTER / math.log(radius), 4.0 * P.size)
-    return _Loop(A, B, P, int(min(settled, MOST_SAMPLES)))
+    length = max(-RESPONSE_LENGTH / math.log(radius), 4.0 * P.size)
+    return _Loop(A, B, P, int(min(length, MOST_SAMPLES)))
 
 
 def _judged(loops: Sequence[_Loop], T: Array, h: float, demand: Demand) -> Followed:

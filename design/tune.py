@@ -41,7 +41,7 @@ FREQUENCIES_TRIED = 20  # dominant w_n tried, evenly spaced in log
 SLOWEST, FASTEST = 0.005, 0.6  # w_n h [rad]
 DAMPINGS = (1.0, 0.8)
 RATIOS = (3.0, 6.0, 1.5)  # auxiliary poles, in units of w_n
-KEPT_POLE = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
+UNMOVED_POLE = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
 DAMPED, LEAST_DAMPED = 0.5, 0.3  # damping from which it may; the second beside slow zeros
 LAGGARD = 0.5  # decay of the slowest pole, in units of the dominant ones', below which they are not
 SLOWEST_ZERO = 0.9995  # a plant zero nearer to 1 would never decay
@@ -224,7 +224,7 @@ def _slow_zeros(B: Array) -> tuple[complex, ...]:
     brute force. Kept as closed-loop poles, they leave y/r alone and decay after a disturbance.
     """
     real = [z.real for z in roots(trim(B[np.flatnonzero(B)[0] :])) if abs(z.imag) < 1e-9]
-    return tuple(complex(z) for z in sorted(real, reverse=True) if KEPT_POLE < z < SLOWEST_ZERO)
+    return tuple(complex(z) for z in sorted(real, reverse=True) if UNMOVED_POLE < z < SLOWEST_ZERO)
 
 
 def _auxiliary(
@@ -232,22 +232,22 @@ def _auxiliary(
 ) -> Callable[[float], tuple[complex, ...]]:
     """Auxiliary poles for a given speed [rad/s]: `first`, kept plant poles, equal real ones."""
     count -= len(first)
-    kept = _kept(roots(A), h, LEAST_DAMPED if first else DAMPED)[:count]
-    kept = kept[:-1] if len(kept) and kept[-1].imag > 0 else kept
+    unmoved = _unmoved(roots(A), h, LEAST_DAMPED if first else DAMPED)[:count]
+    unmoved = unmoved[:-1] if len(unmoved) and unmoved[-1].imag > 0 else unmoved
 
     def poles(speed: float) -> tuple[complex, ...]:
         real = complex(math.exp(-speed * h))
-        return (*first, *(complex(z) for z in kept), *[real] * (count - len(kept)))
+        return (*first, *(complex(z) for z in unmoved), *[real] * (count - len(unmoved)))
 
     return poles
 
 
-def _kept(poles: ComplexArray, h: float, damped: float) -> ComplexArray:
+def _unmoved(poles: ComplexArray, h: float, damped: float) -> ComplexArray:
     """Plant poles that may stay: fast and damped; conjugates side by side, positive one first."""
     fit = [
         complex(z)
         for z in poles
-        if 1e-6 < abs(z) <= KEPT_POLE
+        if 1e-6 < abs(z) <= UNMOVED_POLE
         and (z.real > 0 and frequency_and_damping(complex(z), h)[1] > damped)
     ]
     return np.array(sorted(fit, key=lambda z: (abs(z), z.real, -z.imag)), dtype=np.complex128)
@@ -283,9 +283,9 @@ def _best(
                     found.append(judge())
             except BadSpecification as error:
                 refusal = refusal or error
-        kept = [one for one in found if not one.missed]
-        if kept:
-            return max(kept, key=lambda one: one.worst or 0.0)
+        admissible = [one for one in found if not one.missed]
+        if admissible:
+            return max(admissible, key=lambda one: one.worst or 0.0)
     for _, judge in sorted(hopeless, key=lambda one: -one[0])[:NEAREST]:
         try:
             found.append(judge())

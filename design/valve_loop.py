@@ -71,15 +71,18 @@ class ValveLoopRun:
 
 
 def valve_plant(delay: float, lag: float, h: float) -> tuple[Array, Array]:
-    """A, B of the position over the wanted speed, held over h [s], behind a delay and a lag [s]."""
+    """A, B of the position over the wanted speed, which a zero-order hold gives every h [s], behind
+    a delay and a lag [s]."""
     whole = int(np.floor(delay / h))
     early = delay - whole * h
     late, lag = h - early, max(lag, SHORTEST_LAG)
-    decay, kept = np.exp(-h / lag), np.exp(-late / lag)
+    decay, decay_late = np.exp(-h / lag), np.exp(-late / lag)
     A = multiply(np.array([1.0, -1.0]), np.array([1.0, -decay]))
     flow = multiply(np.array([late, early]), np.array([1.0, -decay]))
-    held = -lag * multiply(np.array([1.0, -1.0]), np.array([1.0 - kept, kept - decay]))
-    return A, np.concatenate([np.zeros(whole + 1), add(flow, held)])
+    lagging = -lag * multiply(
+        np.array([1.0, -1.0]), np.array([1.0 - decay_late, decay_late - decay])
+    )
+    return A, np.concatenate([np.zeros(whole + 1), add(flow, lagging)])
 
 
 def valve_rst(k_p: float, k_i: float, h: float) -> RST:
@@ -104,7 +107,7 @@ def tuned(
     A, B = valve_plant(valve.delay, valve.lag, h)
     B = gain * B
 
-    def keeps(k_p: float) -> bool:
+    def meets_goals(k_p: float) -> bool:
         try:
             found = margins(
                 A, B, valve_rst(k_p, k_p**2 / INTEGRAL_OVER_LOOP if integrator else 0.0, h)
@@ -115,7 +118,7 @@ def tuned(
         return bool(found.modulus >= modulus and slow and step_overshoot(A, B, k_p) <= overshoot)
 
     low, high = 1e-3 / (valve.delay + valve.lag + h), 2.0 / h
-    if not keeps(low):
+    if not meets_goals(low):
         raise BadSpecification(
             f"no gain gives a modulus margin of {modulus:g} and a delay margin of"
             f" {delay_samples:g} periods of {h:g} s behind a delay of {valve.delay:.3g} s and a lag"
@@ -123,7 +126,7 @@ def tuned(
         )
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if keeps(middle) else (low, middle)
+        low, high = (middle, high) if meets_goals(middle) else (low, middle)
     return low, low**2 / INTEGRAL_OVER_LOOP if integrator else 0.0
 
 
@@ -161,8 +164,12 @@ class _Plant:
         first, second = self.past[0], self.past[1]
         late = self.h - self.early
         for i, (way, factor, lag) in enumerate(self.parts):
-            decay, kept = np.exp(-self.h / lag), np.exp(-late / lag)
-            v = decay * self.v[i] + (kept - decay) * first[way] + (1.0 - kept) * second[way]
+            decay, decay_late = np.exp(-self.h / lag), np.exp(-late / lag)
+            v = (
+                decay * self.v[i]
+                + (decay_late - decay) * first[way]
+                + (1.0 - decay_late) * second[way]
+            )
             flow = self.early * first[way] + late * second[way]
             self.y += factor * (flow - lag * (v - self.v[i]))
             self.v[i] = float(v)

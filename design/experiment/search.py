@@ -216,9 +216,9 @@ def _exchanged(
         found = criterion.evaluate(reference(segments, limits, h))
         return found if found is not None and found.peaks.share_of(limits) <= OF_A_LIMIT else None
 
-    looks = [(one, evaluated(one)) for one in begun if one]
-    best = max(looks, key=lambda one: -np.inf if one[1] is None else one[1].value)
-    count, stale, chosen = len(looks), 0, best[0]
+    starts = [(one, evaluated(one)) for one in begun if one]
+    best = max(starts, key=lambda one: -np.inf if one[1] is None else one[1].value)
+    count, stale, chosen = len(starts), 0, best[0]
     while best[1] is None and chosen:  # a run as a whole may go further than its pieces
         chosen = tuple(one.changed(0.9, 1.0) for one in chosen)
         best = (chosen, evaluated(chosen))

@@ -69,8 +69,8 @@ def _line(knots: Array, speed: float, h: float) -> Array:
 
 
 def _steps(amplitude: float, rate: float, h: float) -> Array:
-    held = max(1, round(1.0 / rate / h))
-    return np.concatenate([np.full(held, amplitude), np.zeros(held)])
+    samples = max(1, round(1.0 / rate / h))
+    return np.concatenate([np.full(samples, amplitude), np.zeros(samples)])
 
 
 def _strokes(amplitude: float, rate: float, h: float) -> Array:
