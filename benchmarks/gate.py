@@ -28,7 +28,7 @@ TWICE = 2.0
 
 def judged(log: Log, rig: Rig, seed: int, count: Counter[str]) -> str:
     """Counts of one log's parameters; the wrong ones in words."""
-    said = identifiability_of_runs([log], rig).told
+    said = identifiability_of_runs([log], rig).identifiability
     fit = fit_plant([log], np.random.default_rng(seed), rig=rig)
     wrong = []
     for one in said:

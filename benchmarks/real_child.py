@@ -105,7 +105,7 @@ def named_in(found: Trace) -> list[str]:
 
 def doctor_answer(found: Examined) -> dict[str, Any]:
     """What the doctor says, as far as it is judged."""
-    told = [f"{one.name}: {one.why} {one.add}" for one in found.told]
+    told = [f"{one.name}: {one.why} {one.add}" for one in found.identifiability]
     bad = [json.dumps(one.as_json(), default=str) for one in found.bad]
     return {
         "delays": {one.of: one.seconds for one in found.delays},
@@ -174,12 +174,12 @@ def promise(answers: Answers, ready: Prepared, card: Card, part: str) -> None:
 
     def said() -> dict[str, Any]:
         found = examine(paths[0], card)
-        return said_answer(found.told, found.refused)
+        return said_answer(found.identifiability, found.refused)
 
     def said_of_all() -> dict[str, Any]:
         read = sources_of(every, card)
         found = identifiability_of_runs([one.log for one in read.runs], read.rig)
-        return said_answer(found.told, found.reason)
+        return said_answer(found.identifiability, found.reason)
 
     def kept(asked: Sequence[str]) -> dict[str, Any]:
         return kept_answer(identify_sources(sources_of(asked, card), seed=SEED))

@@ -8,7 +8,7 @@ beside it, the nominal one and the machine's own controller. The true machine th
 motions, with noise.
 
 - promised: mean over the machines of the share of drawn machines that keep a limit.
-- kept: share of the true machines that keep it; a promise holds where the two are alike.
+- share: share of the true machines that keep it; a promise holds where the two are alike.
 - staircase: on a ramp at half the narrowest stick band; times: of the PID alone over the robust
   design, on each true machine. scale: the band times the period, about one step of a body that
   cannot slide more slowly and is moved once a period; with an actuator at least (F_s - F_c)/k_2,
@@ -74,9 +74,9 @@ def judged(seed: int, draws: int, seconds: float, slow: bool) -> Judged:
     found = robust_design(model, RobustAsked(draws=draws, staircase=staircase, seed=seed))
     spent = time.process_time() - began
     promised = {
-        name: measure.kept
+        name: measure.share
         for name, measure in found.promises[ROBUST].measures.items()
-        if measure.kept is not None
+        if measure.share is not None
     }
     own = found.design.compensator
     word = "none" if not found.promises[ROBUST].compensator else "excess" if own.excess else "whole"
@@ -195,7 +195,7 @@ def share(told: list[Judged], loop: str, name: str) -> str:
     """Share of the true machines on which the loop keeps the limit, in words."""
     limits = limits_by_name(RobustAsked().limits)
     kept = [
-        bool(one.true[loop].kept({name: limits[name]})[name][0])
+        bool(one.true[loop].within({name: limits[name]})[name][0])
         for one in told
         if loop in one.true and name in one.true[loop].values
     ]

@@ -112,7 +112,7 @@ def story(
             now = day.at + timedelta(minutes=5)
             Pass(registry, Chain(), settings, partial(at, now), silent).run(root / "machines")
             (outcome,) = (one for one in Queue(registry.database).outcomes("rig") if one.at == now)
-            version = registry.in_force("rig")
+            version = registry.active_version("rig")
             value = None
             if version is not None:
                 value = registry.document(version, "model")["friction"]["F_cp"]["value"]

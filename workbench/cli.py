@@ -251,9 +251,9 @@ def _echo_refusal(reason: str, then: Step) -> None:
     """Print a refusal as JSON; where nobody takes it, the exit status says it alone."""
     import json
 
-    told = {"verdict": "refused", "reason": one_line(reason), "next": then.command}
+    document = {"verdict": "refused", "reason": one_line(reason), "next": then.command}
     with suppress(OSError):
-        click.echo(json.dumps(told, indent=2))
+        click.echo(json.dumps(document, indent=2))
 
 
 def _debug(arguments: Sequence[str]) -> bool:
@@ -272,8 +272,8 @@ def _shortened(text: str, most: int) -> str:
     """The text, its middle left out where it is longer than `most` characters."""
     if len(text) <= most:
         return text
-    kept = (most - len(CUT)) // 2
-    return text[:kept] + CUT + text[-kept:]
+    half = (most - len(CUT)) // 2
+    return text[:half] + CUT + text[-half:]
 
 
 def _drop_warning(*_: object, **__: object) -> None:

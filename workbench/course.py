@@ -33,15 +33,15 @@ class Course:
     """How far a computation has come, by its stages and by the clock, and whether it is to go on.
 
     advance: takes steps of the bar, which add up to 1; stages: the part of the bar of each; budget
-    [s]: after which it is to end; told: what goes on, in words. A stage begins where the last one
-    has come to, if that is further on: some are left out, and others take their place.
+    [s]: after which it is to end; describe: shows what goes on, in words. A stage begins where the
+    last one has come to, if that is further on: some are left out, and others take their place.
     """
 
     advance: Callable[[float], None]
     stages: Stages
     clock: Clock
     budget: float = math.inf
-    told: Callable[[str], None] = lambda _words: None
+    describe: Callable[[str], None] = lambda _words: None
     shown: float = 0.0
     _begun: float = field(init=False)
     _stage: str = field(init=False, default="")
@@ -61,7 +61,7 @@ class Course:
         """A share of a stage is done; a stage that is not known counts as the last known one."""
         if stage in self.stages and stage != self._stage:
             self._stage, self._low = stage, max(self.stages[stage][0], self.shown)
-            self.told(stage)
+            self.describe(stage)
         place = self._low + (self._high - self._low) * min(max(share, 0.0), 1.0)
         if place > self._here:
             self._here, self._since = place, self.clock()
@@ -100,7 +100,7 @@ class Course:
         elif self._compiles is not None:
             self._compiled += now - self._compiles
             self._compiles = None
-        self.told(COMPILING if begins else self._stage)
+        self.describe(COMPILING if begins else self._stage)
 
     def done(self) -> None:
         """Fill the bar."""
@@ -146,7 +146,7 @@ def running(
 ) -> Iterator[Course]:
     """A course behind a bar of that label, `watched`; mute with JSON."""
     with progress(label, 1.0, as_json=as_json) as bar:
-        course = Course(bar, stages, time.monotonic, budget, bar.told)
+        course = Course(bar, stages, time.monotonic, budget, bar.describe)
         with watched(course):
             yield course
 

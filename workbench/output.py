@@ -35,11 +35,11 @@ MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
 
 
 class Bar(Protocol):
-    """A bar of progress: called with a step, it moves on; told, it says what goes on."""
+    """A bar of progress: called with a step, it moves on; `describe` says what goes on."""
 
     def __call__(self, step: float) -> None: ...
 
-    def told(self, words: str) -> None:
+    def describe(self, words: str) -> None:
         """Say these words behind the bar's own."""
 
 
@@ -48,7 +48,7 @@ class NoBar:
 
     def __call__(self, step: float) -> None: ...
 
-    def told(self, words: str) -> None: ...
+    def describe(self, words: str) -> None: ...
 
 
 class BadOutput(UserError):
@@ -265,7 +265,7 @@ def progress(label: str, total: float | None = None, *, as_json: bool = False) -
         def __call__(self, step: float) -> None:
             self.bar.advance(self.task, step)
 
-        def told(self, words: str) -> None:
+        def describe(self, words: str) -> None:
             self.bar.update(self.task, description=f"{label}: {words}" if words else label)
 
     with Progress(console=Console(stderr=True), transient=True) as bar:

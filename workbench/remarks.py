@@ -70,8 +70,8 @@ def _together(remarks: Sequence[str], logs: Collection[str]) -> str:
 def _ranges(texts: Sequence[str]) -> str:
     """The texts, alike but for their numbers, as one: a range where a number differs."""
     columns = zip(*(FIGURE.findall(text) for text in texts), strict=True)
-    told = iter([_range(column) for column in columns])
-    return FIGURE.sub(lambda _: next(told), texts[0])
+    ranges = iter([_range(column) for column in columns])
+    return FIGURE.sub(lambda _: next(ranges), texts[0])
 
 
 def _range(numbers: Sequence[str]) -> str:

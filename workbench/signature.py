@@ -27,7 +27,7 @@ Decorator = Callable[[Any], Any]
 
 @dataclass(frozen=True, eq=False)
 class _Said:
-    """A parameter as it was said: an option's own names, or none; what click is told of it.
+    """A parameter as it was said: an option's own names, or none; what click gets of it.
 
     beside: options that come after it and that no function takes.
     """
@@ -90,7 +90,7 @@ def decorated(command: Command, name: str, said: Any, annotation: object) -> Com
 
 
 def _by_annotation(annotation: object, is_argument: bool) -> dict[str, Any]:
-    """What click need not be told, since the annotation says it."""
+    """What click need not be given, since the annotation says it."""
     how: dict[str, Any] = {}
     of = get_args(annotation)
     if get_origin(annotation) is tuple and of[-1] is Ellipsis:

@@ -60,7 +60,7 @@ def test_the_undeclared_spring_is_named_when_it_comes_and_stays(
     assert "Missing: spring" in first.outcome.reason
     assert not any("spring" in one.outcome.reason for one in told if not one.day.spring)
     with Registry(str(home / "registry.db")) as registry:
-        version = registry.in_force("rig")
+        version = registry.active_version("rig")
         assert version is not None
         effects = registry.document(version, "model")["effects"]
     assert list(effects) == ["spring"]

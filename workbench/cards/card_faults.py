@@ -59,7 +59,7 @@ def _shown(found: object) -> str:
 
 
 def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
-    """Keys of the section that stands at `loc`, found by walking the sections' fields."""
+    """Keys of the section that stands at `loc`, found along the sections' fields."""
     sections: list[type[CardTable]] = [CardFile]
     for part in loc:
         found = [s.model_fields[str(part)].annotation for s in sections if part in s.model_fields]

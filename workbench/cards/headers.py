@@ -85,7 +85,7 @@ def _table() -> Iterator[tuple[str, WrittenUnit]]:
                     yield one, WrittenUnit(card, quantity, rotary)
 
 
-# "nm" stands for both nanometres and newton metres; its case tells which.
+# "nm" stands for both nanometres and newton metres; its case says which.
 _UNITS = dict(_table())
 _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
@@ -273,7 +273,7 @@ def words_of(name: str) -> list[str]:
 
 
 def says_purpose(word: str) -> bool:
-    """Whether a word tells what a signal is for (soll, actual, cmd), not what it is."""
+    """Whether a word says what a signal is for (soll, actual, cmd), not what it is."""
     parts = any(one in word for one in (*_REFERENCE, *_MEASURED, *_MODEL))
     return parts or word in (*_REFERENCE_SHORT, *_MEASURED_SHORT, *_MODEL_SHORT, "command")
 

@@ -49,7 +49,7 @@ def command(
     card = load_card(card_path(RECIPE))
     with results("demo", out) as folder:
         with progress("demo", 1.0, as_json=as_json) as bar:
-            course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
+            course = Course(bar, DEMO_STAGES, time.monotonic, describe=bar.describe)
             with moving(course), fits_compiled_ahead():
                 found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation

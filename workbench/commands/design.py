@@ -164,7 +164,9 @@ def _nominal(given: DesignOptions, model: "Model", asked: "Asked") -> int:
                 found = scheduled(model, found, given.over, asked, goals)
         view = design_view(found, model.rotary)
         view.write(folder)
-    then = after_design(found, given.model_file, asked.dominant is not None, _kept(given))
+    then = after_design(
+        found, given.model_file, asked.dominant is not None, _repeated_options(given)
+    )
     show(view, folder.final, given.as_json, then)
     return 1 if found.recommended == "none" else 0
 
@@ -173,7 +175,7 @@ def _velocity(given: DesignOptions) -> int:
     """The same of a rig whose velocity follows the command."""
     from workbench.documents.velocity import read_velocity_model
     from workbench.report.next_steps import without_design
-    from workbench.report.velocity import velocity_design_view
+    from workbench.report.velocity import velocity_view
     from workbench.report.view import show
     from workbench.steps.velocity_loop import design_velocity
 
@@ -182,7 +184,7 @@ def _velocity(given: DesignOptions) -> int:
         found = design_velocity(
             model, _limits(given), integrator=given.integrator, period=given.design_period
         )
-        view = velocity_design_view(found)
+        view = velocity_view(found)
         view.write(folder)
     design_file = folder.final / "design.json"
     then = step("the loop in simulation", "validate", given.model_file, design_file)
@@ -246,7 +248,7 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     return drift_found([friction.validate_python(model["friction"]) for model in models])
 
 
-def _kept(given: DesignOptions) -> tuple[str, ...]:
+def _repeated_options(given: DesignOptions) -> tuple[str, ...]:
     """The options that another try keeps."""
     period = given.design_period
     return (

@@ -1,18 +1,16 @@
 """`workbench fleet`: the logs of many machines on a Dask cluster."""
 
 import os
-import secrets
-import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from workbench.ending import StatusCommand, Step, step
+from workbench.jobs.options import clock, worker_name
 from workbench.options import POSITIVE, REGISTRY_OPTION, SEED_OPTION
 from workbench.output import JSON_OPTION, dumps, emit, progress
 from workbench.signature import argument, by_fields, option
@@ -86,11 +84,11 @@ def command(given: FleetOptions) -> int:
     logs, out, where = given.logs, given.out, None if given.no_registry else (given.where or "")
     text = None if given.card is None else _card_text(given.card)
     found = find_logs(logs, leave_out=out)
-    with ExitStack() as held:
-        store = held.enter_context(ResultStore(out))
-        recorder = held.enter_context(_recorder(where))
-        cluster = held.enter_context(_cluster(given))
-        advance = held.enter_context(progress("fleet", float(len(found)), as_json=given.as_json))
+    with ExitStack() as stack:
+        store = stack.enter_context(ResultStore(out))
+        recorder = stack.enter_context(_recorder(where))
+        cluster = stack.enter_context(_cluster(given))
+        advance = stack.enter_context(progress("fleet", float(len(found)), as_json=given.as_json))
         settings = FleetSettings(logs, text, given.seed)
         done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
     result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
@@ -98,11 +96,6 @@ def command(given: FleetOptions) -> int:
     then = after_fleet(done, logs, given.card, where, in_registry=not given.no_registry)
     emit(result, given.as_json, lambda: fleet_view(done, out), then)
     return 0 if then is None else 1
-
-
-def clock() -> datetime:
-    """The time now, in UTC."""
-    return datetime.now(UTC)
 
 
 def after_fleet(
@@ -175,7 +168,7 @@ def _recorder(where: str | None) -> "Iterator[Recorder]":
     if where is None:
         yield NoRegistry()
         return
-    owner = f"fleet:{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    owner = f"fleet:{worker_name()}"
     with Patience()(Registry, location(where or None)) as registry:
         yield InRegistry(registry, owner, clock)
 

@@ -72,7 +72,7 @@ def command(
                     " constant; leave --drive out."
                 )
             left = budget - (time.monotonic() - begun)
-            course = Course(bar, IDENTIFY_STAGES, time.monotonic, left, bar.told)
+            course = Course(bar, IDENTIFY_STAGES, time.monotonic, left, bar.describe)
             with watched(course):
                 found = identify_sources(
                     sources,
@@ -96,7 +96,7 @@ def _velocity(
     refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.velocity import after_velocity, velocity_model_view
+    from workbench.report.velocity import after_velocity, velocity_view
     from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
@@ -104,6 +104,6 @@ def _velocity(
         with progress("identifying", as_json=as_json):
             sources = read_sources(logs, card, velocity=True)
             model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)
-        view = velocity_model_view(model)
+        view = velocity_view(model)
         view.write(folder)
     show(view, folder.final, as_json, after_velocity(model, logs, card, folder.final))

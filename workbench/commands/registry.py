@@ -146,7 +146,7 @@ def add(
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where, create=True) as found:
         version = found.add(machine, candidate, reason=reason, by=who, now=now)
-        current = found.in_force(machine)
+        current = found.active_version(machine)
         if promote and (current is None or current.number != version.number):
             found.promote(machine, version.number, reason=reason, by=who, now=now)
     state = "active" if promote else "not active yet: 'workbench registry promote'"
@@ -222,7 +222,7 @@ def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     from workbench.registry.errors import BadRegistry
 
     found.machine(machine)
-    version = found.in_force(machine) if number is None else found.version(machine, number)
+    version = found.active_version(machine) if number is None else found.version(machine, number)
     if version is None:
         raise BadRegistry(f"{machine}: no active version; name a version's number")
     return version

@@ -66,7 +66,7 @@ def command(
             train = read_sources(names, card)
             test = read_sources(held_out, card) if held_out else None
             left = budget - (time.monotonic() - begun)
-            course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
+            course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.describe)
             with watched(course):
                 found = trace_sources(
                     train, test, known, seed, course.report, keep_going=course.keep_going
@@ -84,7 +84,7 @@ def _velocity(
     begun = time.monotonic()
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.velocity import velocity_trace_view
+    from workbench.report.velocity import velocity_view
     from workbench.report.view import show
     from workbench.steps.trace import named_logs
     from workbench.steps.velocity import trace_velocity
@@ -97,6 +97,6 @@ def _velocity(
             found = trace_velocity(
                 train, test, keep_going=lambda: time.monotonic() - begun < budget
             )
-        view = velocity_trace_view(found)
+        view = velocity_view(found)
         view.write(folder)
     show(view, folder.final, as_json)

@@ -96,7 +96,7 @@ def _velocity(
     import numpy as np
 
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
-    from workbench.report.velocity import after_velocity_validation, velocity_validation_view
+    from workbench.report.velocity import after_velocity_validation, velocity_view
     from workbench.report.view import show
     from workbench.steps.velocity_loop import validate_velocity
 
@@ -106,7 +106,7 @@ def _velocity(
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
-        view = velocity_validation_view(found)
+        view = velocity_view(found)
         view.write(folder)
     show(view, folder.final, as_json, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

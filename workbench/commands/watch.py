@@ -44,13 +44,13 @@ def command(
     from workbench.jobs.watching import watch_machines
 
     stop = threading.Event()
-    with ExitStack() as held:
-        found = held.enter_context(worker(given, stop.is_set))
+    with ExitStack() as stack:
+        found = stack.enter_context(worker(given, stop.is_set))
         if port is not None:
-            held.enter_context(_served(found, address, port))
+            stack.enter_context(_served(found, address, port))
         for number in (signal.SIGTERM, signal.SIGINT):
             before = signal.signal(number, lambda _number, _frame: stop.set())
-            held.callback(signal.signal, number, before)
+            stack.callback(signal.signal, number, before)
         found.report("watching", root=str(given.root), cron=cron, port=port)
         watch_machines(
             given.root,
@@ -91,8 +91,8 @@ def _served(found: "Worker", address: str, port: int) -> ExitStack:
     from workbench.jobs.metrics import collected
 
     server, thread = start_http_server(port, address, registry=collected(found.figures))
-    held = ExitStack()
-    held.callback(thread.join)
-    held.callback(server.server_close)
-    held.callback(server.shutdown)
-    return held
+    stack = ExitStack()
+    stack.callback(thread.join)
+    stack.callback(server.server_close)
+    stack.callback(server.shutdown)
+    return stack

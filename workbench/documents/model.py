@@ -275,7 +275,7 @@ class Model(ModelFile):
         return all(entry.position_rms is None for entry in self.log)
 
     @property
-    def imposed(self) -> bool:
+    def prescribed_motion(self) -> bool:
         """Whether the motion was prescribed by a rig: no drive of its own shows in the logs."""
         driven = self.rig.kind == "motor" or self.actuator is not None
         return self.by_equation and not driven

@@ -7,7 +7,7 @@ from typing import Any
 from design.program import Program, State, Variable
 from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, lead_of, rows, title_of
-from workbench.export.syntax import INDENT, Syntax, braced, state_names
+from workbench.export.syntax import INDENT, Syntax, braced
 
 # Python's names that are keywords of C, and one of a function of its library.
 C_KEYWORDS = (
@@ -50,8 +50,8 @@ def c_syntax(program: Program, precision: Precision) -> C:
         },
         functions={"min": f"{short}_min", "max": f"{short}_max", "abs": f"{short}_abs"},
         names={word: f"{word}_" for word in C_KEYWORDS},
-        states=state_names(program),
-        kept="s->",
+        states=frozenset(one.name for one in program.states),
+        state_prefix="s->",
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ def cogging_csv(what: Compensation) -> TableFile:
     return TableFile(
         f"{what.name}_cogging.csv", text, "cogging-table", "",
         f"{what.force_unit}, deg, {unit} of the axis", "any program that reads CSV", len(rows), 0.0,
-        (), _untold(what),
+        (), _unidentified(what),
     )  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def turn_csv(what: Compensation) -> TableFile:
     return TableFile(
         f"{what.name}_cogging_turn.csv", text, "cogging-table", "",
         f"{unit}, {what.force_unit} of the axis", "any program that reads CSV", TURN_POINTS, 0.0,
-        (), _untold(what),
+        (), _unidentified(what),
     )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def ax8000_cogging(what: Compensation) -> TableFile:
         f"{what.name}_ax8000_cogging.csv", text, "cogging-table", "twincat",
         "N m, deg", "TwinCAT drive AX8000: startup list or objects 0x32CB",
         len(fitting), None, costs,
-        (what.at, UNSAID, *_untold(what)),
+        (what.at, UNSAID, *_unidentified(what)),
     )  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
     """The waves of the cogging; raises BadModel where the model has none."""
     if not what.harmonics:
         if any(is_cogging(one) for one in what.model.acting):
-            why = "; ".join(_untold(what))
+            why = "; ".join(_unidentified(what))
             raise BadModel(f"{what.model.card}: no cogging table, as {why}")
         raise BadModel(
             f"{what.model.card}: the model has no cogging, so there is no cogging table; 'workbench"
@@ -143,9 +143,9 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
 
 def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
     costs_in_file = in_file(costs, what.force_unit)
-    return {"card": what.model.card, "costs": costs_in_file, "remarks": _untold(what)}
+    return {"card": what.model.card, "costs": costs_in_file, "remarks": _unidentified(what)}
 
 
-def _untold(what: Compensation) -> tuple[str, ...]:
+def _unidentified(what: Compensation) -> tuple[str, ...]:
     """Lines on what of the cogging no log identifies."""
     return tuple(line for line in what.unidentified_places if line.startswith("cogging"))

@@ -28,7 +28,7 @@ Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
 Encoder = Literal["motor", "load"]
 IDENTIFIED_BY_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
 MOST_OF_IT = 0.5  # of the asymmetry, from which a constant force is worth saying
-PLACES_ALONG = 400  # of the travel, at which a force of place is looked at
+PLACES_ALONG = 400  # of the travel, at which a position-dependent force is evaluated
 NO_TABLE_HOLDS = "what it adds depends on what was before, so no table holds it"
 
 
@@ -111,7 +111,7 @@ class Compensation:
         for one in filter(is_of_speed, self.model.acting):
             for name, found in self.model.effects[one.key].items():
                 if not found.known:
-                    raise BadModel(self.untold("a friction table", f"{one.key}.{name}", found))
+                    raise BadModel(self.refusal("a friction table", f"{one.key}.{name}", found))
         return SlidingFriction(self.model.simulated, LOWEST_OF_TABLE * self.high, self.high)
 
     @property
@@ -130,9 +130,9 @@ class Compensation:
         for name in names:
             found = self.model.friction[name]
             if not found.known:
-                raise BadModel(self.untold(what, name, found))
+                raise BadModel(self.refusal(what, name, found))
 
-    def untold(self, what: str, name: str, found: Estimate) -> str:
+    def refusal(self, what: str, name: str, found: Estimate) -> str:
         """The refusal of what needs a number that no log identifies."""
         return (
             f"{self.model.card}: {what} needs {name}, which is not identified"
@@ -185,9 +185,9 @@ class Compensation:
 
     @cached_property
     def _places(self) -> list[tuple[Acting | None, list[str]]]:
-        return [self._told(one) for one in self.model.acting if is_of_place(one)]
+        return [self._identified_part(one) for one in self.model.acting if is_of_place(one)]
 
-    def _told(self, one: Acting) -> tuple[Acting | None, list[str]]:
+    def _identified_part(self, one: Acting) -> tuple[Acting | None, list[str]]:
         """The effect without the sizes that no log identifies; None where its shape is not
         identified."""
         found, lines, values = self.model.effects[one.key], list[str](), dict(one.values)
@@ -214,7 +214,7 @@ class Compensation:
         """
         found = self.model.effects.get("backlash", {}).get("width")
         if found is not None and found.value is None:
-            raise BadModel(self.untold("backlash", "its width", found))
+            raise BadModel(self.refusal("backlash", "its width", found))
         return found
 
     @property

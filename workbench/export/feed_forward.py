@@ -27,7 +27,7 @@ FEED_FORWARD_POINTS = 20  # of the friction curve, each way
 
 @dataclass(frozen=True)
 class PlaceForce:
-    """Forces of place on the body: constant + sum of waves - k y - k_3 y^3 [N], y [m]."""
+    """Position-dependent forces on the body: constant + sum of waves - k y - k_3 y^3 [N], y [m]."""
 
     constant: float
     k: float
@@ -60,7 +60,7 @@ def place_force(acting: tuple[Acting, ...]) -> PlaceForce:
 
 
 def is_included(one: Acting) -> bool:
-    """Whether the feed-forward has this force of place."""
+    """Whether the feed-forward has this position-dependent force."""
     return is_cogging(one) or one.key in ("constant_force", "spring", "gravity")
 
 
@@ -95,9 +95,11 @@ def _remarks_of(what: Compensation) -> tuple[str, ...]:
 
 def _costs(what: Compensation) -> tuple[Cost, ...]:
     """As of a friction table, but for the position-dependent forces that it has."""
-    held = {one.key.replace("_", " ") for one in what.model.acting if is_included(one)}
+    included = {one.key.replace("_", " ") for one in what.model.acting if is_included(one)}
     return tuple(
-        one for one in friction_costs(what, signed=True) if one.what.partition(":")[0] not in held
+        one
+        for one in friction_costs(what, signed=True)
+        if one.what.partition(":")[0] not in included
     )
 
 
@@ -106,7 +108,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     what.need("a feed-forward", ("m",))
     model = what.model
     v, F, _ = both_ways(what, FEED_FORWARD_POINTS)
-    held = place_force(tuple(one for one in what.places if is_included(one)))
+    along_travel = place_force(tuple(one for one in what.places if is_included(one)))
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
@@ -124,12 +126,12 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
         "size": len(v),
         "speeds": rows(map(form, v.tolist())),
         "forces": rows(map(form, F.tolist())),
-        "constant": form(held.constant),
-        "k": form(held.k),
-        "k_3": form(held.k_3),
+        "constant": form(along_travel.constant),
+        "k": form(along_travel.k),
+        "k_3": form(along_travel.k_3),
         "waves": [
             (form(one.amplitude), form(2.0 * np.pi / one.period), form(one.phase))
-            for one in held.waves
+            for one in along_travel.waves
         ],
         "per_force": form(1.0 / drive.k_a) if isinstance(drive, Motor) else None,
         "command": model.rig.command_unit,

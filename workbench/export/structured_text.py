@@ -146,7 +146,7 @@ def _controller(what: Exported, st: StructuredText) -> Block:
         Declared(st.name(name), real, meaning, len(values), tuple(map(st.number, values)))
         for name, values, meaning in tables
     ]
-    kept = [
+    stored = [
         Declared(
             st.name(one.name), types[one.kind], one.meaning, len(one.at_rest) if one.array else 0
         )
@@ -164,7 +164,7 @@ def _controller(what: Exported, st: StructuredText) -> Block:
         (*inputs, begin),
         (Declared(st.name(output.name), real, f"[{output.unit}] {output.meaning}"),),
         tuple(constants),
-        (*kept, started, *own),
+        (*stored, started, *own),
         (*first, "END_IF;", *st.lines(program.statements)),
     )
 

@@ -16,7 +16,6 @@ from design.program import (
     Number,
     Operation,
     Operator,
-    Program,
     Remark,
     Repeat,
     Statement,
@@ -39,7 +38,7 @@ class Syntax:
     """How a language writes a program.
 
     symbols: of its operators; functions: for min, max and abs; names: for what it would take for
-    something else; kept: what stands before a state.
+    something else; state_prefix: what stands before a state.
     """
 
     precision: Precision
@@ -47,7 +46,7 @@ class Syntax:
     functions: Mapping[str, str]
     names: Mapping[str, str]
     states: frozenset[str] = frozenset()
-    kept: str = ""
+    state_prefix: str = ""
 
     @abstractmethod
     def number(self, value: float) -> str:
@@ -79,7 +78,7 @@ class Syntax:
     def name(self, name: str) -> str:
         """A name as the language takes it."""
         own = self.names.get(name, name)
-        return self.kept + own if name in self.states else own
+        return self.state_prefix + own if name in self.states else own
 
     def lines(self, statements: Sequence[Statement], depth: int = 0) -> list[str]:
         """The statements, indented by `depth`."""
@@ -139,8 +138,3 @@ class Syntax:
 def braced(lines: list[str]) -> list[str]:
     """The lines, indented once."""
     return [INDENT + line for line in lines]
-
-
-def state_names(program: Program) -> frozenset[str]:
-    """Names of the program's states."""
-    return frozenset(one.name for one in program.states)

@@ -60,8 +60,8 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
     for control in controls:
         if left and not any(one.control == control for one in files):
             raise BadModel("; ".join(left))
-    kept = {one.name: one for one in files}
-    return Tables(tuple(kept.values()), tuple(dict.fromkeys(left)))
+    by_name = {one.name: one for one in files}
+    return Tables(tuple(by_name.values()), tuple(dict.fromkeys(left)))
 
 
 def _tried(

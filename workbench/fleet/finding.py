@@ -139,7 +139,7 @@ def _inside(system: Any, path: str, folder: Path | None) -> bool:
 
 
 def _time(info: Mapping[str, Any]) -> int:
-    """Modification time [ns]; 0 where the file system does not tell it."""
+    """Modification time [ns]; 0 where the file system does not give it."""
     for key in TIMES:
         found = info.get(key)
         if isinstance(found, int | float):

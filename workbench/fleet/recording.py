@@ -55,7 +55,7 @@ class InRegistry:
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
         """The log as a worker takes it, with the active model and design of its machine."""
         retry, registry = self.patience, self.registry
-        version = retry(registry.in_force, log.machine)
+        version = retry(registry.active_version, log.machine)
         if version is None:
             return Item(url, log, card, seed)
         documents = retry(registry.documents, version)
@@ -84,7 +84,7 @@ class InRegistry:
         try:
             if not self._waits(queue, machine, seen):
                 return True
-            version = retry(self.registry.in_force, machine)
+            version = retry(self.registry.active_version, machine)
             if (None if version is None else version.number) != result.against:
                 return False
             retry(queue.finish, claim, seen, result.judgement(), by=self.owner, now=self.clock())

@@ -15,8 +15,8 @@ from workbench.fleet.values import GOOD, BadCluster, BadLogs, LogFile, Result
 from workbench.fleet.work import work as default_work
 from workbench.jobs.lease import Clock
 
-LOOK = 1.0  # s between looks at the cluster
-LOOKED = 20  # logs looked at for a card before a run begins
+FLEET_POLL = 1.0  # s between looks at the cluster
+CARDS_CHECKED = 20  # logs whose card is searched before a run begins
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class FleetRun:
         """What the run did; raises BadLogs, BadCluster, RegistryAway, with all results kept."""
         begin = self._clock()
         for result in self._store.journalled():
-            self._keep(result)
+            self._record(result)
         todo = [log for log in logs if log.key not in self._store.done]
         before = len(logs) - len(todo)
         self._advance(before)
@@ -114,14 +114,14 @@ class FleetRun:
         self._memory = max(self._memory, result.memory)
         if result.verdict != "waits":
             self._store.note(result)
-            if not self._keep(result):
+            if not self._record(result):
                 self._later += 1
                 return
         self._verdicts[result.verdict] += 1
         if result.verdict not in GOOD and len(self._bad) < self._listed:
             self._bad.append(replace(result, model=None, made=None, rival=None, evidence={}))
 
-    def _keep(self, result: Result) -> bool:
+    def _record(self, result: Result) -> bool:
         """The result into the registry and then into Parquet; False: left to a later run."""
         if not self._recorder.record(result):
             return False
@@ -151,7 +151,7 @@ class FleetRun:
                     self._next(log, machines, ready)
                 else:
                     hands[given] = log
-            for future in self._cluster.wait(list(hands), LOOK) if hands else ():
+            for future in self._cluster.wait(list(hands), FLEET_POLL) if hands else ():
                 found = self._cluster.result(future)
                 if found is None:
                     continue
@@ -181,7 +181,7 @@ class FleetRun:
 
     def _refuse_cardless(self, logs: Sequence[LogFile]) -> None:
         url = self._settings.url
-        looked = logs[:LOOKED]
+        looked = logs[:CARDS_CHECKED]
         if looked and not any(card_text(url, log) for log in looked):
             raise BadLogs(
                 f"{shown(url)}: no card.toml beside or above {looked[0].name!r} and the logs after"

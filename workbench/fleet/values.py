@@ -47,7 +47,7 @@ class BadCluster(UserError):
 class LogFile:
     """One machine's log as the listing has it; path within the file system of its URL.
 
-    name: path below the folder that was listed; mtime_ns 0 where the file system does not tell.
+    name: path below the folder that was listed; mtime_ns 0 where the file system does not say.
     """
 
     machine: str

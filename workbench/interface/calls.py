@@ -102,7 +102,7 @@ def identify(
     """
     found = sources(logs, card, rig, signals)
     with _bar("identifying", 1.0) as bar:
-        course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
+        course = Course(bar, IDENTIFY_STAGES, time.monotonic, describe=bar.describe)
         with moving(course):
             known = identify_sources(
                 found, options, seed, posterior=posterior, on_progress=course.report
@@ -238,8 +238,8 @@ def predict(
     known = _model(model)
     found = sources(log, *_machine(model, card, rig, signals))
     with _bar("predicting"):
-        told = predict_sources(known, found, drive=drive, window=window)
-    return PredictResult(told, known.rotary)
+        predicted = predict_sources(known, found, drive=drive, window=window)
+    return PredictResult(predicted, known.rotary)
 
 
 def response(
@@ -259,7 +259,7 @@ def response(
     found = sources(logs, *_machine(model, card, rig, signals))
     if known is None and left_in is None:
         with _bar("identifying", 1.0) as bar:
-            course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
+            course = Course(bar, IDENTIFY_STAGES, time.monotonic, describe=bar.describe)
             with moving(course):
                 known, left_in = identified_or_not(found, seed, course.report)
     with _bar("averaging spectra"):

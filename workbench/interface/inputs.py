@@ -53,7 +53,10 @@ def sources(
     every: Sequence[LogLike] = logs if several else [logs]  # type: ignore[assignment,list-item]
     if not every:
         raise BadLog("no log given; give a DataFrame, a path, or a list of them")
-    found = [one if _is_path(one) else _recorded(one, k) for k, one in enumerate(every)]
+    found = [
+        one if isinstance(one, str | os.PathLike) else _recorded(one, k)
+        for k, one in enumerate(every)
+    ]
     if card is not None:
         if rig is not None or signals is not None:
             raise BadCard(
@@ -72,10 +75,6 @@ def read_card(card: CardLike) -> Card:
     if isinstance(card, Card):
         return card
     return load_card(card_path(os.fspath(card)), with_recipe=False)
-
-
-def _is_path(log: object) -> bool:
-    return isinstance(log, str | os.PathLike)
 
 
 def _named(log: Any) -> str | Recorded:

@@ -11,6 +11,11 @@ from identification.log import Log
 from workbench.cards.card import Card
 from workbench.interface.result import Result
 from workbench.output import dumps
+from workbench.report.axis_test import axis_view
+from workbench.report.drift import drift_view
+from workbench.report.prediction import prediction_view
+from workbench.report.response import response_view
+from workbench.report.view import View
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.drift import Drifted
 from workbench.steps.predict import Predicted
@@ -18,8 +23,6 @@ from workbench.steps.response import Curve, Responded
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from workbench.report.view import View
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,9 +40,7 @@ class PredictResult(Result):
 
         return prediction_frame(self.found.runs)
 
-    def _made(self) -> "View":
-        from workbench.report.prediction import prediction_view
-
+    def _made(self) -> View:
         return prediction_view(self.found, self.rotary)
 
 
@@ -69,9 +70,7 @@ class ResponseResult(Result):
         one = curve_of(self.found, what)
         return frd(one.H[one.seen], 2.0 * np.pi * one.f[one.seen])
 
-    def _made(self) -> "View":
-        from workbench.report.response import response_view
-
+    def _made(self) -> View:
         return response_view(self.found)
 
 
@@ -88,9 +87,7 @@ class DriftResult(Result):
         """ "none", "drift", "structure" or "not_judged"."""
         return self.found.verdict
 
-    def _made(self) -> "View":
-        from workbench.report.drift import drift_view
-
+    def _made(self) -> View:
         return drift_view(self.found, self.model_name)
 
 
@@ -111,9 +108,7 @@ class AxisTestResult(Result):
         """Why it is not green, the worst first."""
         return self.found.reasons
 
-    def _made(self) -> "View":
-        from workbench.report.axis_test import axis_view
-
+    def _made(self) -> View:
         return axis_view(self.found)
 
 

@@ -10,6 +10,10 @@ from identification.errors import BadModel
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.interface.result import Result
+from workbench.report.experiment import experiment_view
+from workbench.report.reports import design_view, validation_view
+from workbench.report.robust import robust_view
+from workbench.report.view import View
 from workbench.steps.experiment.planned import Experiment
 from workbench.steps.loop_figures import Traces
 from workbench.steps.robust.robust import ROBUST, Robust
@@ -19,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from design.schedule import Over
-    from workbench.report.view import View
 
 
 class ControlLoop(NamedTuple):
@@ -69,9 +72,7 @@ class DesignResult(Result):
 
         return DesignResult(scheduled(self.model, self.design, over), self.model)
 
-    def _made(self) -> "View":
-        from workbench.report.reports import design_view
-
+    def _made(self) -> View:
         return design_view(self.design, self.model.rotary)
 
 
@@ -100,9 +101,7 @@ class RobustResult(Result):
 
         return pd.DataFrame(dict(self.found.promises[ROBUST].found.values))
 
-    def _made(self) -> "View":
-        from workbench.report.robust import robust_view
-
+    def _made(self) -> View:
         return robust_view(self.found, self.model.rotary)
 
 
@@ -120,9 +119,7 @@ class ValidateResult(Result):
         """Whether the tested controller keeps every limit on every plant."""
         return self.found.passed
 
-    def _made(self) -> "View":
-        from workbench.report.reports import validation_view
-
+    def _made(self) -> View:
         return validation_view(self.found, self.traces, self.rotary)
 
 
@@ -141,7 +138,5 @@ class ExperimentResult(Result):
         r = self.found.r
         return pd.DataFrame({"t": self.found.h * np.arange(len(r)), "r": r})
 
-    def _made(self) -> "View":
-        from workbench.report.experiment import experiment_view
-
+    def _made(self) -> View:
         return experiment_view(self.found)

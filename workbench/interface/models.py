@@ -11,13 +11,14 @@ from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.documents.model import Model
 from workbench.interface.result import Result
+from workbench.report.reports import identified_view
+from workbench.report.trace import traced_view
+from workbench.report.view import View
 from workbench.steps.identify_sources import Identified
 from workbench.steps.trace import Traced
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from workbench.report.view import View
 
 
 class MissingLibrary(UserError):
@@ -104,9 +105,7 @@ class IdentifyResult(_OfModel):
         }
         return arviz.from_dict(posterior=posterior, attrs=said)
 
-    def _made(self) -> "View":
-        from workbench.report.reports import identified_view
-
+    def _made(self) -> View:
         return identified_view(self.found)
 
 
@@ -146,9 +145,7 @@ class TraceResult(_OfModel):
         own = {"t": rest.t, "before": rest.before, "after": rest.after, "noise": rest.noise}
         return pd.DataFrame({**rest.signals, **own})
 
-    def _made(self) -> "View":
-        from workbench.report.trace import traced_view
-
+    def _made(self) -> View:
         return traced_view(self.found)
 
 

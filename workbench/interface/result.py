@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from workbench.interface.inputs import PathLike
 from workbench.output import OutputFolder, dumps
+from workbench.report.view import View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from workbench.report.view import View
 
 
 @dataclass(frozen=True, repr=False)
@@ -27,11 +26,11 @@ class Result(ABC):
     _command: ClassVar[str]
 
     @abstractmethod
-    def _made(self) -> "View":
+    def _made(self) -> View:
         """How the result is shown."""
 
     @cached_property
-    def _view(self) -> "View":
+    def _view(self) -> View:
         return self._made()
 
     @property

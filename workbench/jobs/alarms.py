@@ -23,7 +23,7 @@ from workbench.jobs.passes import Report
 from workbench.registry.outbox import Outbox
 from workbench.registry.values import ALARMING, Alarm
 
-KEPT_FOR = timedelta(days=1)  # an alarm older than this is given up
+GIVEN_UP_AFTER = timedelta(days=1)  # an alarm older than this is given up
 IN_HAND = timedelta(minutes=2)  # for so long no other worker sends an alarm that one has taken
 IN_A_ROW = 3  # alarms that do not get through, after which the others are left
 BUSY_STATUSES = (408, 425, 429)  # refusals that are worth another try at once, as those from 500 on
@@ -87,7 +87,7 @@ class Webhook:
             wait=wait_random_exponential(multiplier=0.2, max=self.longest_wait),
             reraise=True,
         )
-        again(self._post, json.dumps(told(alarm)), key(alarm), client)
+        again(self._post, json.dumps(alarm_document(alarm)), key(alarm), client)
 
     def _post(self, content: str, idempotency: str, client: httpx.Client) -> None:
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency}
@@ -117,7 +117,7 @@ class Delivery:
     reason: str | None = None
 
 
-def told(alarm: Alarm) -> dict[str, str | int | None]:
+def alarm_document(alarm: Alarm) -> dict[str, str | int | None]:
     """What a webhook is sent."""
     return {
         "machine": _readable(alarm.machine),
@@ -153,11 +153,12 @@ def send_alarms(
     cannot be reached, or takes too long for all of them, the rest is left for the next pass.
     """
     now = clock()
-    outbox.fill(ALARMING, since=now - KEPT_FOR, now=now)
-    lost = outbox.give_up(before=now - KEPT_FOR, now=now)
+    outbox.fill(ALARMING, since=now - GIVEN_UP_AFTER, now=now)
+    lost = outbox.give_up(before=now - GIVEN_UP_AFTER, now=now)
     for alarm in lost:
         report("alarm_given_up", machine=alarm.machine, file=alarm.log, verdict=alarm.verdict,
-               reason=f"not taken by {webhook.shown} within {KEPT_FOR.days} day(s)")  # fmt: skip
+               reason=f"not taken by {webhook.shown} within {GIVEN_UP_AFTER.days}"
+                      " day(s)")  # fmt: skip
     logging.getLogger("httpx").setLevel(logging.WARNING)  # else it logs whole addresses
     round_ = _Round(outbox, webhook, clock, report, stop)
     round_.send(outbox.due(now))

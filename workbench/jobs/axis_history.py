@@ -19,7 +19,7 @@ from workbench.steps.axis_test import Earlier
 
 LAST_LOGS_READ = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see
-HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
+TAKEN_OUT_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
@@ -42,23 +42,23 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
         return Earlier(machine, values, None, None, said)
     model = read_model(Stored("model.json", registry.document(state.in_force, "model")))
     estimates, remarks = None, list[str]()
-    further = [key.replace("_", " ") for key in model.effects if not _held(key)]
+    further = [key.replace("_", " ") for key in model.effects if not _taken_out(key)]
     if further:
         remarks.append(
             f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
         found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
-        estimates = untold(model, found.reason) | by_quantity(found.parameters)
+        estimates = unidentified(model, found.reason) | by_quantity(found.parameters)
     width = model.effects.get("backlash", {}).get("width")
     if width is not None and width.value is not None and "backlash" not in (estimates or {}):
-        in_force = Estimate(width.value, width.unit, width.sd, width.low, width.high)
-        estimates = {**(estimates or {}), "backlash": in_force}
+        active_width = Estimate(width.value, width.unit, width.sd, width.low, width.high)
+        estimates = {**(estimates or {}), "backlash": active_width}
         remarks.append(f"backlash is that of the active version {state.in_force.number}")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
 
 
-def untold(model: Model, why: str) -> dict[str, Estimate]:
+def unidentified(model: Model, why: str) -> dict[str, Estimate]:
     """The nine as a log has them that the fit of the active model does not identify."""
     return {
         name: Estimate(None, one.unit, reason=why)
@@ -80,7 +80,7 @@ def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
     return out
 
 
-def _held(key: str) -> bool:
+def _taken_out(key: str) -> bool:
     """Whether the equation of motion holds an effect, the first or a further one of its kind."""
     name, _, number = key.rpartition("_")
-    return key in HELD_BY_EQUATION or (name in HELD_BY_EQUATION and number.isdigit())
+    return key in TAKEN_OUT_BY_EQUATION or (name in TAKEN_OUT_BY_EQUATION and number.isdigit())

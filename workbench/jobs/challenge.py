@@ -102,9 +102,9 @@ def challenge(
     if lost:
         return Contest(False, False, lost, errors, loop)
     lost = _lost_loop(old, new, terms)
-    keeps = old is not None and old.rms is not None and not old.missed
+    champion_passes = old is not None and old.rms is not None and not old.missed
     said = _won(errors, loop) if not lost else f"{_held_out_words(errors)}; {lost}"
-    return Contest(not lost, bool(lost) and keeps, said, errors, loop)
+    return Contest(not lost, bool(lost) and champion_passes, said, errors, loop)
 
 
 def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:

@@ -113,13 +113,17 @@ class Chain:
         reason = f"{said}; {contest.reason}"
         if contest.won:
             return Judgement("promoted", reason, candidate, evidence)
-        kept = self._kept(champion, challenger) if contest.model_won else None
-        if kept is None or candidate is None:
+        model_alone = (
+            self._with_active_controllers(champion, challenger) if contest.model_won else None
+        )
+        if model_alone is None or candidate is None:
             return Judgement("refused", reason, candidate, evidence)
         stays = f"{reason}; so the model is replaced and the controllers stay"
-        return Judgement("promoted", stays, kept, evidence, (candidate, reason))
+        return Judgement("promoted", stays, model_alone, evidence, (candidate, reason))
 
-    def _kept(self, champion: Contender, challenger: Contender) -> Candidate | None:
+    def _with_active_controllers(
+        self, champion: Contender, challenger: Contender
+    ) -> Candidate | None:
         """The new model with the active controllers, where they pass on it.
 
         The compensator holds the friction of the new model, as of any design made for it.

@@ -149,10 +149,15 @@ def worker(options: JobOptions, stop: Callable[[], bool] = lambda: False) -> Ite
 
     machine_folders(options.root)
     webhook = None if options.webhook is None else Webhook(options.webhook)
-    name = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    name = worker_name()
     with Patience(options.patience)(Registry, location(options.where)) as registry:
         report = reporter(sys.stderr, name)
         yield Worker(options, registry, webhook, report, name, MachineFigures(registry), stop)
+
+
+def worker_name() -> str:
+    """This process by computer and number, as claims and events name it."""
+    return f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
 
 
 def clock() -> datetime:

@@ -162,7 +162,7 @@ class Pass:
             self._report("logs_found", machine=name, count=new)
         if not any(self._ready(log, found) for log, _ in retry(self._queue.waiting, name)):
             return done
-        if retry(self._registry.in_force, name) is None and not settings.first:
+        if retry(self._registry.active_version, name) is None and not settings.first:
             self._report("no_model_in_force", machine=name)
             return replace(done, without_model=(*done.without_model, name))
         claim = retry(
@@ -259,7 +259,7 @@ class Pass:
 
     def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
         retry, registry, queue = self._settings.patience, self._registry, self._queue
-        version = retry(registry.in_force, folder.name)
+        version = retry(registry.active_version, folder.name)
         documents = {} if version is None else retry(registry.documents, version)
         # What was found of the machine as it is now says nothing of a log from before.
         newer = retry(queue.newer_behind, folder.name, log, self._settings.order)

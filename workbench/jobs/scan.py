@@ -1,7 +1,7 @@
 """Machine folders and the log files in them that are complete.
 
 ROOT/<machine>/card.toml says how ROOT/<machine>/logs/* are read. A file counts as complete when
-nobody has it open for writing, as far as the system tells, and it has not changed for a while;
+nobody has it open for writing, as far as the system says, and it has not changed for a while;
 where the writer leaves a marker beside each finished file ("run1.csv.done"), when that is there.
 """
 
@@ -114,7 +114,7 @@ def unchanged(path: Path, log: SeenLog) -> bool:
 
 
 def open_for_writing(path: Path) -> bool:
-    """Whether a process has the file open for writing; False where the system does not tell."""
+    """Whether a process has the file open for writing; False where the system does not say."""
     if not hasattr(os, "O_CLOEXEC") or not (lease := _lease()):
         return False
     try:

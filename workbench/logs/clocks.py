@@ -36,8 +36,8 @@ def on_one_clock(
     back, where groups have no time in common, and where a measured signal is slower than the clock.
     """
     base, own = signals["t"], groups["t"]
-    kept = np.isfinite(base)
-    _check(f"{where}, signals.t", base[kept])
+    usable = np.isfinite(base)
+    _check(f"{where}, signals.t", base[usable])
     h = _period(base)
     every, remarks = dict(signals), list[str]()
     members = _members(signals, groups)
@@ -48,7 +48,7 @@ def on_one_clock(
         if _same_but_for_ends(times, base):
             for name in members[group]:
                 every[name] = _as_long(signals[name], len(base))
-            kept[len(times) :] = False
+            usable[len(times) :] = False
             continue
         known = np.isfinite(times)
         _check(f"{where}, the clock of group {group!r}", times[known])
@@ -59,19 +59,21 @@ def on_one_clock(
             if len(signals[name]) != len(times):
                 raise BadLog(_unequal(where, name, group, len(signals[name]), len(times)))
             every[name] = _moved(name, times[known], signals[name][known], base, h)
-        kept[kept] &= (base[kept] >= times[known][0]) & (base[kept] <= times[known][-1] + period)
+        usable[usable] &= (base[usable] >= times[known][0]) & (
+            base[usable] <= times[known][-1] + period
+        )
         remarks.append(
             MinorRemark(
                 f"{where}: signals of group {group!r} (every {period:.4g} s) are brought to the"
                 f" clock of {own!r} (every {h:.4g} s)"
             )
         )
-    if np.count_nonzero(kept) < 2:
+    if np.count_nonzero(usable) < 2:
         raise BadLog(
             f"{where}: the groups {', '.join(map(repr, (own, *members)))} have no time in common;"
             " name columns of one recording"
         )
-    first, last = (int(np.flatnonzero(kept)[k]) for k in (0, -1))
+    first, last = (int(np.flatnonzero(usable)[k]) for k in (0, -1))
     parts = {name: values[first : last + 1] for name, values in every.items()}
     return OneClock(parts, first, tuple(remarks))
 
@@ -139,8 +141,8 @@ def _moved(name: str, times: Array, values: Array, base: Array, h: float) -> Arr
     out = np.full(base.shape, np.nan)
     if np.count_nonzero(known) < 2:
         return out
-    told = np.isfinite(base)
-    out[told] = at_times(name, times[known], values[known], base[told], h)
+    finite = np.isfinite(base)
+    out[finite] = at_times(name, times[known], values[known], base[finite], h)
     if name == "u":
         return out
     after = np.clip(np.searchsorted(times, base), 1, len(times) - 1)

@@ -82,12 +82,12 @@ def _width(lines: Sequence[Sequence[str]]) -> int:
 
 
 def _first_data(lines: Sequence[Sequence[str]], width: int) -> int | None:
-    kept = [k for k, line in enumerate(lines) if line]
-    for at in range(len(kept)):
-        if all(_is_data(lines[j], width) for j in kept[at : at + _IN_A_ROW]):
-            while at and len(lines[kept[at - 1]]) == width and not any(lines[kept[at - 1]]):
+    filled = [k for k, line in enumerate(lines) if line]
+    for at in range(len(filled)):
+        if all(_is_data(lines[j], width) for j in filled[at : at + _IN_A_ROW]):
+            while at and len(lines[filled[at - 1]]) == width and not any(lines[filled[at - 1]]):
                 at -= 1  # a row of empty fields is one of missing samples
-            return kept[at]
+            return filled[at]
     return None
 
 

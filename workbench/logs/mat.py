@@ -1,4 +1,4 @@
-"""MAT v5 tags walked before the file is read: scipy's reader crashes Python on corrupt ones."""
+"""MAT v5 tags followed before the file is read: scipy's reader crashes Python on corrupt ones."""
 
 import struct
 from collections.abc import Iterator

@@ -43,11 +43,6 @@ def entry(tree: Any, key: str) -> Any:
     raise LookupError(key)
 
 
-def records_of(rows: Sequence[Any]) -> dict[str, RawColumn]:
-    """A column for each number in tables of one kind, a row each, by its path in them."""
-    return dict(_records("", rows))
-
-
 def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]]:
     if depth > DEEPEST:
         return
@@ -74,7 +69,7 @@ def _entries(
 ) -> Iterator[tuple[str, RawColumn]]:
     """Tables of a list: rows, where each holds single values, else one after the other."""
     if len(entries) > WIDEST_ARRAY:
-        yield from _records(path, entries)
+        yield from records(path, entries)
         return
     for k, one in enumerate(entries):
         own = list(_leaves("", one, depth + 1))
@@ -84,7 +79,7 @@ def _entries(
             yield (name if len(long) == 1 else f"{name}.{key}"), x
 
 
-def _records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
+def records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
     """A column for each number in the tables of a list, one row each."""
     flat = [dict(_numbers("", row, 0)) if isinstance(row, Mapping) else {} for row in rows]
     for key in flat[0]:

@@ -22,7 +22,7 @@ from workbench.logs.mat import tags_are_sound
 from workbench.logs.mcap import read_mcap
 from workbench.logs.mdf import read_mdf
 from workbench.logs.numpy_files import read_numpy
-from workbench.logs.structs import entry, plain_tree, records_of, vectors_of
+from workbench.logs.structs import entry, plain_tree, records, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
     RawColumn,
@@ -206,7 +206,7 @@ def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
 
 def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: FileSpec) -> Table:
     if isinstance(rows[0], dict):
-        return of_vectors({**records_of(rows), **scalars}, spec)
+        return of_vectors({**dict(records("", rows)), **scalars}, spec)
     for number, row in enumerate(rows, start=1):
         if not isinstance(row, list) or len(row) != len(rows[0]):
             raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")

@@ -27,8 +27,8 @@ _COMPARED = 40  # lines by which the delimiter is found
 _END = "EOF"  # the last line of some scopes'
 MANY = 10  # rows of a wrong length that make the header suspect instead
 TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
-_LOOK = 262_144  # characters looked at to find the layout
-_HEAD_BYTES = 8 * _LOOK  # in which they are, whatever the letters
+_EXAMINED = 262_144  # characters looked at to find the layout
+_HEAD_BYTES = 8 * _EXAMINED  # in which they are, whatever the letters
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     text = _decode(path, spec.encoding)
     if blocks := _blocks(text, spec):
         return block_table(path, blocks, spec.decimal or decimal_of(blocks))
-    lines = text[:_LOOK].splitlines()
+    lines = text[:_EXAMINED].splitlines()
     start = spec.skip_rows
     while start < len(lines) and _skipped(lines[start], spec.comment):
         start += 1
-    lines = lines[start:] if len(text) <= _LOOK else lines[start:-1]
+    lines = lines[start:] if len(text) <= _EXAMINED else lines[start:-1]
     if not lines:
         raise BadLog(f"{path}: no rows after line {start}; check skip_rows in the card")
     looked = [line for line in lines[1:] if not _skipped(line, spec.comment)]
@@ -120,8 +120,8 @@ def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
     """
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
     text = _head(path, spec.encoding)
-    lines = text[:_LOOK].splitlines()
-    lines = lines if len(text) <= _LOOK else lines[:-1]
+    lines = text[:_EXAMINED].splitlines()
+    lines = lines if len(text) <= _EXAMINED else lines[:-1]
     marks = _marks([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
     rows = [_split(line, marks) for line in lines]
     if spec.decimal is None and marks.delimiter == ",":
@@ -147,7 +147,7 @@ def refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
 
 
 def _head(path: Path, encoding: str) -> str:
-    """More than `_LOOK` characters of the file, or all that it has."""
+    """More than `_EXAMINED` characters of the file, or all that it has."""
     with path.open("rb") as file:
         content = file.read(_HEAD_BYTES)
     if len(content) == _HEAD_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
@@ -156,7 +156,7 @@ def _head(path: Path, encoding: str) -> str:
             text = whole.decode(encoding).removeprefix("\ufeff")
         except (LookupError, UnicodeDecodeError):
             text = ""
-        if len(text) > _LOOK and "\0" not in text:
+        if len(text) > _EXAMINED and "\0" not in text:
             return text
     return _decode(path, encoding)
 
@@ -171,7 +171,7 @@ def _decode(path: Path, encoding: str) -> str:
         raise BadLog(f"{path}: encoding {encoding!r} is unknown; write it as 'latin-1'") from None
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        what = "is not text" if b"\0" in content[:_LOOK] else f"is not {encoding} text"
+        what = "is not text" if b"\0" in content[:_EXAMINED] else f"is not {encoding} text"
         raise BadLog(
             f"{path}: {what} (byte 0x{content[error.start]:02x} in line {line}); give a CSV file, "
             'or name its encoding in the card, [file] encoding = "latin-1"'
@@ -243,8 +243,10 @@ def _body(text: str, start: int, spec: FileSpec, marks: _Marks) -> str:
     if body.endswith((_END, _END + "\n", _END + "\r\n")):
         body = body.rstrip().removesuffix(_END)
     if spec.comment and spec.comment in body:
-        kept = (line for line in body.splitlines() if not line.lstrip().startswith(spec.comment))
-        body = "\n".join(kept)
+        remaining = (
+            line for line in body.splitlines() if not line.lstrip().startswith(spec.comment)
+        )
+        body = "\n".join(remaining)
     if marks.delimiter == " ":
         body = "\n".join(" ".join(line.split()) for line in body.splitlines())
     return body
@@ -295,10 +297,10 @@ def _parse(
             numbers = load(pa.float64(), plain) if plain else None
         except pa.ArrowInvalid:
             numbers = None
-    told = set() if numbers is None else set(numbers.column_names)
+    numeric = set() if numbers is None else set(numbers.column_names)
 
     def fetch(number: int) -> NDArray[Any]:
-        if numbers is not None and names[number] in told:
+        if numbers is not None and names[number] in numeric:
             return np.asarray(numbers.column(names[number]).to_numpy())
         try:
             return np.asarray(load(pa.float64(), [names[number]]).column(0).to_numpy())
@@ -313,7 +315,7 @@ def _parse(
 
 def _plain(content: bytes, marks: _Marks, width: int) -> list[int]:
     """The columns that hold numbers alone, by the first and the last rows."""
-    head, tail = content[:_LOOK].splitlines()[:-1], content[-_LOOK:].splitlines()[1:]
+    head, tail = content[:_EXAMINED].splitlines()[:-1], content[-_EXAMINED:].splitlines()[1:]
     rows = [
         _split(line.decode("utf-8", "replace"), marks)
         for line in (*head[:_COMPARED], *tail[-_COMPARED:])

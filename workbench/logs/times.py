@@ -37,8 +37,8 @@ def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
         return _spans(raw)
     if raw.dtype.kind == "M":
         moments = raw.astype("datetime64[ns]")
-        told = moments[~np.isnat(moments)]
-        return _spans(moments - told[0].astype("datetime64[D]")) if told.size else None
+        valid = moments[~np.isnat(moments)]
+        return _spans(moments - valid[0].astype("datetime64[D]")) if valid.size else None
     if raw.dtype.kind not in "OUS":
         return None
     first = next((value for value in raw if not _is_empty(value)), None)

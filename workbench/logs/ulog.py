@@ -13,7 +13,7 @@ from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.channels import Channel, channel_table, optional
-from workbench.logs.table import RawColumn, Table, refuse_long
+from workbench.logs.table import Table, refuse_long
 
 _ULOG_BYTES = 400_000_000  # read record by record in Python, a minute for 100 MB
 
@@ -39,8 +39,4 @@ def _channels(path: Path, file: Any) -> Iterator[Channel]:
         group = f"{message.name}[{message.multi_id}]" if message.multi_id else message.name
         for name, values in message.data.items():
             refuse_long(path, len(values))
-            yield Channel(group, name, partial(_column, values))
-
-
-def _column(values: Any) -> RawColumn:
-    return np.asarray(values)
+            yield Channel(group, name, partial(np.asarray, values))

@@ -13,7 +13,7 @@ from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
 from workbench.page import version_views
-from workbench.page.dropped import card_of, keep_files, log_of, refuse_machine
+from workbench.page.dropped import card_of, log_of, refuse_machine, store_files
 from workbench.page.pages import go, part, registry_of
 from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import Visitor, changing, form_of, reading
@@ -26,7 +26,7 @@ from workbench.registry.values import Candidate
 LONGEST_REASON = 500
 
 
-def keep(request: Request, visitor: Visitor) -> Response:
+def add_machine(request: Request, visitor: Visitor) -> Response:
     """Keep what came of a dropped log as a machine with an active version."""
     settings, registry = request.app.state.settings, registry_of(request)
     task = Bench(registry.database).task(request.path_params["task"])
@@ -42,8 +42,8 @@ def keep(request: Request, visitor: Visitor) -> Response:
     now = datetime.now(UTC)
     version = registry.add(machine, Candidate(**made), reason=reason, by=visitor.name, now=now)
     report = f"version-{version.number}-{task.kind}.html", result_file(request, REPORT_FILE)
-    keep_files(settings.root, machine, log, card, report)
-    current = registry.in_force(machine)
+    store_files(settings.root, machine, log, card, report)
+    current = registry.active_version(machine)
     if current is None or current.number != version.number:
         registry.promote(machine, version.number, reason=reason, by=visitor.name, now=now)
     detail = f"version {version.number}, from {log.name}: {reason}"
@@ -103,7 +103,7 @@ def _text(request: Request, name: str) -> str:
 
 
 ACTION_ROUTES = [
-    Route("/work/{task:int}/keep", changing(keep), methods=["POST"]),
+    Route("/work/{task:int}/keep", changing(add_machine), methods=["POST"]),
     Route("/machine/{machine}/promote", changing(promote), methods=["POST"]),
     Route("/machine/{machine}/rollback", changing(rollback), methods=["POST"]),
     Route("/machine/{machine}/version/{number:int}/export", reading(export)),

@@ -13,8 +13,8 @@ from starlette.responses import Response
 
 from workbench.page.visitors import Endpoint, Visitor
 
-ANSWER_KEPT = 1.0  # s
-MOST_KEPT = 200
+ANSWER_LIFETIME = 1.0  # s
+MOST_ANSWERS = 200
 Key = tuple[str, str, str, str]
 
 
@@ -22,7 +22,7 @@ class Moment:
     """The answers of a server in the last second, by address and by who asks."""
 
     def __init__(self) -> None:
-        self._kept: dict[Key, tuple[float, int, bytes, Mapping[str, str]]] = {}
+        self._answers: dict[Key, tuple[float, int, bytes, Mapping[str, str]]] = {}
         self._lock = Lock()
 
     def answer(self, endpoint: Endpoint, request: Request, visitor: Visitor) -> Response:
@@ -33,14 +33,14 @@ class Moment:
         asked = request.url.path, request.url.query
         key = (*asked, request.headers.get("hx-target", ""), visitor.name)
         with self._lock:
-            found = self._kept.get(key)
-            if found is None or time.monotonic() - found[0] > ANSWER_KEPT:
-                if len(self._kept) >= MOST_KEPT:
-                    self._kept.clear()
+            found = self._answers.get(key)
+            if found is None or time.monotonic() - found[0] > ANSWER_LIFETIME:
+                if len(self._answers) >= MOST_ANSWERS:
+                    self._answers.clear()
                 made = endpoint(request, visitor)
-                kept = {"content-type": made.headers["content-type"]}
-                found = time.monotonic(), made.status_code, bytes(made.body), kept
-                self._kept[key] = found
+                made_headers = {"content-type": made.headers["content-type"]}
+                found = time.monotonic(), made.status_code, bytes(made.body), made_headers
+                self._answers[key] = found
         _, status, body, headers = found
         return Response(body, status, headers)
 

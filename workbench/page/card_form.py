@@ -135,7 +135,7 @@ class CardForm:
             label, unit = RIG_NUMBERS[key]
             raise BadCard(f"{label}: {text!r} is no number; give it in {unit}") from None
 
-    def keep(self, folder: Path) -> None:
+    def store(self, folder: Path) -> None:
         """Write the form beside its log."""
         content = {"fields": dict(self.fields), "columns": list(self.columns),
                    "why": dict(self.why), "remarks": list(self.remarks),
@@ -143,7 +143,7 @@ class CardForm:
         write_whole(folder / FORM_FILE, json.dumps(content), "form")
 
 
-def kept_form(folder: Path) -> CardForm | None:
+def stored_form(folder: Path) -> CardForm | None:
     """The form that was kept beside a log; None where there is none."""
     path = folder / FORM_FILE
     if not path.exists():
@@ -151,8 +151,8 @@ def kept_form(folder: Path) -> CardForm | None:
     found = json.loads(path.read_text(encoding="utf-8"))
     columns = [(str(key), str(words)) for key, words in found["columns"]]
     why = {name: (bool(sure), str(said)) for name, (sure, said) in found["why"].items()}
-    kept = found.get("others", {})  # which forms of older versions lack
-    others = {name: (str(words), dict(one)) for name, (words, one) in kept.items()}
+    stored = found.get("others", {})  # which forms of older versions lack
+    others = {name: (str(words), dict(one)) for name, (words, one) in stored.items()}
     return CardForm(found["fields"], columns, why, found["remarks"], found["layout"], others)
 
 

@@ -29,11 +29,6 @@ _ID = re.compile(r"[0-9a-f]{16}")
 _ODD = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
-def new_id() -> str:
-    """A name that nobody guesses."""
-    return secrets.token_hex(8)
-
-
 def folder_of(root: Path, upload: str) -> Path:
     """The folder of an upload; raises BadRegistry where the name is none."""
     if not _ID.fullmatch(upload):
@@ -57,7 +52,7 @@ def file_name(given: str) -> str:
     return (stem[: LONGEST_FILE_NAME - len(ending)].strip("._-") or "log") + ending.lower()
 
 
-def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
+def store(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
     """Write the log, whole or not at all: its size [bytes] and fingerprint.
 
     Raises BadLog where it is empty.
@@ -73,11 +68,6 @@ def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, st
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return size, digest
-
-
-def drop_again(root: Path, upload: str) -> None:
-    """Remove an upload that is no log."""
-    shutil.rmtree(folder_of(root, upload), ignore_errors=True)
 
 
 def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
@@ -131,7 +121,7 @@ def refuse_machine(root: Path, machine: str, card: Path) -> None:
         )
 
 
-def keep_files(root: Path, machine: str, log: Path, card: Path, report: tuple[str, Path]) -> None:
+def store_files(root: Path, machine: str, log: Path, card: Path, report: tuple[str, Path]) -> None:
     """Put card, log and report into the machine's folder; card and log that are there stay.
 
     report: its name there, and where it lies.

@@ -1,5 +1,7 @@
 """Drop a log: the zone, the log's columns, its card as a form, and the doctor's picture."""
 
+import secrets
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -19,17 +21,15 @@ from workbench.page.card_form import (
     CardForm,
     empty_form,
     form_of,
-    kept_form,
+    stored_form,
 )
 from workbench.page.dropped import (
     ENDINGS,
     card_of,
-    drop_again,
     file_name,
     folder_of,
-    keep,
     log_of,
-    new_id,
+    store,
 )
 from workbench.page.pages import go, show
 from workbench.page.visitors import Visitor, changing, reading
@@ -56,13 +56,13 @@ def drop(request: Request, visitor: Visitor) -> Response:
         raise HTTPException(400, "No file came; choose one.")
     if (given.size or 0) > request.app.state.settings.most_bytes:
         raise HTTPException(413, "The file is too large; cut the log.")
-    upload, name = new_id(), file_name(given.filename)
+    upload, name = secrets.token_hex(8), file_name(given.filename)
     root = request.app.state.settings.root
-    size, digest = keep(root, upload, name, given.file)
+    size, digest = store(root, upload, name, given.file)
     try:
         request.app.state.helpers(log_views.refuse_no_log, log_of(root, upload))
     except UserError:
-        drop_again(root, upload)
+        shutil.rmtree(folder_of(root, upload), ignore_errors=True)
         raise
     shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in given.filename)
     now = datetime.now(UTC)
@@ -92,10 +92,10 @@ def columns(request: Request, visitor: Visitor) -> Response:
 
 def card(request: Request, visitor: Visitor) -> Response:
     """The card as a form: as it was corrected, else as `init` proposes it."""
-    form, said = kept_form(_folder(request)), ""
+    form, said = stored_form(_folder(request)), ""
     if form is None:
         form, said = _proposed(request)
-        said = said or _keep_card(request, form)
+        said = said or _store_card(request, form)
     response = _form(request, visitor, form, said)
     response.headers["HX-Trigger-After-Settle"] = "card-ready"
     return response
@@ -104,9 +104,9 @@ def card(request: Request, visitor: Visitor) -> Response:
 def correct(request: Request, visitor: Visitor) -> Response:
     """Take the corrected card; one that does not read the log is reported, and the last one
     stays."""
-    before = kept_form(_folder(request)) or _proposed(request)[0]
+    before = stored_form(_folder(request)) or _proposed(request)[0]
     form = before.with_fields(given_form(request))
-    said = _keep_card(request, form)
+    said = _store_card(request, form)
     if not said:
         upload = _upload(request)
         audit(request.app.state.registry.database, "card_corrected", upload.id, form["name"],
@@ -169,7 +169,7 @@ def _proposed(request: Request) -> tuple[CardForm, str]:
         return empty_form(helpers(log_views.headers, path), path.stem), str(error)
 
 
-def _keep_card(request: Request, form: CardForm) -> str:
+def _store_card(request: Request, form: CardForm) -> str:
     """Keep form and card where it reads the log; else why it does not."""
     path, place = _log(request), _card(request)
     part = place.with_name(f"new-{place.name}")
@@ -179,7 +179,7 @@ def _keep_card(request: Request, form: CardForm) -> str:
         if refused:
             return refused.replace(part.name, "the card")
         part.replace(place)
-        form.keep(place.parent)
+        form.store(place.parent)
     except BadCard as error:
         return str(error)
     finally:

@@ -28,12 +28,12 @@ def fleet(request: Request, visitor: Visitor) -> Response:
     asked = asked_for(request.query_params, request.app.state.settings.silent_days)
     found = fleet_page(request.app.state.registry.database, asked)
     pages = max(1, -(-found.found // asked.per_page))
-    kept = {"text": asked.text, "state": asked.state, "order": asked.order,
+    selection = {"text": asked.text, "state": asked.state, "order": asked.order,
             "down": "1" if asked.down else ""}  # fmt: skip
     part_only = request.headers.get("hx-target") == "fleet"
     return show(
         request, visitor, "fleet_table" if part_only else "fleet", title="Fleet",
-        asked=asked, found=found, pages=pages, kept=kept, heads=HEADS, states=STATE_WORDS,
+        asked=asked, found=found, pages=pages, selection=selection, heads=HEADS, states=STATE_WORDS,
         total=sum(found.counts.values()),
     )  # fmt: skip
 

@@ -46,9 +46,10 @@ class Guard:
             return
         below = _below(scope, self._settings.prefix)
         most = self._settings.most_bytes if _path(below) == UPLOAD_PATH else FORM_BYTES
-        told = headers.get("content-length", "0")
-        if not told.isdigit() or int(told) > most + FORM_BYTES:
-            await _too_large(most)(below, receive, _with_headers(send, below))
+        declared = headers.get("content-length", "0")
+        if not declared.isdigit() or int(declared) > most + FORM_BYTES:
+            refusal = PlainTextResponse(_too_large_text(most), 413, {"Connection": "close"})
+            await refusal(below, receive, _with_headers(send, below))
             return
         await self._limited(below, receive, _with_headers(send, below), most + FORM_BYTES)
 
@@ -65,10 +66,6 @@ class Guard:
             return message
 
         await self._app(scope, counted, send)
-
-
-def _too_large(most: int) -> PlainTextResponse:
-    return PlainTextResponse(_too_large_text(most), 413, {"Connection": "close"})
 
 
 def _too_large_text(most: int) -> str:
@@ -96,13 +93,13 @@ def _path(scope: Scope) -> str:
 
 
 def _with_headers(send: Send, scope: Scope) -> Send:
-    kept = str(scope["path"]).startswith("/static/")
+    is_static = str(scope["path"]).startswith("/static/")
 
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             headers.setdefault("Content-Security-Policy", POLICY)
-            headers.setdefault("Cache-Control", "max-age=86400" if kept else "no-store")
+            headers.setdefault("Cache-Control", "max-age=86400" if is_static else "no-store")
             for name, value in SAFE_HEADERS.items():
                 headers[name] = value
         await send(message)

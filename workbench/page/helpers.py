@@ -1,4 +1,4 @@
-"""Heavy looks at a log in processes of their own, warm, and killed where they take too long."""
+"""Heavy work on a log in processes of their own, warm, and killed where they take too long."""
 
 from collections.abc import Callable
 from contextlib import AsyncExitStack, suppress
@@ -17,7 +17,7 @@ STAYS_WARM = 120.0  # s between two calls; after five minutes without one a proc
 
 
 class TooLong(UserError):
-    """A look at a log that does not come to its end."""
+    """Work on a log that does not come to its end."""
 
 
 class Helpers:
@@ -26,33 +26,33 @@ class Helpers:
     def __init__(self) -> None:
         self._quick: anyio.CapacityLimiter | None = None
         self._slow: anyio.CapacityLimiter | None = None
-        self._held = AsyncExitStack()
+        self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Self:
         self._quick = anyio.CapacityLimiter(QUICK_CALLS)
         self._slow = anyio.CapacityLimiter(SLOW_CALLS)
-        group = await self._held.enter_async_context(anyio.create_task_group())
+        group = await self._stack.enter_async_context(anyio.create_task_group())
         group.start_soon(self._keep_warm)
-        self._held.callback(group.cancel_scope.cancel)
+        self._stack.callback(group.cancel_scope.cancel)
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await self._held.aclose()
+        await self._stack.aclose()
 
-    def __call__(self, look: Callable[..., Result], *arguments: Any) -> Result:
-        """What the look gives, asked for in a thread of the server; raises what it raises."""
-        return anyio.from_thread.run(self._asked, self._quick, look, *arguments)
+    def __call__(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """What the work gives, asked for in a thread of the server; raises what it raises."""
+        return anyio.from_thread.run(self._asked, self._quick, work, *arguments)
 
-    def slowly(self, look: Callable[..., Result], *arguments: Any) -> Result:
-        """The same of a look that may take seconds of a long log."""
-        return anyio.from_thread.run(self._asked, self._slow, look, *arguments)
+    def slowly(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """The same of work that may take seconds of a long log."""
+        return anyio.from_thread.run(self._asked, self._slow, work, *arguments)
 
     async def _asked(
-        self, limit: anyio.CapacityLimiter | None, look: Callable[..., Result], *arguments: Any
+        self, limit: anyio.CapacityLimiter | None, work: Callable[..., Result], *arguments: Any
     ) -> Result:
         try:
             with anyio.fail_after(LONGEST_CALL):
-                return await to_process.run_sync(look, *arguments, cancellable=True, limiter=limit)
+                return await to_process.run_sync(work, *arguments, cancellable=True, limiter=limit)
         except TimeoutError:
             raise TooLong(
                 f"the log was not read within {LONGEST_CALL:.0f} s; cut it, or use the commands"

@@ -36,11 +36,11 @@ class DoctorFound:
 
     verdict: str
     lines: tuple[str, ...]
-    told: tuple[tuple[str, bool, str], ...]
+    identifiability: tuple[tuple[str, bool, str], ...]
 
 
 def warm() -> None:
-    """Import what the looks need, and compile or load their kernels' module."""
+    """Import what the work on a log needs, and compile or load their kernels' module."""
     import pandas  # noqa: F401
     import pyarrow.parquet  # noqa: F401
 
@@ -124,8 +124,8 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
     with _without(path, card):
         found = examine(path, load_card(card, with_recipe=False))
     lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
-    told = tuple((one.name, one.can, _said_of(one)) for one in found.told)
-    return DoctorFound(found.verdict, tuple(lines), told)
+    identifiability = tuple((one.name, one.can, _said_of(one)) for one in found.identifiability)
+    return DoctorFound(found.verdict, tuple(lines), identifiability)
 
 
 def _said_of(one: "Identifiable") -> str:

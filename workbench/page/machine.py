@@ -77,7 +77,7 @@ def report(request: Request, _visitor: Visitor) -> Response:
     return report_response(request.app.state.helpers(version_views.design_page, design))
 
 
-def kept_report(request: Request, _visitor: Visitor) -> Response:
+def stored_page(request: Request, _visitor: Visitor) -> Response:
     """A report in the machine's folder."""
     registry_of(request).machine(request.path_params["machine"])
     for path in _reports(request):
@@ -121,7 +121,7 @@ MACHINE_ROUTES = [
     Route("/audit", reading(changes)),
     Route("/machine/{machine}", reading(briefly(machine))),
     Route("/machine/{machine}/compare", reading(compare)),
-    Route("/machine/{machine}/report/{file}", reading(kept_report)),
+    Route("/machine/{machine}/report/{file}", reading(stored_page)),
     Route("/machine/{machine}/version/{number:int}/report", reading(report)),
     Route("/machine/{machine}/version/{number:int}/{kind}.json", reading(document)),
 ]

@@ -59,7 +59,7 @@ def _moved(history: Mapping[int, Mapping[str, Any]]) -> float:
 
 
 def _times(seconds: Sequence[float]) -> tuple[Array, str]:
-    """When the logs were recorded, back from the last one; their numbers where times do not tell.
+    """When the logs were recorded, back from the last one; their numbers where times do not say.
 
     Equal times are set apart by a little, so that no log hides another.
     """

@@ -87,7 +87,7 @@ def moment(at: datetime | None) -> str:
 
 
 def ago(at: datetime | None) -> str:
-    """How long ago, in the largest unit that tells it."""
+    """How long ago, in the largest unit that shows it."""
     if at is None:
         return "never"
     seconds = max((datetime.now(UTC) - at).total_seconds(), 0.0)

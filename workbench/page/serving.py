@@ -46,7 +46,7 @@ def _workers(settings: PageSettings, report: "Report") -> Iterator[None]:
     """Within the block the workers run, each started again should it die."""
     over = threading.Event()
     keepers = [
-        threading.Thread(target=_keep, args=(settings, report, over), daemon=True)
+        threading.Thread(target=_restarted, args=(settings, report, over), daemon=True)
         for _ in range(settings.workers)
     ]
     for one in keepers:
@@ -59,7 +59,7 @@ def _workers(settings: PageSettings, report: "Report") -> Iterator[None]:
             one.join()
 
 
-def _keep(settings: PageSettings, report: "Report", over: threading.Event) -> None:
+def _restarted(settings: PageSettings, report: "Report", over: threading.Event) -> None:
     """One worker after the other; the registry's address is not on its command line."""
     command = [sys.executable, "-m", "workbench", "work", "--machines", settings.machines]
     environment = {**os.environ, REGISTRY_VARIABLE: settings.where}

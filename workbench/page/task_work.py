@@ -64,14 +64,14 @@ class Work:
 
 
 def course_of(
-    kind: TaskKind, advance: Callable[[float], None], told: Callable[[str], None]
+    kind: TaskKind, advance: Callable[[float], None], describe: Callable[[str], None]
 ) -> Course:
     """The course of a task: its stages, and those of the design after it."""
     stages = {
         name: (MODEL_SHARE * low, MODEL_SHARE * high)
         for name, (low, high) in WORK_STAGES[kind].items()
     }
-    return Course(advance, {**stages, **LAST_STAGES}, time.monotonic, told=told)
+    return Course(advance, {**stages, **LAST_STAGES}, time.monotonic, describe=describe)
 
 
 def done(work: Work, course: Course) -> str:
@@ -104,7 +104,7 @@ def _identified(sources: Sources, course: Course) -> Made:
     model = found.model
     result = {
         "summary": summary(model),
-        "notes": _told((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
+        "notes": _notes((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
         "errors": None,
         "report": identified_view(found).page(),
     }
@@ -119,7 +119,7 @@ def _traced(sources: Sources, course: Course) -> Made:
     errors = errors_table(found.trace, rotary, tested=False)
     result = {
         "summary": trace_sentence(found),
-        "notes": _told((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
+        "notes": _notes((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
         "errors": {"head": errors.full_head, "rows": errors.whole},
         "report": traced_view(found).page(),
     }
@@ -129,7 +129,7 @@ def _traced(sources: Sources, course: Course) -> Made:
     return model, documents, result, [against_signal(one, rotary, command) for one in shown]
 
 
-def _told(remarks: Sequence[str], logs: Sequence[str]) -> list[str]:
+def _notes(remarks: Sequence[str], logs: Sequence[str]) -> list[str]:
     return [one.text for one in report_notes(remarks, logs)]
 
 

@@ -70,8 +70,8 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
             for name, one in found.controllers.items():
                 t, y = linear_step(found, one)
                 colour: Colour = "reference" if place else "model"
-                look = STYLES_OF[name]
-                lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
+                style = STYLES_OF[name]
+                lines.append(Line(f"{number}: {name.upper()}", t, y, colour, style))
             if found.recommendation:
                 said.append(f"version {number}: {found.recommendation.why}")
         except UserError as error:

@@ -4,20 +4,19 @@ It may be killed at any moment: its lease ends, and another begins the task anew
 """
 
 import os
-import secrets
 import signal
-import socket
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from types import FrameType
 
 from identification.errors import UserError
 from workbench.jobs.lease import Patience, renewed
+from workbench.jobs.options import clock, worker_name
 from workbench.jobs.passes import Report
 from workbench.page.dropped import card_of, log_of, results_of, without_path
 from workbench.page.settings import PageSettings
@@ -49,7 +48,7 @@ def run_worker(settings: PageSettings, report: Report, *, once: bool = False) ->
 
     Runs in the main thread, as its task is ended by a signal.
     """
-    owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    owner = worker_name()
     signal.signal(signal.SIGUSR1, _raise)  # which only a beat sends
     patience = Patience()
     with patience(Registry, settings.where) as registry:
@@ -57,7 +56,7 @@ def run_worker(settings: PageSettings, report: Report, *, once: bool = False) ->
         report("worker_ready", owner=owner)
         while True:
             try:
-                claim = bench.claim(owner, lease=TASK_LEASE, now=datetime.now(UTC))
+                claim = bench.claim(owner, lease=TASK_LEASE, now=clock())
             except RegistryAway as error:
                 report("registry_away", reason=str(error))
                 time.sleep(10 * QUEUE_POLL)
@@ -76,7 +75,7 @@ def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report)
     report("task_begun", task=task.id, kind=task.kind, upload=task.upload)
     try:
         state, said = _made(bench, claim, settings, report)
-        Patience()(bench.finish, claim, state, said, now=datetime.now(UTC))
+        Patience()(bench.finish, claim, state, said, now=clock())
         report("task_over", task=task.id, state=state, said=said)
     except (NotOurs, LostClaim):
         report("task_lost", task=task.id)
@@ -93,9 +92,9 @@ def _made(
     try:
         log, card = log_of(root, task.upload), card_of(root, task.upload)
         out = results_of(root, task.upload, task.id)
-        with _beating(bench, claim) as (advance, told):
+        with _beating(bench, claim) as (advance, describe):
             return "done", done(
-                Work(task.kind, log, card, out), course_of(task.kind, advance, told)
+                Work(task.kind, log, card, out), course_of(task.kind, advance, describe)
             )
     except UserError as error:
         return "failed", without_path(str(error), [log, card])
@@ -116,11 +115,11 @@ def _beating(
     def advance(step: float) -> None:
         state.share = min(state.share + step, 1.0)
 
-    def told(words: str) -> None:
+    def describe(words: str) -> None:
         state.stage = words
 
     def beat() -> None:
-        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=datetime.now(UTC))
+        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=clock())
 
     def stop(over: threading.Event) -> None:
         os.kill(os.getpid(), signal.SIGUSR1)
@@ -128,7 +127,7 @@ def _beating(
             os._exit(STUBBORN_STATUS)
 
     with renewed(beat, QUEUE_POLL, stop):
-        yield advance, told
+        yield advance, describe
 
 
 def _raise(_number: int, _frame: FrameType | None) -> None:

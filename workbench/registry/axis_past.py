@@ -28,10 +28,10 @@ def newest_lights(logs: Sequence[TestedLog]) -> tuple[str, Sequence[AxisLine]]:
 
     logs: the newest first.
     """
-    told = [one for one in logs if one.parameters]
-    if not told:
+    identified = [one for one in logs if one.parameters]
+    if not identified:
         return "", ()
-    newest, older = told[0], told[1 : 1 + LAST_ON_PAGE]
+    newest, older = identified[0], identified[1 : 1 + LAST_ON_PAGE]
     past = history(list(reversed(older)))
     limits = limits_of({name: [value for _, value in every] for name, every in past.items()})
     found = {}

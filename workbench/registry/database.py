@@ -170,8 +170,8 @@ def _unreadable(why: str) -> BadRegistry:
 
 def _shown(url: URL) -> str:
     """The URL without its password and what else its query may hold."""
-    kept = {key: value for key, value in url.query.items() if key in ("host", "port")}
-    return url.set(drivername="postgresql", query=kept).render_as_string(hide_password=True)
+    query = {key: value for key, value in url.query.items() if key in ("host", "port")}
+    return url.set(drivername="postgresql", query=query).render_as_string(hide_password=True)
 
 
 def _refuse_place(path: Path, create: bool) -> None:

@@ -60,9 +60,9 @@ def with_log(trend: Mapping[str, Sequence[float]], evidence: Mapping[str, Any]) 
     out = {name: list(values) for name, values in trend.items()}
     for one in _parameters(evidence):
         if one.get("after") is not None:
-            told = out.setdefault(str(one["name"]), [])
-            told.append(float(f"{float(one['after']):.6g}"))
-            del told[:-TREND_LOGS]
+            recent = out.setdefault(str(one["name"]), [])
+            recent.append(float(f"{float(one['after']):.6g}"))
+            del recent[:-TREND_LOGS]
     return out
 
 
@@ -107,10 +107,14 @@ def summary_tested(
     row.state = state_of(verdict, evidence)
     name, change = most_moved(evidence)
     if name is not None:
-        kept = session.get_one(MachineTrendRow, machine)
-        trend = with_log(json.loads(kept.trend), evidence)
-        kept.trend = dumps(trend)
-        row.moved, row.moved_by, row.moved_trend = name, change, dumps(trend.get(name, []))
+        trend_row = session.get_one(MachineTrendRow, machine)
+        trend = with_log(json.loads(trend_row.trend), evidence)
+        trend_row.trend = dumps(trend)
+        row.moved, row.moved_by, row.moved_trend = (
+            name,
+            change,
+            dumps(trend.get(name, [])),
+        )
 
 
 def summary_moved(session: Session, machine: str) -> None:

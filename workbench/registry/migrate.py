@@ -63,8 +63,8 @@ def _refuse_damaged(connection: Connection, where: str) -> None:
         else "SELECT DISTINCT c.relname FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid"
         " WHERE NOT t.tgisinternal AND pg_table_is_visible(c.oid)"
     )
-    kept = set(connection.execute(text(query)).scalars())
-    open_to_change = sorted({*APPEND_ONLY, *PAGE_APPEND_ONLY, "in_force"} - kept)
+    protected = set(connection.execute(text(query)).scalars())
+    open_to_change = sorted({*APPEND_ONLY, *PAGE_APPEND_ONLY, "in_force"} - protected)
     if open_to_change:
         raise BadRegistry(
             f"registry {where}: nothing keeps its table {open_to_change[0]!r} from being changed"

@@ -1,6 +1,6 @@
 """Which of two logs of a machine is the older: by the files' times, or by the numbers in names.
 
-A copy made late has a new time, but its name still tells when it was recorded ("run007.csv").
+A copy made late has a new time, but its name still says when it was recorded ("run007.csv").
 """
 
 import re

@@ -36,12 +36,12 @@ class Outbox:
 
     def fill(self, verdicts: Sequence[LogVerdict], *, since: datetime, now: datetime) -> None:
         """Put the results of these verdicts from `since` on into it that never were in it."""
-        told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
+        delivered = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
         here = and_(OutboxRow.log_id == OutcomeRow.log_id, OutboxRow.turn == OutcomeRow.turn)
         at = literal(now, OutboxRow.next_at.type)
         new = (
             select(OutcomeRow.log_id, OutcomeRow.turn, literal(0), at)
-            .outerjoin(NoticeRow, told)
+            .outerjoin(NoticeRow, delivered)
             .outerjoin(OutboxRow, here)
             .where(
                 OutcomeRow.verdict.in_(verdicts),

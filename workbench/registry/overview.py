@@ -135,9 +135,9 @@ def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int
 
 def _line(row: Any, force: tuple[int, datetime] | None) -> FleetLine:
     machine, heard_at, logs, moved, moved_by, trend, state = row
-    told = json.loads(trend) if trend else []
+    values = json.loads(trend) if trend else []
     return FleetLine(
-        machine, state, heard_at, logs, moved, moved_by, told, *(force or (None, None))
+        machine, state, heard_at, logs, moved, moved_by, values, *(force or (None, None))
     )
 
 

@@ -224,8 +224,8 @@ class Queue:
     ) -> tuple[str, ...]:
         """Files that wait again from now on; their earlier results stay.
 
-        logs: names or beginnings of fingerprints of logs with a result, none: all that were set
-        aside. Raises BadRegistry where one is not there or waits anyhow.
+        logs: names or beginnings of fingerprints of logs with a result, none: all that were
+        excluded. Raises BadRegistry where one is not there or waits anyhow.
         """
         with self._database.writing() as session:
             need_machine(session, machine, lock=True)
@@ -243,7 +243,7 @@ class Queue:
     def last_evidence(self, version: Version) -> dict[str, Any] | None:
         """Evidence of the latest result against this version; None where there is none yet.
 
-        That of a log older than the version's own is left out: it tells of the machine before.
+        That of a log older than the version's own is left out: it is of the machine before.
         """
         query = (
             select(OutcomeRow.evidence)
@@ -285,7 +285,7 @@ class Queue:
 
 
 def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLog | None:
-    """As `Queue.newer_behind`; a name that the machine has used before tells no order."""
+    """As `Queue.newer_behind`; a name that the machine has used before gives no order."""
     query = select(func.count(LogRow.id)).where(
         LogRow.machine == machine, LogRow.file == log.file, LogRow.sha256 != log.sha256
     )

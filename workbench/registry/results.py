@@ -13,14 +13,14 @@ from workbench.registry.page_tables import MachineNowRow
 from workbench.registry.rows import judged_now
 from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
 
-Told = Literal["", "sent", "waiting", "given up"]
+Delivered = Literal["", "sent", "waiting", "given up"]
 
 
 @dataclass(frozen=True)
 class TestedLog:
     """A log of the machine, when it was recorded and tested; verdict None: it waits.
 
-    parameters: what it gave of each; told: whether the webhook has been told.
+    parameters: what it gave of each; delivered: whether the webhook has taken its alarm.
     """
 
     file: str
@@ -31,7 +31,7 @@ class TestedLog:
     number: int | None
     at: datetime | None
     parameters: Sequence[Mapping[str, Any]]
-    told: Told
+    delivered: Delivered
 
 
 def last_logs(database: Database, machine: str, last: int) -> Sequence[TestedLog]:
@@ -75,9 +75,9 @@ def _judged(
     if done is None:
         return TestedLog(log.file, log.sha256, recorded, None, "", None, None, (), "")
     drift = json.loads(done.evidence).get("drift") or {}
-    told: Told = "sent" if sent else ""
+    delivered: Delivered = "sent" if sent else ""
     if queued is not None:
-        told = "waiting" if queued.given_up_at is None else "given up"
+        delivered = "waiting" if queued.given_up_at is None else "given up"
     parameters = tuple(drift.get("parameters") or ())
     return TestedLog(log.file, log.sha256, recorded, done.verdict, done.reason, number, done.at,
-                     parameters, told)  # fmt: skip
+                     parameters, delivered)  # fmt: skip

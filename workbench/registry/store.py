@@ -116,7 +116,7 @@ class Registry:
             (found,) = _states(session, name)
             return found
 
-    def in_force(self, machine: str) -> Version | None:
+    def active_version(self, machine: str) -> Version | None:
         """The active version; None where nothing has been promoted."""
         with self.database.reading() as session:
             row = active_version(session, machine)
@@ -199,7 +199,7 @@ def _states(session: Session, name: str | None = None) -> tuple[MachineState, ..
     judged = select(LogRow.machine, func.count()).join(OutcomeRow, judged_now())
     done = _counts(session, judged, only(LogRow.machine))
     bad = (*only(LogRow.machine), OutcomeRow.verdict == "set_aside")
-    aside = _counts(session, judged, bad)
+    excluded = _counts(session, judged, bad)
     query = select(MachineRow.name).where(*only(MachineRow.name)).order_by(MachineRow.name)
     return tuple(
         MachineState(
@@ -209,7 +209,7 @@ def _states(session: Session, name: str | None = None) -> tuple[MachineState, ..
             versions=made.get(one, 0),
             logs=logs.get(one, 0),
             waiting=logs.get(one, 0) - done.get(one, 0),
-            set_aside=aside.get(one, 0),
+            set_aside=excluded.get(one, 0),
         )
         for one in session.scalars(query)
     )

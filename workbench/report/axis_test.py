@@ -38,11 +38,6 @@ def _first(test: AxisTest) -> str:
     return f"{first} (and {len(rest)} more)" if rest else first
 
 
-def axis_rows(test: AxisTest) -> list[Row]:
-    """A row a quantity."""
-    return [_row(one) for one in test.quantities]
-
-
 def _row(one: Quantity) -> Row:
     estimate = one.estimate
     (unit, factor) = ("%", 100.0) if estimate.unit == "1" else shown_unit(estimate.unit)
@@ -70,7 +65,7 @@ def axis_view(test: AxisTest) -> View:
         f"Axis test of {test.machine}",
         axis_sentence(test),
         [
-            tabled(AXIS_HEAD, axis_rows(test)),
+            tabled(AXIS_HEAD, map(_row, test.quantities)),
             listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
             listed((f"note: {line}" for line in test.remarks), most=4),
         ],
@@ -92,7 +87,7 @@ def _sections(test: AxisTest) -> list[Section]:
     body = render(
         "axis_test", light=test.light, sentence=axis_sentence(test).partition(": ")[2],
         reasons=_few(test.reasons),
-        head=AXIS_HEAD, rows=list(zip(axis_rows(test), test.quantities, strict=True)),
+        head=AXIS_HEAD, rows=[(_row(one), one) for one in test.quantities],
     )  # fmt: skip
     drawn = "".join(str(chart_html(one)) for one in axis_charts(test))
     end = render("axis_test_end", facts=[one for one in facts if one], remarks=test.remarks)

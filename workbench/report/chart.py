@@ -39,7 +39,7 @@ class Line:
     x: Array
     y: Array
     colour: Colour = "model"
-    look: LineStyle = "line"
+    style: LineStyle = "line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,18 +181,18 @@ def _panel(panel: Panel, points: int) -> dict[str, Any]:
         "bands": [band._asdict() for band in panel.bands],
         "marks": [mark._asdict() for mark in panel.marks],
         "tables": tables,
-        "lines": [_look(column) for group in groups for column in group],
+        "lines": [_line_entry(column) for group in groups for column in group],
     }
 
 
 def _dots(*columns: _Column) -> bool:
-    return any(column.line.look == "dots" for column in columns)
+    return any(column.line.style == "dots" for column in columns)
 
 
-def _look(column: _Column) -> dict[str, Any]:
+def _line_entry(column: _Column) -> dict[str, Any]:
     line = column.line
-    look = "edge" if column.edge else line.look
-    out = {"name": line.name, "colour": line.colour, "look": look}
+    style = "edge" if column.edge else line.style
+    out = {"name": line.name, "colour": line.colour, "look": style}
     return {**out, "upper": column.edge == "upper"} if column.edge else out
 
 

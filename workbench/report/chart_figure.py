@@ -51,11 +51,11 @@ def style() -> Iterator[None]:
 
 def figure(width: float, height: float) -> "Figure":
     """An empty figure [inch] without a window; a notebook shows it, whatever its backend."""
-    return _shown_figure()(figsize=(width, height))
+    return _figure_class()(figsize=(width, height))
 
 
 @cache
-def _shown_figure() -> "type[Figure]":
+def _figure_class() -> "type[Figure]":
     from matplotlib.figure import Figure
 
     class ShownFigure(Figure):
@@ -67,9 +67,9 @@ def _shown_figure() -> "type[Figure]":
     return ShownFigure
 
 
-def line(axes: "Axes", x: Array, y: Array, **look: Any) -> None:
+def line(axes: "Axes", x: Array, y: Array, **style: Any) -> None:
     """A line of at most `LINE_POINTS` points that keeps every peak."""
-    axes.plot(*thinned(x, y), **look)
+    axes.plot(*thinned(x, y), **style)
 
 
 def thinned(x: Array, y: Array, points: int = LINE_POINTS) -> tuple[Array, Array]:
@@ -109,7 +109,7 @@ FIGURE_COLOURS: dict[Colour, str] = {
     "band": BAND,
     "quiet": GREY,
 }
-LOOKS: dict[str, dict[str, Any]] = {
+LINE_STYLES: dict[str, dict[str, Any]] = {
     "line": {},
     "bold": {"lw": 1.8},
     "dashed": {"ls": "--"},
@@ -180,11 +180,11 @@ def _mark(axes: "Axes", mark: Mark) -> None:
 
 def _line(axes: "Axes", one: Line) -> None:
     colour = FIGURE_COLOURS[one.colour]
-    if one.look == "dots":
-        keep = evenly_spread(len(one.x))
+    if one.style == "dots":
+        chosen = evenly_spread(len(one.x))
         axes.plot(
-            one.x[keep], one.y[keep], ".", ms=3, mew=0, color=colour, alpha=0.6, rasterized=True,
-            label=one.name,
+            one.x[chosen], one.y[chosen], ".", ms=3, mew=0, color=colour, alpha=0.6,
+            rasterized=True, label=one.name,
         )  # fmt: skip
     else:
-        line(axes, one.x, one.y, color=colour, label=one.name, **LOOKS[one.look])
+        line(axes, one.x, one.y, color=colour, label=one.name, **LINE_STYLES[one.style])

@@ -82,8 +82,8 @@ def step_chart(found: Design) -> Chart:
     for name, one in found.controllers.items():
         t, y = linear_step(found, one)
         # Held from sample to sample.
-        held = np.repeat(t, 2)[1:], np.repeat(y, 2)[:-1]
-        lines.append(Line(name.upper(), *held, LOOP_COLOURS[name]))
+        staircase = np.repeat(t, 2)[1:], np.repeat(y, 2)[:-1]
+        lines.append(Line(name.upper(), *staircase, LOOP_COLOURS[name]))
     panel = Panel("time [s]", "position / step [-]", lines, marks=[Mark(1.0)])
     return Chart("step", "linear step response of the closed loop", [panel])
 

@@ -22,7 +22,7 @@ from workbench.report.validation_tables import (
 from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
-from workbench.steps.recommend import percent, settled
+from workbench.steps.recommend import percent, settling_words
 from workbench.steps.trace import effect_estimates
 
 SIMULATED = (
@@ -74,8 +74,10 @@ def controller_sentence(found: Demonstration) -> str:
 
 def taken(design: Design) -> str:
     """The loop that a design recommends, by its name in a validation."""
-    told = design.recommendation
-    return design.recommended + (COMPENSATED if told is not None and told.compensator else "")
+    recommendation = design.recommendation
+    return design.recommended + (
+        COMPENSATED if recommendation is not None and recommendation.compensator else ""
+    )
 
 
 def called(name: str) -> str:
@@ -106,7 +108,7 @@ def _figures(one: LoopFigures) -> Row:
     return (
         percent(one.standstill_relative),
         percent(max(one.overshoot, 0.0)),
-        settled(one),
+        settling_words(one),
         percent(one.smooth_relative),
         f"{one.force_peak:.3g}",
         margin,

@@ -46,11 +46,11 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
         lines += _labelled("direction -", [_way(found, ways.negative)])
         lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
                                       f" {ways.rested:.3g} s"])  # fmt: skip
-    if found.told:
-        can = ", ".join(_within(one) for one in found.told if one.can)
+    if found.identifiability:
+        can = ", ".join(_within(one) for one in found.identifiability if one.can)
         lines += _labelled("identifiable", [can or "nothing"])
-    lines += _labelled("only if", _open(found.told))
-    lines += _labelled("unidentifiable", _not_identifiable(found.told), 6)
+    lines += _labelled("only if", _open(found.identifiability))
+    lines += _labelled("unidentifiable", _not_identifiable(found.identifiability), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]

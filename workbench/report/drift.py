@@ -7,13 +7,14 @@ import numpy as np
 from identification.arrays import Array
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.drift_tables import (
-    drift_notes,
+    detectable_lines,
     drift_parts,
     drift_sentence,
     logs_of_drift,
     run_table,
     shift_table,
     then_of_drift,
+    what_the_columns_say,
 )
 from workbench.report.notes import report_notes
 from workbench.report.page import Section, lines_section, table_section
@@ -66,7 +67,8 @@ def _sections(found: Drifted) -> list[Section]:
     if judged:
         title = f"Parameters before and after, {last.source.file}"
         sections.append(table_section(title, shift_table(last)))
-    notes = report_notes(drift_notes(found), logs_of_drift(found))
+    lines = [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
+    notes = report_notes(lines, logs_of_drift(found))
     return [*sections, lines_section("Notes", notes)]
 
 

@@ -182,11 +182,6 @@ def detectable_lines(found: Drifted) -> list[str]:
     return out
 
 
-def drift_notes(found: Drifted) -> list[str]:
-    """What to know of the tests: thresholds, inconclusive runs, remarks."""
-    return [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
-
-
 def logs_of_drift(found: Drifted) -> tuple[str, ...]:
     """Names of the logs, as remarks begin with them."""
     names = ((one.source.file, one.source.log.name) for one in found.tests)

@@ -85,11 +85,6 @@ def _safe(found: Experiment) -> str:
     )
 
 
-def experiment_lines(found: Experiment) -> list[str]:
-    """Limits and what the run uses of them, how it is put together, remarks."""
-    return [*limit_lines(found), *search_lines(found), *found.remarks]
-
-
 def limit_lines(found: Experiment) -> list[str]:
     """How to run it, and what it uses of the limits."""
     units, limits, used = shown(found.motion == "rotary"), found.limits, found.safety.peaks
@@ -144,7 +139,8 @@ def _sections(found: Experiment) -> list[Section]:
          _rate(found, i))
         for i, one in enumerate(found.segments)
     ]  # fmt: skip
-    promised = table(promise_table(found), experiment_lines(found))
+    lines = [*limit_lines(found), *search_lines(found), *found.remarks]
+    promised = table(promise_table(found), lines)
     sections = [
         Section("The run", chart_html(run_chart(found), RUN_CAPTION)),
         Section("What it promises", promised + chart_html(promise_chart(found))),

@@ -12,7 +12,7 @@ from workbench.cards.readable import units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Chart, Line, Mark, Panel, Part, chart_html
-from workbench.report.model_tables import held
+from workbench.report.model_tables import run_coupling
 from workbench.report.page import Section
 from workbench.steps.predicted_force import force_by_model
 
@@ -95,7 +95,7 @@ def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | 
         measured = factor * row.joined([one.log[signal] for one in sources])
         lines = [Line("measured", row.t, measured, "measured")]
         if signal == "F" or any(runs):
-            lines.append(Line("model", row.t, factor * row.joined(modelled), look="dashed"))
+            lines.append(Line("model", row.t, factor * row.joined(modelled), style="dashed"))
         panels.append(Panel(row.label, f"{name} [{unit}]", lines, marks=row.marks))
     part = liveliest(sources[0].log["y"])
     lively = Part("liveliest part", float(row.t[part.start]), float(row.t[part.stop - 1]))
@@ -122,6 +122,6 @@ def _caption(model: Model) -> str:
             f" sees the measured position.{inverse if model.rig.kind == 'motor' else ''}"
         )
     return (
-        f"The model is driven by the measured force, {held(model)}: a free run on a measured force"
-        f" drifts at every stop.{inverse}"
+        f"The model is driven by the measured force, {run_coupling(model)}: a free run on a"
+        f" measured force drifts at every stop.{inverse}"
     )

@@ -21,7 +21,7 @@ ERRORS_SHOWN: tuple[tuple[Literal["step", "smooth"], str], ...] = (
     ("smooth", "along the smooth reference"),
     ("step", "at rest, last step"),
 )
-SETTLED_FOR = 4.0  # settling times shown after a step
+SETTLING_TIMES_SHOWN = 4.0  # settling times shown after a step
 SINCE = "time since the step [s]"
 
 
@@ -115,7 +115,7 @@ def _span(found: Validation, place: str, most: int, run: LoopRun) -> int:
     """Samples after a step in which the loops differ: until the slowest has long settled."""
     times = [one[place].settling for one in found.figures.values() if place in one]
     h = float(run.t[1] - run.t[0])
-    return int(np.clip(SETTLED_FOR * float(np.median(times)) / h, min(50, most), most))
+    return int(np.clip(SETTLING_TIMES_SHOWN * float(np.median(times)) / h, min(50, most), most))
 
 
 def _rest(run: LoopRun) -> int:
@@ -129,8 +129,8 @@ def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: f
     alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
     beside: LineStyle = "dotted" if name.endswith(SCHEDULED) else "dashed"
-    look: LineStyle = "line" if alone == name else beside
-    return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], look)
+    style: LineStyle = "line" if alone == name else beside
+    return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], style)
 
 
 def _cut(
@@ -141,8 +141,8 @@ def _cut(
     factor: float,
     name: str,
     colour: Colour,
-    look: LineStyle,
+    style: LineStyle,
 ) -> Line:
     part = slice(begin, begin + span)
     t = run.t[part]
-    return Line(name, t - t[0], factor * np.asarray(values, dtype=np.float64)[part], colour, look)
+    return Line(name, t - t[0], factor * np.asarray(values, dtype=np.float64)[part], colour, style)

@@ -9,6 +9,7 @@ from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
 from workbench.documents.model import Model, used
+from workbench.documents.velocity import VelocityModel
 from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.notes import notes
@@ -97,7 +98,7 @@ def model_parts(model: Model, remarks: Sequence[str]) -> list[Part | str]:
     ]
 
 
-def logs_of(model: Model) -> tuple[str, ...]:
+def logs_of(model: Model | VelocityModel) -> tuple[str, ...]:
     """Names of the model's logs, as remarks begin with them."""
     return tuple(dict.fromkeys(entry.file for entry in model.log))
 
@@ -116,8 +117,10 @@ def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> li
     """
     out: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        told = row[value] != "-"
-        out.setdefault((row[0],) if told else ("", _short(row[value + 2], logs)), []).append(row)
+        has_value = row[value] != "-"
+        out.setdefault((row[0],) if has_value else ("", _short(row[value + 2], logs)), []).append(
+            row
+        )
     return [
         alike[0] if name else _together(alike, reason, value)
         for (name, *reason), alike in out.items()
@@ -181,7 +184,11 @@ def next_of_model(model: Model) -> str:
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
-    by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
+    by = (
+        "the command"
+        if model.fit.drive == "command"
+        else f"the applied force, {run_coupling(model)}"
+    )
     lines = [
         f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
         f" {e.duration:.4g} s, driven by {by}"
@@ -225,7 +232,7 @@ def runs_to_add(model: Model) -> tuple[str, ...]:
     )
 
 
-def held(model: Model) -> str:
+def run_coupling(model: Model) -> str:
     """How a run on the measured force was kept near the measured position."""
     from workbench.steps.predict import FORCE_WINDOW
 

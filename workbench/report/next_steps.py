@@ -57,15 +57,15 @@ def _card_of(model: "Model | VelocityModel", card: str | None) -> str:
 
 
 def after_design(
-    found: "Design", model_file: Path, asked_poles: bool, kept: Iterable[str]
+    found: "Design", model_file: Path, asked_poles: bool, options: Iterable[str]
 ) -> Step | None:
     """Where no controller keeps the goals: what the best of them does keep.
 
-    kept: the other options of the command. None where one is recommended.
+    options: the other options of the command. None where one is recommended.
     """
     if found.recommended != "none":
         return None
-    words = ("design", str(model_file), *kept)
+    words = ("design", str(model_file), *options)
     if asked_poles:
         return step("poles that meet the goals are searched", *words)
     best = max(found.controllers.values(), key=lambda one: (-len(one.missed), _worst(one)))

@@ -16,9 +16,9 @@ def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_N
     logs: names with which a remark on one log begins.
     """
     every = tuple(remarks)
-    told = printed_once((one for one in every if not isinstance(one, MinorRemark)), logs)
+    main = printed_once((one for one in every if not isinstance(one, MinorRemark)), logs)
     shown = [one._replace(text=f"note: {one.text}") for one in report_notes(every, logs)]
-    return replace(instead(_noted(told), _noted(every), most, yields=True), merged=shown)
+    return replace(instead(_noted(main), _noted(every), most, yields=True), merged=shown)
 
 
 def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:

@@ -85,8 +85,8 @@ def prediction_chart(found: Predicted, rotary: bool) -> Chart:
             every = [np.append(getattr(run, key), gap) for run in found.runs]
             values = factor * np.concatenate(every)
             if np.any(np.isfinite(values)):
-                look: LineStyle = "line" if colour == "measured" else "dashed"
-                lines.append(Line(said, t, values, colour, look))
+                style: LineStyle = "line" if colour == "measured" else "dashed"
+                lines.append(Line(said, t, values, colour, style))
         panels.append(Panel("time [s]", f"{name} [{unit}]", lines))
         if len(lines) > 1:
             measured, model = lines[:2]

@@ -58,14 +58,14 @@ def identified_view(found: Identified) -> View:
         return [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
 
     def sections() -> Sequence[Section]:
-        told = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
+        said = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
         return (
             residual(model, sources, runs()),
             parameters_section(model),
             friction_curve(model, found.fit, sources),
             fit(model, sources, runs()),
             *over_frequency(model, sources),
-            lines_section("In words", report_notes(told, logs_of(model))),
+            lines_section("In words", report_notes(said, logs_of(model))),
         )
 
     return View(
@@ -132,9 +132,9 @@ def validation_view(
 
 def parameters_section(model: Model) -> Section:
     """The parameters with units and intervals, or why there is none."""
-    held = {**model.friction, **(model.actuator or {})}
+    estimates = {**model.friction, **(model.actuator or {})}
     assumed = ", ".join(
-        f"{name} = {_shown(used(e))} {e.unit}" for name, e in held.items() if e.value is None
+        f"{name} = {_shown(used(e))} {e.unit}" for name, e in estimates.items() if e.value is None
     )
     return Section("Parameters", render("parameters", rows=parameter_rows(model), assumed=assumed))
 

@@ -65,10 +65,10 @@ def _force_panel(
     starts = [part.low for part in row.parts]
     t = np.concatenate([begin + own for begin, (own, _) in zip(starts, found, strict=True)])
     left = np.concatenate([one for _, one in found])
-    keep = evenly_spread(len(t))
+    chosen = evenly_spread(len(t))
     name = "applied force less the equation of motion's, while sliding"
     return Panel(
-        row.label, label, [Line(name, t[keep], left[keep], look="dots")], marks=row.marks,
+        row.label, label, [Line(name, t[chosen], left[chosen], style="dots")], marks=row.marks,
         y_range=_most_of(left), x_range=(float(row.t[0]), float(row.t[-1])),
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
+from workbench.report.chart import Area, Chart, Line, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
 from workbench.report.page import Section, lines_section, table
 from workbench.report.view import View
@@ -270,19 +270,20 @@ def _bode(
         Area("95 %", x, low, decibels(np.abs(H) * (1.0 + half)), "measured"),
         Area("95 %", x, phase - spread, phase + spread, "measured"),
     )
-    magnitude, turn = [_line("measured", x, size)], [_line("measured", x, phase)]
+    magnitude = [Line("measured", x, size, "measured")]
+    turn = [Line("measured", x, phase, "measured")]
     if beside is not None:
         left_in = np.where(beside.seen, beside.H, np.nan)[use]
-        magnitude.insert(0, _line("friction left in", x, decibels(np.abs(left_in)), "before"))
-        turn.insert(0, _line("friction left in", x, _near(degrees(left_in), phase), "before"))
+        magnitude.insert(0, Line("friction left in", x, decibels(np.abs(left_in)), "before"))
+        turn.insert(0, Line("friction left in", x, _near(degrees(left_in), phase), "before"))
     for name, curve in others:
         if curve is not None:
             own = curve[use]
-            magnitude.append(_line(name, x, decibels(np.abs(own)), "model", "dashed"))
-            turn.append(_line(name, x, _near(degrees(own), phase), "model", "dashed"))
-    coherence = [_line("measured", x, one.coherence[use])]
+            magnitude.append(Line(name, x, decibels(np.abs(own)), "model", "dashed"))
+            turn.append(Line(name, x, _near(degrees(own), phase), "model", "dashed"))
+    coherence = [Line("measured", x, one.coherence[use], "measured")]
     if beside is not None:
-        coherence.insert(0, _line("friction left in", x, beside.coherence[use], "before"))
+        coherence.insert(0, Line("friction left in", x, beside.coherence[use], "before"))
     shown_range = _round_range(x)
     level = [[], []] if levels is None else [[Mark(one)] for one in levels]
     return [
@@ -301,12 +302,6 @@ def _round_range(f: Array) -> tuple[float, float]:
     low = ends[max(int(np.searchsorted(ends, f[0], side="right")) - 1, 0)]
     high = ends[min(int(np.searchsorted(ends, f[-1])), len(ends) - 1)]
     return float(low), float(high)
-
-
-def _line(
-    name: str, x: Array, y: Array, colour: Colour = "measured", look: LineStyle = "line"
-) -> Line:
-    return Line(name, x, y, colour, look)
 
 
 def _near(phase: Array, other: Array) -> Array:

@@ -46,7 +46,7 @@ def robust_sentence(found: Robust) -> str:
     called = promise.controller.upper()
     with_it = " with the compensator" if promise.compensator else ""
     least = min(
-        (one.kept for one in promise.measures.values() if one.kept is not None), default=1.0
+        (one.share for one in promise.measures.values() if one.share is not None), default=1.0
     )
     if promise.every == 1.0:
         return (
@@ -64,7 +64,7 @@ def promise_table(found: Robust, rotary: bool) -> Part:
         (
             one.words,
             "" if spread.limit is None else _limit(one, spread.limit, rotary),
-            "" if spread.kept is None else f"{100 * spread.kept:.0f} %",
+            "" if spread.share is None else f"{100 * spread.share:.0f} %",
             *(_said(one, value, rotary) for value in (spread.low, spread.median, spread.high)),
         )
         for one, spread in _of(found.promises[ROBUST])
@@ -85,8 +85,8 @@ def _beside(one: Measure, promise: Promise | None, rotary: bool) -> str:
     spread = None if promise is None else promise.measures.get(one.name)
     if spread is None:
         return "-"
-    kept = "" if spread.kept is None else f" ({100 * spread.kept:.0f} %)"
-    return f"{_said(one, spread.median, rotary)}{kept}"
+    share = "" if spread.share is None else f" ({100 * spread.share:.0f} %)"
+    return f"{_said(one, spread.median, rotary)}{share}"
 
 
 def _of(promise: Promise) -> list[tuple[Measure, Spread]]:
@@ -217,8 +217,8 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
             continue
         at = np.sort(factor * values)
         share = 100.0 * np.arange(1, len(at) + 1) / len(at)
-        keep = np.isfinite(at)
-        at, share = at[keep], share[keep]
+        finite = np.isfinite(at)
+        at, share = at[finite], share[finite]
         # Where many machines have one value the line goes up, which an axis takes as going on.
         apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
         lines.append(Line(name, at + apart, share, *CURVE_STYLES[name]))

@@ -111,7 +111,7 @@ def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> P
     signal = signal_of(effect, residual)
     taken, how = residual.before - residual.after, "before"
     if not alone:
-        own = along_rows(acting, residual, p)
+        own = effect_at_rows(acting, residual, p)
         if own is not None:
             taken, how = own, f"without {words(effect.key)}"
     single = len(effect.depends_on) == 1 and (alone or how != "before")
@@ -121,7 +121,7 @@ def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> P
     return Picture(residual, signal, effect, residual.after + taken, how, curve, period)
 
 
-def along_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | None:
+def effect_at_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | None:
     """What an effect contributes at each row, (r,); None where it is no function of the signals."""
     effect = acting.effect
     if effect.place.sign is None or effect.evolve is not None or "v" not in residual.signals:
@@ -205,9 +205,9 @@ def time_chart(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Ch
     """The chart of `over_time`; logs: names of the logs in a row."""
     unit, factor = residual_unit(residual.equation, rotary)
     noise = 2 * factor * float(np.median(residual.noise))
-    keep = evenly_spread(len(residual.t))
+    chosen = evenly_spread(len(residual.t))
     lines = [
-        Line(name, residual.t[keep], factor * values[keep], colour, "dots")
+        Line(name, residual.t[chosen], factor * values[chosen], colour, "dots")
         for values, colour, name in _both(residual)
     ]
     starts = log_starts(residual)
@@ -272,8 +272,8 @@ def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
 
 def _cloud(residual: Residual, x: Array, values: Array, colour: Colour, levels: int) -> list[Line]:
     """Points against a signal, and their running median in each direction of motion."""
-    keep = evenly_spread(len(x), DOTS)
-    out = [Line("rows", x[keep], values[keep], colour, "dots")]
+    chosen = evenly_spread(len(x), DOTS)
+    out = [Line("rows", x[chosen], values[chosen], colour, "dots")]
     for name, (at, way) in by_direction(residual).items():
         out.append(Line(name, *running_median(x[at], values[at], levels), way, "bold"))
     return out

@@ -61,7 +61,9 @@ def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
         )
         for key, name, factor, floor in errors
     ]
-    return tabled(head, _main_rows(rows), whole=rows)
+    known = [row for row in rows if set(row[1:5]) != {"-"} and "%" not in row[0]]
+    fell = [row for row in known if row[1] != row[2] or row[3] != row[4]]
+    return tabled(head, fell or known, whole=rows)
 
 
 def _cell(value: float | None, factor: float) -> str:
@@ -171,8 +173,8 @@ def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
             (was,) = in_digits((shown_before.value,), shown_before.value, shown_before.sd)
             change = percent(shown_before.value, after.value)
             out.append((name, was, value, after.unit, interval, change))
-    told = reasons_once(out, logs, 2 if found.effects else 1)
-    return tabled(CHANGE_HEAD if found.effects else SAME_HEAD, told, whole=out)
+    shortened = reasons_once(out, logs, 2 if found.effects else 1)
+    return tabled(CHANGE_HEAD if found.effects else SAME_HEAD, shortened, whole=out)
 
 
 def differences_table(found: Trace) -> Part:
@@ -211,9 +213,3 @@ def trace_parts(traced: Traced) -> list[Part | str]:
 def logs_of_trace(traced: Traced) -> tuple[str, ...]:
     """Names of its logs, as remarks begin with them."""
     return tuple(dict.fromkeys(source.log.name for source in (*traced.train, *traced.test)))
-
-
-def _main_rows(errors: list[Row]) -> list[Row]:
-    """The errors in newtons and millimetres that are known; those that fell, where any did."""
-    known = [row for row in errors if set(row[1:5]) != {"-"} and "%" not in row[0]]
-    return [row for row in known if row[1] != row[2] or row[3] != row[4]] or known

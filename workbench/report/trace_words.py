@@ -242,7 +242,8 @@ def then_of(traced: Traced) -> list[str]:
     if found.verdict == "drift":
         out.append("`workbench identify` the newer logs: a model of the machine as it is now")
     elif found.effects:
-        out.append(f"{design} on the model with {_them(found)} in it")
+        them = "the effect" if len(found.effects) == 1 else "the effects"
+        out.append(f"{design} on the model with {them} in it")
     elif found.verdict == "none":
         out.append(f"{design}; the model is as good as these logs can make it")
     if found.verdict == "unknown" and found.unknown.depends_on:
@@ -251,7 +252,3 @@ def then_of(traced: Traced) -> list[str]:
             " FOLDER`, then `workbench trace ... --effects FOLDER`"
         )
     return out
-
-
-def _them(found: Trace) -> str:
-    return "the effect" if len(found.effects) == 1 else "the effects"

@@ -6,7 +6,13 @@ from workbench.output import Row
 from workbench.report.notes import notes
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures
-from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
+from workbench.steps.recommend import (
+    in_thousandths,
+    other_figures,
+    own_figures,
+    percent,
+    settling_words,
+)
 from workbench.steps.validate import Validation
 
 
@@ -69,7 +75,7 @@ def _row(one: LoopFigures, units: Shown) -> Row:
         delay,
         percent(one.standstill_relative),
         percent(max(one.overshoot, 0.0)),
-        settled(one),
+        settling_words(one),
         percent(one.smooth_relative),
         f"{one.force_peak:.3g}",
         *command,

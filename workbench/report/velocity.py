@@ -1,19 +1,20 @@
 """Results of a rig whose velocity follows the command: one screen each, and a report."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from identification.velocity.rivals import STRUCTURES, is_noise
 from workbench.cards.readable import length, number
 from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity_document
 from workbench.ending import Step, step
 from workbench.output import Row
-from workbench.report.model_tables import MODEL_HEAD, estimate_cells
+from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.notes import notes
-from workbench.report.page import Section, lines_section, table_section
+from workbench.report.page import lines_section, table_section
 from workbench.report.view import View
-from workbench.screen import Part, tabled
+from workbench.screen import Part, screen, tabled
 from workbench.steps.velocity import (
     VelocityPrediction,
     VelocityTraced,
@@ -52,14 +53,6 @@ SLOWER_MODULUS, MOST_MODULUS = 1.3, 0.9  # asked for next; times the one before
 RIVAL_ROWS = ("rival", "held out, 2 s", "0.2 s", "chance", "clearly better")
 
 
-def valve_rows(model: VelocityModel) -> list[Row]:
-    """Number, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
-    every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
-    return [
-        (name, *estimate_cells(one), VALVE_MEANING.get(name, "")) for name, one in every.items()
-    ]
-
-
 def _errors(model: VelocityModel) -> str:
     fit, rotary = model.fit, model.rotary
     return (
@@ -78,33 +71,58 @@ def _summary(model: VelocityModel) -> str:
     return f"{said} Not identifiable: {', '.join(lost)}." if lost else said
 
 
-def _logs(model: VelocityModel) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(entry.file for entry in model.log))
+def _valve(model: VelocityModel, *, with_meaning: bool) -> Part:
+    """The numbers: value, unit, 95 % interval (or why there is none), and what each is."""
+    every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
+    rows: list[Row] = [
+        (name, *estimate_cells(one), VALVE_MEANING.get(name, "")) for name, one in every.items()
+    ]
+    if with_meaning:
+        return tabled((*MODEL_HEAD, "meaning"), rows)
+    return tabled(MODEL_HEAD, [row[:4] for row in rows])
 
 
-def valve_section(model: VelocityModel) -> Section:
-    """The numbers with their meaning."""
-    return table_section("The valve", tabled((*MODEL_HEAD, "meaning"), valve_rows(model)))
+def _said(parts: Sequence[Part | str]) -> list[str]:
+    """What a screen of these parts says, line by line."""
+    lines = screen(*parts).text(verbose=True).splitlines()
+    return [one for one in lines if one.strip()]
 
 
-def valve_table(model: VelocityModel) -> Part:
-    """The numbers for a terminal."""
-    return tabled(MODEL_HEAD, [row[:4] for row in valve_rows(model)])
-
-
-def velocity_model_view(model: VelocityModel) -> View:
-    """The six numbers, what they predict, and remarks."""
-    return View(
-        f"Identification of {model.card}",
-        _summary(model),
-        [valve_table(model), _errors(model), notes(model.remarks, _logs(model))],
-        lambda: velocity_document(model),
-        {"model.json": lambda: velocity_document(model)},
-        lambda: [
-            valve_section(model),
-            lines_section("In words", [_errors(model), *model.remarks]),
-        ],
-    )
+def velocity_view(
+    found: VelocityModel | VelocityTraced | VelocityDesign | VelocityValidation,
+) -> View:
+    """A model, a trace, a design or a validation: its sentence, its numbers and its remarks."""
+    model = found.model if isinstance(found, VelocityTraced) else found
+    parts: list[Part | str]
+    files: dict[str, Callable[[], dict[str, Any]]]
+    match found:
+        case VelocityModel():
+            what, sentence, errors = "Identification of", _summary(found), _errors(found)
+            files = {"model.json": partial(velocity_document, found)}
+            parts = [_valve(found, with_meaning=False), errors,
+                     notes(found.remarks, logs_of(found))]  # fmt: skip
+            sections = [table_section("The valve", _valve(found, with_meaning=True)),
+                        lines_section("In words", [errors, *found.remarks])]  # fmt: skip
+        case VelocityTraced():
+            what, sentence = "Trace of", _verdict(found)
+            files = {"trace.json": partial(velocity_trace_document, found),
+                     "model.json": partial(velocity_document, found.model)}  # fmt: skip
+            valve = _valve(found.model, with_meaning=False)
+            remarks = notes(found.model.remarks, logs_of(found.model))
+            parts = [_rivals(found), valve, notes(_untried(found)), remarks]
+            sections = [table_section("The valve", _valve(found.model, with_meaning=True)),
+                        lines_section("In words", _said([sentence, *parts]))]  # fmt: skip
+        case VelocityDesign():
+            what, (sentence, *rest) = "Design for", design_lines(found)
+            files = {"design.json": partial(velocity_document, found)}
+            parts = [*rest, notes(found.remarks)]
+            sections = [lines_section("The controller", [*rest, *found.remarks])]
+        case VelocityValidation():
+            what, sentence, loops = "Validation for", _passed(found), _validation_table(found)
+            files = {"validation.json": partial(velocity_validation_document, found)}
+            parts, sections = [loops], [table_section("The loop", loops)]
+    content = next(iter(files.values()))
+    return View(f"{what} {model.card}", sentence, parts, content, files, lambda: sections)
 
 
 def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
@@ -136,33 +154,18 @@ def _verdict(found: VelocityTraced) -> str:
             return f"unknown: {over}, and no richer structure predicts it clearly better"
 
 
-def velocity_trace_view(found: VelocityTraced) -> View:
-    """The verdict, the rivals, and the numbers."""
+def _rivals(found: VelocityTraced) -> Part:
     rotary = found.model.rotary
     rows = [
         (one.key, length(one.left.rms[0], rotary), length(one.left.rms[1], rotary),
          number(one.p_value, 2), "yes" if one.better else "no")
         for one in found.left.rivals
     ]  # fmt: skip
-    untried = [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else []
-    view = View(
-        f"Trace of {found.model.card}",
-        _verdict(found),
-        [
-            tabled(RIVAL_ROWS, rows, (1, 2, 3)),
-            valve_table(found.model),
-            notes(untried),
-            notes(found.model.remarks, _logs(found.model)),
-        ],
-        lambda: velocity_trace_document(found),
-        {
-            "trace.json": lambda: velocity_trace_document(found),
-            "model.json": lambda: velocity_document(found.model),
-        },
-    )
-    words = view.screen().text(verbose=True).splitlines()
-    lines = lines_section("In words", [one for one in words if one.strip()])
-    return replace(view, sections=lambda: [valve_section(found.model), lines])
+    return tabled(RIVAL_ROWS, rows, (1, 2, 3))
+
+
+def _untried(found: VelocityTraced) -> list[str]:
+    return [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else []
 
 
 def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
@@ -221,19 +224,6 @@ def design_lines(found: VelocityDesign) -> list[str]:
     ]
 
 
-def velocity_design_view(found: VelocityDesign) -> View:
-    """The controller and its margins."""
-    first, *rest = design_lines(found)
-    return View(
-        f"Design for {found.card}",
-        first,
-        [*rest, notes(found.remarks)],
-        lambda: velocity_document(found),
-        {"design.json": lambda: velocity_document(found)},
-        lambda: [lines_section("The controller", [*rest, *found.remarks])],
-    )
-
-
 VALIDATED = ("plant", "standstill", "overshoot", "tracking", "modulus", "delay", "misses")
 
 
@@ -256,18 +246,6 @@ def _passed(found: VelocityValidation) -> str:
         return f"Passed: the loop meets every limit on {many} plants."
     failed = sum(bool(one.misses) for one in found.figures.values())
     return f"Not passed: on {failed} of {many} plants a limit is missed."
-
-
-def velocity_validation_view(found: VelocityValidation) -> View:
-    """Whether the loop keeps its limits, on each plant."""
-    return View(
-        f"Validation for {found.card}",
-        _passed(found),
-        [_validation_table(found)],
-        lambda: velocity_validation_document(found),
-        {"validation.json": lambda: velocity_validation_document(found)},
-        lambda: [table_section("The loop", _validation_table(found))],
-    )
 
 
 def after_velocity_validation(found: VelocityValidation, model_file: Path) -> Step | None:

@@ -20,11 +20,6 @@ if TYPE_CHECKING:
 OUT = "\0"  # in what to do next: the folder of the files, where they are written
 
 
-def no_sections() -> Sequence[Section]:
-    """Of a result that has no page."""
-    return ()
-
-
 @dataclass(frozen=True, eq=False)
 class View:
     """A result: what was found in a sentence, what to do next, and what stands below.
@@ -41,7 +36,7 @@ class View:
     parts: Sequence[Part | str]
     content: Callable[[], Mapping[str, Any]]
     files: Mapping[str, Callable[[], object]]
-    sections: Callable[[], Sequence[Section]] = no_sections
+    sections: Callable[[], Sequence[Section]] = tuple
     chart: Callable[[], Chart] | None = None
     then: Sequence[str] = ()
     then_by_command: bool = False
@@ -93,18 +88,14 @@ class View:
     def write(self, folder: OutputFolder, page_name: str = REPORT_FILE) -> None:
         """Write the files of the result."""
         for name, content in self.files.items():
-            folder.write_text(name, text_of(content()))
+            made = content()
+            folder.write_text(name, made if isinstance(made, str) else dumps(made) + "\n")
         if self.has_page:
             folder.write_text(page_name, self.page())
 
     def _then(self, folder: Path | None) -> list[str]:
         where = "" if folder is None else f"{folder}/"
         return [line.replace(OUT, where) for line in self.then]
-
-
-def text_of(content: object) -> str:
-    """A file's text; a document as JSON."""
-    return content if isinstance(content, str) else dumps(content) + "\n"
 
 
 def show(view: View, folder: Path, as_json: bool, then: Step | None = None, **more: object) -> None:

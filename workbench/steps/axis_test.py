@@ -146,7 +146,8 @@ def axis_test(
         estimates |= earlier.estimates
     travel = friction_along(found)
     estimates["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
-    allowed = {**_of_past(earlier), **_of_card(sources.card.limits)}
+    own = {name: Allowed(*ends, "card") for name, ends in sources.card.limits.items()}
+    allowed = {**_of_past(earlier), **own}
     allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
     runs = len(sources.runs)
     longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
@@ -225,10 +226,6 @@ def _deviation(travel: Travel) -> float | None:
         if np.count_nonzero(np.isfinite(one)) > 1
     ]
     return max(sizes, default=None)
-
-
-def _of_card(limits: Mapping[str, tuple[float, float]]) -> dict[str, Allowed]:
-    return {name: Allowed(low, high, "card") for name, (low, high) in limits.items()}
 
 
 def _of_past(earlier: Earlier | None) -> dict[str, Allowed]:

@@ -58,8 +58,8 @@ def unseen_lag(model: Model) -> float:
     """By how much the motion may follow what a law asks for, beyond what the model has, without a
     log to show it [s]: a part of its samples, and of a force that is logged without the command
     behind it what a drive takes to make one."""
-    told = model.lag is not None or "input_delay" in model.effects
-    sampled = 0.0 if told else LAG_FROM * model.period
+    delay_known = model.lag is not None or "input_delay" in model.effects
+    sampled = 0.0 if delay_known else LAG_FROM * model.period
     return sampled + (FORCE_LAG if model.simulated.actuator is None else 0.0)
 
 

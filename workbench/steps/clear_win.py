@@ -30,7 +30,7 @@ SLOW_STROKE = 0.25  # of the speed
 LONGEST_STROKE = 10.0  # s
 STROKE_DWELL = 0.3  # s
 SINE_PERIODS = 2.5
-LEAST_ERROR_RATIO = 1e-6  # that is told of an error
+LEAST_ERROR_RATIO = 1e-6  # that counts of an error
 CORNER_SHARE = 0.5  # of the time in which a stroke comes to its speed, that its jerk takes
 CONTEST_SEED = 50
 

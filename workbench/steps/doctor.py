@@ -83,10 +83,10 @@ class Delay:
 class Examined:
     """What a log shows before any fit.
 
-    told: what each parameter of the model can be known by, by name; add: runs that would identify
-    the rest; effects: by how many deviations of the noise each would show at a size that matters,
-    None where that was not asked; refused: why `identify` would not take the log, empty where it
-    would.
+    identifiability: what each parameter of the model can be known by, by name; add: runs that
+    would identify the rest; effects: by how many deviations of the noise each would show at a size
+    that matters, None where that was not asked; refused: why `identify` would not take the log,
+    empty where it would.
     log and motion: the first run, for the picture; None where the log is refused before.
     """
 
@@ -97,7 +97,7 @@ class Examined:
     bad: tuple[BadSamples, ...]
     delays: tuple[Delay, ...]
     ways: Ways | None
-    told: tuple[Identifiable, ...]
+    identifiability: tuple[Identifiable, ...]
     add: tuple[str, ...]
     refused: str
     remarks: tuple[str, ...]
@@ -111,7 +111,7 @@ class Examined:
     def main(self) -> tuple[Identifiable, ...]:
         """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
         of_valve = self.rig.kind == "velocity"
-        return tuple(one for one in self.told if of_valve or one.name in NAMES)
+        return tuple(one for one in self.identifiability if of_valve or one.name in NAMES)
 
     @property
     def verdict(self) -> str:
@@ -206,8 +206,8 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         bad=found.bad,
         delays=_delays(log, seen.motion, late) if log is not None and seen.motion else (),
         ways=seen.ways,
-        told=seen.told,
-        add=tuple(dict.fromkeys(one.add for one in seen.told if one.add)),
+        identifiability=seen.identifiability,
+        add=tuple(dict.fromkeys(one.add for one in seen.identifiability if one.add)),
         refused=found.refused or seen.reason,
         remarks=tuple(dict.fromkeys([*remarks, *seen.remarks])),
         command_unit=found.command_unit,
@@ -271,7 +271,7 @@ def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
             target, on = np.gradient(smooth["F"], log.h), "force"
             others = np.column_stack([motion.v, one])
         late, gain = command_lag(target, others, smooth["u"], longest)
-        late -= HALF_A_HOLD  # what is held over a period acts half of it later on the average
+        late -= HALF_A_HOLD  # what a zero-order hold gives acts half of it later on the average
         shown = late * log.h if gain > SURE_LAG and late > LEAST_LAG else None
         out.append(Delay("u", on, late_command if on == "motion" and late_command else shown))
     if "r" in log and np.ptp(log["r"]) > 0.0:
@@ -301,7 +301,7 @@ def doctor_document(found: Examined, card: str) -> dict[str, Any]:
         "motion": None if found.ways is None else asdict(found.ways),
         "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None,
                             "within": one.within, "only_if": one.only_if or None}
-                 for one in found.told},
+                 for one in found.identifiability},
         "effects": found.effects,
         "add": found.add,
         "remarks": found.remarks,

@@ -42,30 +42,26 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     third of what is assumed."""
     known = active_model(model, "")
     plant = in_loop(model)
-    told = rng.multivariate_normal(
+    drawn = rng.multivariate_normal(
         known.values, known.covariance, count, check_valid="ignore", method="svd"
     )
     lost = lost_bands(model)
     assumed = {**_assumed(model, known.untold), **lost}
     free = np.exp(UNIDENTIFIED_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
-    sets = np.hstack([told, free * np.array(list(assumed.values()))])
+    sets = np.hstack([drawn, free * np.array(list(assumed.values()))])
     last = {name: i for i, name in enumerate(names)}  # what is assumed replaces what was lost
-    kept = [i for name, i in last.items() if _is_of(plant, name)]
-    return tuple(plant_with(plant, [names[i] for i in kept], row[kept]) for row in sets)
+    effects = {one.key for one in plant.effects}
+    indices = [i for n, i in last.items() if "." not in n or n.split(".")[0] in effects]
+    return tuple(plant_with(plant, [names[i] for i in indices], row[indices]) for row in sets)
 
 
-def _is_of(plant: Plant, name: str) -> bool:
-    """Whether a parameter is of a plant: of its friction, actuator or of an effect that it has."""
-    return "." not in name or name.split(".")[0] in {one.key for one in plant.effects}
-
-
-def _assumed(model: Model, untold: Mapping[str, str]) -> dict[str, float]:
+def _assumed(model: Model, unidentified: Mapping[str, str]) -> dict[str, float]:
     """Values that simulations use of the friction and actuator parameters that no log
     identifies."""
     every = {**model.friction, **(model.actuator or {})}
     return {
         name: used(one)
         for name, one in every.items()
-        if name in untold and name != "k_a" and used(one) != 0.0
+        if name in unidentified and name != "k_a" and used(one) != 0.0
     }

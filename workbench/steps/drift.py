@@ -150,12 +150,12 @@ def drift_of(
 ) -> Drifted:  # fmt: skip
     """The runs tested one after the other against the model.
 
-    stream: of the same model, what was stored after earlier logs; one of another model is left
-    aside with a remark. Raises BadModel where model and card are not of one kind of machine.
+    stream: of the same model, what was stored after earlier logs; one of another model is not
+    used, with a remark. Raises BadModel where model and card are not of one kind of machine.
     """
     settings = settings or DriftSettings()
     _same_machine(model, sources)
-    in_force = replace(active_model(model, key), rig=sources.rig)
+    active = replace(active_model(model, key), rig=sources.rig)
     remarks = [*model.read, *sources.remarks]
     if sources.card.name != model.card:
         remarks.append(f"the model is of {model.card}, the logs of {sources.card.name}")
@@ -173,7 +173,7 @@ def drift_of(
     for source in sources.runs:
         # A log's own stream, so that its verdict does not hang on the others of the command.
         rng = np.random.default_rng([seed, int(source.sha256[:8], 16)])
-        found = drift_test(in_force, source.log, rng, state=state, settings=settings)
+        found = drift_test(active, source.log, rng, state=state, settings=settings)
         again = source.sha256 in before
         if again:
             remarks.append(f"{source.file}: taken in before; the state does not count it again")
@@ -255,7 +255,7 @@ def _of_run(one: Tested) -> dict[str, Any]:
 
 
 def detectable_sizes(test: DriftTest) -> dict[str, float | None]:
-    """Smallest change of each parameter that a test could have seen, None where it sees none."""
+    """Minimum detectable change of each parameter in a test, None where it detects none."""
     return {n: x if np.isfinite(x) else None for n, x in test.could_have_seen.items()}
 
 

@@ -23,7 +23,7 @@ NO_WORK = 0.03  # of the work that a force exchanges with a body, that it does o
 ALL_OF_PLACE = 0.97  # of a force, that place explains where it only bears a weight or a spring
 NO_FRICTION_IN_IT = 0.03  # of such a force's spread, that friction is at most
 ALL_FOLLOWED = 0.8  # of a command, that is the velocity
-KEPT_SPEED = 0.7  # of its speed at first, that a body which slows down keeps at most
+SPEED_LEFT = 0.7  # of its speed at first, that a body which slows down keeps at most
 GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a drive that is idle
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
@@ -119,7 +119,7 @@ def _said_of_one_way(up: float) -> str:
 def _said_of_coasting(found: _Moved) -> str:
     speed = np.abs(found.motion.v[found.sure])
     few = max(2, int(ENDS * len(speed)))
-    slower = speed[-few:].mean() < KEPT_SPEED * speed[:few].mean()
+    slower = speed[-few:].mean() < SPEED_LEFT * speed[:few].mean()
     how = "coasts" if slower else "coasts or is carried on at one speed"
     return (
         f"the body {how}: the {found.name} correlates with neither its speed nor its acceleration,"

@@ -37,7 +37,7 @@ class RunsIdentifiability:
 
     motion: Motion | None = None
     ways: Ways | None = None
-    told: tuple[Identifiable, ...] = ()
+    identifiability: tuple[Identifiable, ...] = ()
     reason: str = ""
     remarks: tuple[str, ...] = ()
     effects: Mapping[str, float] | None = None
@@ -61,8 +61,8 @@ def identifiability_of_runs(
         if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
             rig = replace(rig, force_per_command=1.0)
-        look = first_look(runs, rig, drive) if fit is None else FirstLook(fit)
-        around = look.fit.surroundings
+        first = first_look(runs, rig, drive) if fit is None else FirstLook(fit)
+        around = first.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
         m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
@@ -71,7 +71,7 @@ def identifiability_of_runs(
     events = [breakaways(one, m) for one in recorded.logs]
     rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
     ways = ways_of(recorded.logs, events, rests)
-    seen = identifiable_by_log(recorded, ways, look.fit, open_run=look.open)
+    seen = identifiable_by_log(recorded, ways, first.fit, open_run=first.open)
     shown = None
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
@@ -89,7 +89,7 @@ def _identifiability_of_valve(runs: Sequence[Log], rig: Rig, motion: Motion) -> 
     half = {n: NORMAL_95 * e.sd / abs(e.value) for n, e in found.items() if e.value and e.sd}
     return RunsIdentifiability(
         motion,
-        told=tuple(
+        identifiability=tuple(
             Identifiable(n, e.known, e.reason or "", within=half.get(n)) for n, e in found.items()
         ),
     )

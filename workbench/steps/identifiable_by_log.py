@@ -93,8 +93,8 @@ def _side(
         after = [b for _, b in own if b < len(one.log)]
         starts += int(np.sum(one.signals["d"][after] == sign)) if after else 0
     slow, fast = np.quantile(speed, [SLOW_SPEED, QUICK_SPEED]) if len(speed) else (0.0, 0.0)
-    told = sum(int(np.sum(one.direction == sign)) for one in events)
-    return Way(len(speed) * logs[0].log.h, float(slow), float(fast), starts, told)
+    breakaway_count = sum(int(np.sum(one.direction == sign)) for one in events)
+    return Way(len(speed) * logs[0].log.h, float(slow), float(fast), starts, breakaway_count)
 
 
 def _reversals(d: Array) -> int:
@@ -111,7 +111,7 @@ def identifiable_by_log(
     fit: the fit itself, or a first look at it; open_run: whether its run may be followed or not.
     """
     run = {} if fit.imposed else identifiability(recorded)
-    led = led_by_rig(recorded)
+    prescribed = led_by_rig(recorded)
     out = []
     for name in NAMES:
         found = fit.estimates.get(name)
@@ -122,9 +122,9 @@ def identifiable_by_log(
         elif open_run and name not in FIVE:
             out.append(_if_followed(name, recorded, ways, fit, found))
         elif found.value is not None:
-            out.append(_identifiable(name, found, fit, ways, run.get(name), led=led))
+            out.append(_identifiable(name, found, fit, ways, run.get(name), prescribed=prescribed))
         else:  # a path that a rig leads has no breakaways, however it is run
-            lacks = None if led else silent_reason(name, ways.events, recorded.name)
+            lacks = None if prescribed else silent_reason(name, ways.events, recorded.name)
             out.append(_not_identifiable(name, found, recorded.name, lacks))
     if fit.actuator is not None and "k1" in fit.estimates:
         for name in ("k1", "k2"):
@@ -142,12 +142,18 @@ def identifiable_by_log(
 
 
 def _identifiable(
-    name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None, *, led: bool
+    name: str,
+    found: Estimate,
+    fit: KarnoppFit,
+    ways: Ways,
+    run: Tellable | None,
+    *,
+    prescribed: bool,
 ) -> Identifiable:
     """By what a parameter is identified, and within what share of it."""
     half = _half(found)
     if fit.imposed:
-        which = "the force equation" if led else "the equation of motion alone"
+        which = "the force equation" if prescribed else "the equation of motion alone"
         return Identifiable(name, True, f"to {half:.1%} by {which}", within=half)
     within = run.within if run is not None and run.can else half
     why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"

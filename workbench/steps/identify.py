@@ -93,7 +93,7 @@ def identify(
     if fit.surroundings.none and all(value is None for value in friction):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
         raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
-    plant, reason = _arx_or_reason(logs, options)
+    plant, reason = arx_or_reason(logs, options)
     model = Model(
         card=card,
         rig=rig,
@@ -106,7 +106,10 @@ def identify(
             _force_error([fit.surroundings.taken_out(log) for log in logs], fit, rig),
             closed_loop_remarks(logs),
         ),
-        log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
+        log=tuple(
+            log_entry(source, one.start, one.position_rms, one.force_rms, one.chi_square)
+            for source, one in zip(sources, fit.logs, strict=True)
+        ),
         versions=versions(),
         correlation=_correlation(fit),
         effects=surrounding_effects(fit.surroundings, rig),
@@ -171,10 +174,10 @@ def speed_of(log: Log) -> float:
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit held have their assumed value."""
     units = friction_units(rig.motion)
-    held = "fixed at a value that does not matter for these logs"
+    unseen = "fixed at a value that does not matter for these logs"
     return {
         name: fit.estimates.get(name)
-        or Estimate(None, units[name], reason=held, assumed=getattr(fit.friction, name))
+        or Estimate(None, units[name], reason=unseen, assumed=getattr(fit.friction, name))
         for name in NAMES
     }
 
@@ -197,20 +200,24 @@ def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
             return None
 
 
-def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
-    found, log = fit.logs[index], source.log
+def log_entry(
+    source: Source, start: tuple[float, float, float], position_rms: float | None,
+    force_rms: float | None, chi_square: float,
+) -> LogEntry:  # fmt: skip
+    """A run as a model has it; the rest as `LogEntry` has it."""
+    log = source.log
     return LogEntry(
         file=source.file,
         sha256=source.sha256,
         rows=source.rows,
-        start=found.start,
+        start=start,
         travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
         force_peak=float(np.max(np.abs(log["F"]))),
         duration=log.duration,
         h=log.h,
-        position_rms=found.position_rms if np.isfinite(found.position_rms) else None,
-        force_rms=found.force_rms,
-        chi_square=found.chi_square,
+        position_rms=position_rms if np.isfinite(position_rms or 0.0) else None,
+        force_rms=force_rms,
+        chi_square=chi_square,
         speed=speed_of(log),
         period=source.period,
     )
@@ -246,8 +253,11 @@ def closed_loop_remarks(logs: Sequence[Log]) -> list[str]:
     return out
 
 
-def _arx_or_reason(logs: Sequence[Log], options: Options) -> tuple[ArxPlant | None, str | None]:
+def arx_or_reason(
+    logs: Sequence[Log], options: Options | None = None
+) -> tuple[ArxPlant | None, str | None]:
     """The ARX plant; or None and why not, where it was not asked for by orders."""
+    options = options or Options()
     try:
         return arx_plant(logs, options.orders, options.design_period), None
     except (NotIdentifiable, BadLog, BadModel) as error:
@@ -268,14 +278,14 @@ def arx_plant(
     h, steps = common_period(logs, period)
     runs = [decimated(log[key], log["y"], n) for log, n in zip(logs, steps, strict=True)]
     ends = [round(SPLIT * len(y)) for _, y in runs]
-    held = [(u[n:], y[n:]) for (u, y), n in zip(runs, ends, strict=True)]
+    unseen = [(u[n:], y[n:]) for (u, y), n in zip(runs, ends, strict=True)]
     if orders is None:
         choice = select_arx(runs, None, h, orders=ORDERS, split=SPLIT, offset=True)
         orders = (choice.model.na, choice.model.nb, choice.model.nk)
     fitted = [(u[:n], y[:n]) for (u, y), n in zip(runs, ends, strict=True)]
     trial = fit_arx(fitted, *orders, h, offset=True)
-    one_step, simulated = _held_out(trial, held)
-    spread = float(np.std(np.concatenate([y for _, y in held])))
+    one_step, simulated = _held_out(trial, unseen)
+    spread = float(np.std(np.concatenate([y for _, y in unseen])))
     model = fit_arx(runs, *orders, h, offset=True)
     return ArxPlant(
         na=model.na,
@@ -295,11 +305,11 @@ def arx_plant(
     )
 
 
-def _held_out(model: ArxModel, held: Sequence[tuple[Array, Array]]) -> tuple[float, float | None]:
+def _held_out(model: ArxModel, unseen: Sequence[tuple[Array, Array]]) -> tuple[float, float | None]:
     """One-step and free-run errors on runs that the fit has not seen; None: the run diverges."""
-    steps = np.concatenate([one_step_errors(model, u, y) for u, y in held])
+    steps = np.concatenate([one_step_errors(model, u, y) for u, y in unseen])
     with np.errstate(over="ignore", invalid="ignore"):
-        runs = np.concatenate([simulation_errors(model, u, y) for u, y in held])
+        runs = np.concatenate([simulation_errors(model, u, y) for u, y in unseen])
         free = float(np.sqrt(np.mean(runs**2)))
     return float(np.sqrt(np.mean(steps**2))), free if free < RUNAWAY else None
 

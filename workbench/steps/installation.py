@@ -68,7 +68,8 @@ def _cache(wrong: list[str]) -> dict[str, object]:
         if path.suffix in CACHE_SUFFIXES
     ]  # fmt: skip
     size = sum(path.stat().st_size for path in found)
-    writable = all(os.access(_nearest_there(place), os.W_OK) for place in places)
+    there = [next(p for p in (one, *one.parents) if p.exists()) for one in places]
+    writable = all(os.access(place, os.W_OK) for place in there)
     if not writable:
         wrong.append(
             f"compiled kernels cannot be cached in {', '.join(map(str, places))}: every command"
@@ -77,10 +78,6 @@ def _cache(wrong: list[str]) -> dict[str, object]:
         )
     return {"places": [str(place) for place in places], "kernels": sum(p.suffix == ".nbc"
             for p in found), "bytes": size, "writable": writable}  # fmt: skip
-
-
-def _nearest_there(path: Path) -> Path:
-    return next(place for place in (path, *path.parents) if place.exists())
 
 
 def _data(wrong: list[str]) -> dict[str, object]:

@@ -30,9 +30,9 @@ RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest
 BodyForce = Callable[[Array, Array, float], Array]
 
 
-def plain_recording(log: Log, held: bool) -> Recording:
+def plain_recording(log: Log, zero_order_hold: bool) -> Recording:
     """The log as it stands, its force with all friction in it."""
-    return Recording(log.h, log["y"], log["F"], log["F"], log.signals.get("r"), held)
+    return Recording(log.h, log["y"], log["F"], log["F"], log.signals.get("r"), zero_order_hold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Freed:
     slides: BoolArray
     left: Array
 
-    def held_by(self, body: BodyForce) -> Recording:
+    def without_friction(self, body: BodyForce) -> Recording:
         """The log with its force without friction: where the body rests or is slow friction is
         whatever holds it, and the force is what the motion needs of a linear body."""
         resting = body(self.v, self.a, self.plain.h)
@@ -70,17 +70,17 @@ def freed(log: Log, model: Model) -> Freed:
     """
     plant = replace(model.simulated, effects=tuple(_nonlinear(model)))
     refuse_missing(log, plant.effects)
-    held = model.rig.kind == "motor"
+    zero_order_hold = model.rig.kind == "motor"
     moved = of_body(with_motor_force(log, plant), plant)
     motion, late = differentiate(moved["y"], log.h), dead_time(model)
     d = _direction(motion, plant)
     opposed, slides = opposing_force(moved, plant, motion, d), d != 0
-    if held:
+    if zero_order_hold:
         opposed, slides = _over_period(opposed), slides & _following(slides)
     y, F = np.asarray(moved["y"]), np.asarray(moved["F"])
-    plain = replace(plain_recording(log, held), y=y, F=F)
+    plain = replace(plain_recording(log, zero_order_hold), y=y, F=F)
     # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
-    a = _acceleration(motion.v, log.h, held)
+    a = _acceleration(motion.v, log.h, zero_order_hold)
     return Freed(plain, motion.v, a, slides, F - _earlier(opposed, late, log))
 
 
@@ -142,9 +142,9 @@ def _direction(motion: Motion, plant: Plant) -> Array:
     return np.where(motion.v > up, 1.0, np.where(motion.v < down, -1.0, 0.0))
 
 
-def _acceleration(v: Array, h: float, held: bool) -> Array:
+def _acceleration(v: Array, h: float, zero_order_hold: bool) -> Array:
     """Acceleration at every sample, or its mean over the period that follows, (n,)."""
-    if not held:
+    if not zero_order_hold:
         return np.asarray(np.gradient(v, h))
     return np.diff(v, append=v[-1]) / h
 

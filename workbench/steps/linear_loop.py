@@ -89,8 +89,8 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
     body = "sliding body" if model.resonance is None else "two masses, the first sliding"
     inside = "with the force as its input"
     if force:
-        told = all(e.known for e in (model.actuator or {}).values())
-        actuator = "the actuator" if told else "an actuator of assumed k1 and k2"
+        identified = all(e.known for e in (model.actuator or {}).values())
+        actuator = "the actuator" if identified else "an actuator of assumed k1 and k2"
         inside = f"with {actuator} and its force loop"
     return f"{known}: {body}, {inside}, sampled exactly"
 
@@ -206,7 +206,7 @@ def _viscous(model: Model) -> Estimate:
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
     found = model.plant
     why_not = model.friction["m"].reason or "mass identified"
-    if model.imposed:
+    if model.prescribed_motion:
         raise NotIdentifiable(
             "no plant to design on: the logged motion was prescribed; log a run in which the drive"
             " moves the body freely"

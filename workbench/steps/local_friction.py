@@ -111,7 +111,7 @@ def levels_over(model: Model, over: Over) -> Callable[[Array], Array]:
 
 def change_over(model: Model, over: Over) -> float:
     """By which share the mean Coulomb friction changes over its range; of the direction viscous
-    friction, by which the linear plant differs, and no more than its errors tell."""
+    friction, by which the linear plant differs, and no more than its errors allow."""
     if over == "direction":
         return _apart(model.friction["F_vp"], model.friction["F_vn"])
     low, high = range_over(model, over)

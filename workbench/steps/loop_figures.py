@@ -285,11 +285,6 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> tuple[str, .
     return (*missed, *_too_much(result, limits, machine.rotary))
 
 
-def _in_force(one: LoopFigures, unit: str) -> str:
-    """What the limit of a motor's command is as a force."""
-    return "" if one.force_limit is None else f", {one.force_limit:.3g} {unit}"
-
-
 def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str]:
     """Force beyond what the logs have shown, command at its limit, in words."""
     units, seen = shown(rotary), result.force_seen
@@ -300,7 +295,9 @@ def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str
         )
     limit, peak = result.command_limit, result.command_peak
     if limit is not None and peak is not None and not (peak < limit):
+        most = result.force_limit
+        force = "" if most is None else f", {most:.3g} {units.force}"
         yield (
-            f"the command reaches its limit of {limit:g} {result.command_unit}"
-            f"{_in_force(result, units.force)}, for {100 * result.limited:.2g} % of the time"
+            f"the command reaches its limit of {limit:g} {result.command_unit}{force},"
+            f" for {100 * result.limited:.2g} % of the time"
         )

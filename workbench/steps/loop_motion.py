@@ -99,7 +99,7 @@ def loop_motion(
         step=step,
         amplitude=amplitude,
         standstill=float(np.max(np.abs(steps.r - steps.y)[judged])) if stable else np.inf,
-        overshoot=_overshoot(steps),
+        overshoot=max(float(np.max(error / height)) for height, error in _after_steps(steps)),
         settling=_settling(steps),
         step_rms=float(np.sqrt(np.mean((steps.r - steps.y) ** 2))),
         smooth_rms=float(np.sqrt(np.mean((smooth.r - smooth.y) ** 2))),
@@ -142,11 +142,6 @@ def _after_steps(trace: LoopRun) -> list[tuple[float, Array]]:
         (float(trace.r[low] - trace.r[low - 1]), trace.y[low:high] - trace.r[low:high])
         for low, high in _dwells(trace)[1:]
     ]
-
-
-def _overshoot(trace: LoopRun) -> float:
-    """Largest overshoot of a step, relative to its height."""
-    return max(float(np.max(error / height)) for height, error in _after_steps(trace))
 
 
 def _settling(trace: LoopRun) -> float:

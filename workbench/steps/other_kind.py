@@ -21,18 +21,20 @@ COMPARED_EVERY = 0.01  # s, which is enough to decide a kind by and takes a seco
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
 
 
-def looks_like_friction(record: Record, valve: Valve, held: HeldOut, rig: Rig) -> tuple[str, ...]:
+def looks_like_friction(
+    record: Record, valve: Valve, test_errors: HeldOut, rig: Rig
+) -> tuple[str, ...]:
     """A line where a body that the command accelerates against friction predicts held-out windows
     clearly better than the valve."""
     if sum(len(run.y) for run in record.runs) > MOST_COMPARED:
         return ()
     body = body_squares(record, valve)
-    if not clearly_better(body, held.long)[0]:
+    if not clearly_better(body, test_errors.long)[0]:
         return ()
     return (
         'the log looks like kind = "motor": a body that the command accelerates against friction'
         f" predicts 2 s of held-out position within {_rms(body, rig)}, the valve within"
-        f" {_rms(held.long, rig)} rms",
+        f" {_rms(test_errors.long, rig)} rms",
     )
 
 
@@ -54,18 +56,19 @@ def looks_like_velocity(
         valve_estimates(record, found, units(rig.motion, "1"))
     except UserError:
         return ()
-    held = held_out(record, found.valve, found.free, None)
+    test_errors = held_out(record, found.valve, found.free, None)
     friction = [] if model is None else _left_by_friction(model, logs, record)
-    if friction and not clearly_better(held.long, friction[0])[0]:
+    if friction and not clearly_better(test_errors.long, friction[0])[0]:
         return ()
     friction.append(body_squares(record, found.valve))  # last, as it takes longest
-    if not clearly_better(held.long, friction[-1])[0]:
+    if not clearly_better(test_errors.long, friction[-1])[0]:
         return ()
     best = min(friction, key=np.mean)
     return (
         'the log looks like kind = "velocity": the velocity follows the command (dead zone, gain,'
-        f" delay, lag), which predicts 2 s of held-out position within {_rms(held.long, rig)},"
-        f" friction within {_rms(best, rig)} rms; set it under [rig] of the card",
+        " delay, lag), which predicts 2 s of held-out position within"
+        f" {_rms(test_errors.long, rig)}, friction within {_rms(best, rig)} rms; set it under [rig]"
+        " of the card",
     )
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
-FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
+FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by the measured force
 PREDICTION_COLUMNS = (
     "t",
     "force_applied",
@@ -183,13 +183,13 @@ def why_no_run(model: Model, drive: Drive) -> str | None:
     needed = {name: model.friction[name] for name in RUN_NEEDS}
     if drive == "command":
         needed |= model.actuator or {}
-    untold = {name: one for name, one in needed.items() if not one.known}
-    if not untold:
+    unidentified = {name: one for name, one in needed.items() if not one.known}
+    if not unidentified:
         return None
-    name, first = next(iter(untold.items()))
+    name, first = next(iter(unidentified.items()))
     by = "the command" if drive == "command" else "the force"
     return (
-        f"no free run: {', '.join(untold)} not identified, which a run by {by} needs"
+        f"no free run: {', '.join(unidentified)} not identified, which a run by {by} needs"
         f" ({name}: {first.reason})"
     )
 

@@ -102,7 +102,7 @@ def of_body(log: Log, plant: Plant) -> Log:
 
 
 def with_applied_force(log: Log, rig: Rig) -> Log:
-    """The log with F, by the rig where it is not logged; raises BadLog where that does not tell."""
+    """The log with F, by the rig where it is not logged; raises BadLog where that gives none."""
     if "F" in log:
         return log
     force = applied_force(log, rig)

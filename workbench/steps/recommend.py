@@ -38,30 +38,33 @@ def recommended(model: Model, found: Design) -> Recommendation:
     present controller is to be kept where it is as good, or where the one that is taken does not
     clearly win over it on the machines that the model's errors allow.
     """
-    kept = [
+    candidates = [
         name
         for name in DESIGNED_STRUCTURES
         if (one := found.controllers.get(name)) and not one.missed
     ]
-    if not kept:
+    if not candidates:
         said = "; ".join(
             f"{n.upper()}: {', '.join(c.missed)}" for n, c in found.controllers.items()
         )
         return Recommendation("none", False, f"none meets every goal ({said})")
     figures = compared(model, found)
-    alone = _best(kept, figures)
+    alone = _best(candidates, figures)
     both = (alone, alone + COMPENSATED)
     beside = figures.get(both[1])
     usable = beside is not None and beside.passed and beside.limit_cycle is None
     better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
     said = reasons(alone, better, figures, shown(model.rotary))
     taken = both[1] if better else alone
-    keep = _present_as_good(taken, figures)
-    kept_said = "; the present controller is as good, keep it" if keep else ""
-    if not keep and (unclear := _no_clear_win(model, found, alone, better)):
-        keep, kept_said = True, f"; {unclear}: no clear win over the present controller, keep it"
-    why = f"{said}: {_decisive(alone, found, figures)}{kept_said}"
-    return Recommendation(alone, better, why, keep)
+    stays = _present_as_good(taken, figures)
+    present_said = "; the present controller is as good, keep it" if stays else ""
+    if not stays and (unclear := _no_clear_win(model, found, alone, better)):
+        stays, present_said = (
+            True,
+            f"; {unclear}: no clear win over the present controller, keep it",
+        )
+    why = f"{said}: {_decisive(alone, found, figures)}{present_said}"
+    return Recommendation(alone, better, why, stays)
 
 
 def _no_clear_win(model: Model, found: Design, name: Structure, compensated: bool) -> str:
@@ -105,13 +108,12 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
     one = figures[taken]
     said = (
         f"{_called(taken)}: static error {_rest(one, units)} of the step, settling"
-        f" time {settled(one)}, tracking error {percent(one.smooth_relative)} on the smooth"
-        " reference,"
-        f" peak force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
+        f" time {settling_words(one)}, tracking error {percent(one.smooth_relative)} on the smooth"
+        f" reference, peak force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
     )
     beside = [
-        f"{_called(other)}: {_rest(it, units)}, {settled(it)}, {percent(it.smooth_relative)},"
-        f" {it.force_peak:.3g} {units.force}, {_modulus(it):.2f}"
+        f"{_called(other)}: {_rest(it, units)}, {settling_words(it)},"
+        f" {percent(it.smooth_relative)}, {it.force_peak:.3g} {units.force}, {_modulus(it):.2f}"
         for other, it in ((other, figures[other]) for other in others)
     ]
     return f"{said} ({'; '.join(beside)})" if beside else said
@@ -131,18 +133,18 @@ def other_figures(why: str) -> str:
     return f"the others, in the same order: {found[1]}" if found else ""
 
 
-def settled(one: LoopFigures) -> str:
+def settling_words(one: LoopFigures) -> str:
     """The settling time in words; never, where a step is still off by the band in the end."""
     if not one.stable or one.standstill_relative > SETTLING_BAND:
         return "never"
     return f"{one.settling:.2g} s"
 
 
-def _best(kept: Sequence[Structure], figures: Mapping[str, LoopFigures]) -> Structure:
+def _best(candidates: Sequence[Structure], figures: Mapping[str, LoopFigures]) -> Structure:
     """The best of the controllers alone."""
-    passing = [n for n in kept if figures[n].passed]
+    passing = [n for n in candidates if figures[n].passed]
     calm = [n for n in passing if figures[n].limit_cycle is None]
-    pool = calm or passing or list(kept)
+    pool = calm or passing or list(candidates)
     costs = {n: _cost(n, pool, figures) for n in pool}
     first = min(pool, key=lambda n: costs[n])
     equal = [n for n in pool if costs[n] - costs[first] < EQUAL]

@@ -133,24 +133,24 @@ def identified_or_not(
 
 
 def _measured(
-    logs: Sequence[Log], held: bool, model: Model | None, lowest: float | None
+    logs: Sequence[Log], zero_order_hold: bool, model: Model | None, lowest: float | None
 ) -> tuple[MachineResponses, Modes | None]:
     """The responses and their modes; a body at rest is held by what its own modes make of it."""
     if model is None:
-        found = machine_responses([plain_recording(log, held) for log in logs], lowest)
+        found = machine_responses([plain_recording(log, zero_order_hold) for log in logs], lowest)
         return found, fit_modes(found.body)
     every = [freed(log, model) for log in logs]
-    runs = [one.held_by(of_model(model)) for one in every]
+    runs = [one.without_friction(of_model(model)) for one in every]
     if model.resonance is None:
         load = swinging_load(runs, [one.rests for one in every], model.karnopp.m)
-        runs = [one.held_by(of_load(model, load)) for one in every]
+        runs = [one.without_friction(of_load(model, load)) for one in every]
     for _ in range(PASSES_AT_REST):
         body = body_by_force(runs, lowest)
         modes = fit_modes(body)
         if modes is None:
             break
         rests = of_modes(modes, float(body.f[body.seen][-1]))
-        runs = [one.held_by(rests) for one in every]
+        runs = [one.without_friction(rests) for one in every]
     found = machine_responses(runs, lowest)
     return found, fit_modes(found.body)
 

@@ -46,10 +46,10 @@ def scheduled(
     """
     if change_over(model, over) <= CHANGES_FROM:
         also = asked_for(model)
-        told = f"; it changes with {' and '.join(also)}" if also else ""
+        also_said = f"; it changes with {' and '.join(also)}" if also else ""
         raise BadModel(
             f"no schedule over {over}: no effect of the model changes its friction with it by"
-            f" {100 * CHANGES_FROM:g} %; leave the fixed controller{told}"
+            f" {100 * CHANGES_FROM:g} %; leave the fixed controller{also_said}"
         )
     at = _points(model, over)
     names = [n for n in SCHEDULED_STRUCTURES if n in found.controllers]

@@ -34,7 +34,7 @@ from workbench.steps.closed_loop import DrivenLoop, servo_run
 from workbench.steps.present import present
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
-SETTLED_CHANGE = 1e-9  # relative change of the force from which it has settled
+CONVERGED_CHANGE = 1e-9  # relative change of the force from which it has settled
 Chambers = dict[str, OfForce]
 
 
@@ -144,7 +144,7 @@ def _open_run(recipe: Recipe, u: Array, chambers: Chambers) -> FreeRun:
         known = blank.with_signals(**{name: of(force) for name, of in chambers.items()})
         run = free_run(recipe.plant, known, start, "command")
         change = float(np.max(np.abs(run.F - force)))
-        if not circular or change <= SETTLED_CHANGE * float(np.max(np.abs(run.F))):
+        if not circular or change <= CONVERGED_CHANGE * float(np.max(np.abs(run.F))):
             return run
         force = run.F
     raise BadModel(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.effects._library import Library
-from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.errors import BadLog
 from identification.estimation.surroundings import lag_estimate
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -19,13 +19,18 @@ from identification.tracing.result import Errors, FoundEffect, FreeCurve, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
-from workbench.documents.model import ArxPlant, FitSummary, LogEntry, Model
+from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
 from workbench.documents.versions import versions
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
-from workbench.steps.identify import arx_plant, resonance_of, speed_of, surrounding_effects
+from workbench.steps.identify import (
+    arx_or_reason,
+    log_entry,
+    resonance_of,
+    surrounding_effects,
+)
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines
 
@@ -106,8 +111,8 @@ def trace_sources(
 
 def _held_out(train: Sources) -> list[str]:
     """A line for each training log that the card's split holds out."""
-    kept = train.card.split.get("test", ())
-    names = dict.fromkeys(source.file for source in train.runs if source.file in kept)
+    held_out = train.card.split.get("test", ())
+    names = dict.fromkeys(source.file for source in train.runs if source.file in held_out)
     return [f"{name}: trained on, though the card's [split] keeps it for tests" for name in names]
 
 
@@ -119,7 +124,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
         unit = actuator_units(rig.motion, rig.command_unit)["k_a"]
         actuator = {"k_a": Estimate(rig.force_per_command, unit, reason="given by the card")}
     errors = found.after["train"]
-    plant, reason = _arx(sources)
+    plant, reason = arx_or_reason([source.log for source in sources.runs])
     chi = _chi_square(errors, found)
     return Model(
         card=sources.card.name,
@@ -160,30 +165,9 @@ def _chi_square(errors: Errors, found: Trace) -> float:
     return (errors.force_rms / found.noise_force) ** 2
 
 
-def _arx(sources: Sources) -> tuple[ArxPlant | None, str | None]:
-    try:
-        return arx_plant([source.log for source in sources.runs]), None
-    except (NotIdentifiable, BadLog, BadModel) as error:
-        return None, str(error)
-
-
 def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
-    log = source.log
-    return LogEntry(
-        file=source.file,
-        sha256=source.sha256,
-        rows=source.rows,
-        start=(float(log["y"][0]), 0.0, float(log["F"][0])),
-        travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
-        force_peak=float(np.max(np.abs(log["F"]))),
-        duration=log.duration,
-        h=log.h,
-        position_rms=errors.position_rms,
-        force_rms=None,
-        chi_square=chi,
-        speed=speed_of(log),
-        period=source.period,
-    )
+    start = (float(source.log["y"][0]), 0.0, float(source.log["F"][0]))
+    return log_entry(source, start, errors.position_rms, None, chi)
 
 
 def effect_estimates(found: FoundEffect, rig: Rig) -> dict[str, Estimate]:

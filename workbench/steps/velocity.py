@@ -49,9 +49,11 @@ def identify_velocity(sources: Sources, *, keep_going: KeepGoing = without_end) 
     record = recorded(logs_of_runs(sources))
     found = fit(record, keep_going=keep_going)
     numbers = valve_estimates(record, found, _units(sources))
-    held = held_out(record, found.valve, found.free, None)
-    other = looks_like_friction(record, found.valve, held, sources.rig) if keep_going() else ()
-    return _model(sources, numbers, held, record.noise, other)
+    test_errors = held_out(record, found.valve, found.free, None)
+    other = (
+        looks_like_friction(record, found.valve, test_errors, sources.rig) if keep_going() else ()
+    )
+    return _model(sources, numbers, test_errors, record.noise, other)
 
 
 def trace_velocity(
@@ -82,15 +84,15 @@ def _units(sources: Sources) -> Mapping[str, str]:
 
 
 def _model(
-    sources: Sources, numbers: Mapping[str, Estimate], held: HeldOut, noise: float,
+    sources: Sources, numbers: Mapping[str, Estimate], test_errors: HeldOut, noise: float,
     remarks: Sequence[str],
 ) -> VelocityModel:  # fmt: skip
-    long, short = held.rms
+    long, short = test_errors.rms
     return VelocityModel(
         card=sources.card.name,
         rig=sources.rig,
         valve=numbers,
-        fit=PredictionErrors(long, short, len(held.long), noise),
+        fit=PredictionErrors(long, short, len(test_errors.long), noise),
         log=tuple(_entry(source) for source in sources.runs),
         remarks=(*remarks, *sources.remarks),
         versions=versions(),
@@ -141,8 +143,8 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _errors(held: HeldOut) -> dict[str, float]:
-    long, short = held.rms
+def _errors(test_errors: HeldOut) -> dict[str, float]:
+    long, short = test_errors.rms
     return {"position_rms_2s": long, "position_rms_02s": short}
 
 

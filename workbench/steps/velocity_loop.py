@@ -27,7 +27,7 @@ from workbench.steps.loop_figures import Limits
 
 SMOOTHED = 3.0  # deviations of the position's noise, within which no offset is given in full
 STEP_OF_TRAVEL = 0.25
-SETTLED = 15.0  # time constants of the loop, that a step is given
+STEP_LENGTH = 15.0  # time constants of the loop, that a step is given
 SHORTEST_STEP = 4.0  # s
 SMOOTH_OF_SPEED = 0.5  # of the fastest speed, that the smooth reference reaches
 SMOOTH_OF_LOOP = 0.1  # of k_p, that it turns with at most
@@ -224,7 +224,7 @@ def _missed(
 
 def _stairs(law: ValveController, step: float) -> tuple[Array, int]:
     """Steps up, down and back [m], and the samples of each."""
-    dwell = max(SHORTEST_STEP, 2.0 * step / law.fastest + SETTLED / law.k_p)
+    dwell = max(SHORTEST_STEP, 2.0 * step / law.fastest + STEP_LENGTH / law.k_p)
     count = round(dwell / law.h)
     return np.concatenate([[0.0], np.repeat([step, 0.0, -step, 0.0], count)]), count
 

@@ -170,7 +170,7 @@ def test_a_machine_in_anothers_hands_is_left(
     queue.release(claim)
     again = run(cluster, tmp_path, recorder=recorder, logs=LOGS[:3])
     assert (again.before, again.later) == (3, 0)  # its result was noted, and is recorded now
-    assert registry.in_force("m1") is not None
+    assert registry.active_version("m1") is not None
     assert len(verdicts(tmp_path)) == 3
 
 

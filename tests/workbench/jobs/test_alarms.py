@@ -16,8 +16,8 @@ from tests.workbench.jobs.listener import Listener
 from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from workbench.jobs.alarms import (
+    GIVEN_UP_AFTER,
     IN_A_ROW,
-    KEPT_FOR,
     BadWebhook,
     Delivery,
     Unreachable,
@@ -107,7 +107,7 @@ def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: L
     assert [event for event, _ in told] == ["webhook_failed"]
     assert "Connection refused" in told[0][1]["reason"]
     assert send(judged, webhook(listener)).sent == 2
-    assert send(judged, webhook(listener), later=2 * KEPT_FOR) == Delivery()
+    assert send(judged, webhook(listener), later=2 * GIVEN_UP_AFTER) == Delivery()
 
 
 @pytest.mark.slow
@@ -132,7 +132,7 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
     listener.by_machine = {"m3": 400}
     told, passed = Told(), timedelta(0)
     tries: list[timedelta] = []
-    while passed < KEPT_FOR + 10 * MINUTE:
+    while passed < GIVEN_UP_AFTER + 10 * MINUTE:
         before = told.events().count("alarm_refused")
         send(fleet, webhook(listener), later=passed, report=told)
         if told.events().count("alarm_refused") > before:
@@ -150,7 +150,7 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
 def test_results_from_before_there_was_a_webhook_are_not_given_up(
     fleet: Registry, listener: Listener
 ) -> None:
-    assert send(fleet, webhook(listener), later=2 * KEPT_FOR) == Delivery()
+    assert send(fleet, webhook(listener), later=2 * GIVEN_UP_AFTER) == Delivery()
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
     assert tried == [f"m{i}" for i in range(3 * IN_A_ROW)]
     assert told.events() == ["webhook_failed"] * 3
     assert [said["waiting"] for _, said in told] == [10] * 3
-    assert send(fleet, dead(), later=KEPT_FOR + MINUTE, report=told).given_up == 10
+    assert send(fleet, dead(), later=GIVEN_UP_AFTER + MINUTE, report=told).given_up == 10
 
 
 @pytest.mark.slow
@@ -268,7 +268,7 @@ def test_the_address_is_never_shown(
     told = Told()
     with caplog.at_level(logging.INFO):
         found = send(judged, to, report=told)
-        send(judged, to, later=KEPT_FOR + MINUTE, report=told)
+        send(judged, to, later=GIVEN_UP_AFTER + MINUTE, report=told)
     assert found.sent == (2 if status == 200 else 0)
     shown = repr((told, to, found)) + caplog.text
     assert "geheim" not in shown and "services" not in shown
@@ -293,7 +293,7 @@ def test_an_address_that_is_none(url: str) -> None:
 def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Path) -> None:
     listener.by_machine = {"m0": 500}
     outbox, now = Outbox(fleet.database), datetime.now(UTC)
-    outbox.fill(ALARMING, since=now - KEPT_FOR - MINUTE, now=now)
+    outbox.fill(ALARMING, since=now - GIVEN_UP_AFTER - MINUTE, now=now)
     (given_up, *_) = (a for a in outbox.due(now) if a.machine == "m1")
     assert outbox.give_up(before=given_up.at + timedelta(microseconds=1), now=now)
     send(fleet, webhook(listener))

@@ -264,7 +264,7 @@ def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, r
     (outcome,) = run(judging).outcomes
     assert (outcome.verdict, seen) == ("refused", [None])
     assert "not made active: log0.csv is older than log5.csv" in outcome.reason
-    current = registry.in_force("a")
+    current = registry.active_version("a")
     assert current is not None and current.number == 2
     machine(root, "a", {"log6.csv": "drift 6"})
     assert verdicts(run()) == {"log6.csv": "promoted"}
@@ -325,7 +325,7 @@ def test_a_machine_without_a_model_waits(run: Run, registry: Registry, root: Pat
     assert (done.without_model, done.outcomes) == (("a",), ())
     (outcome,) = run(first=True).outcomes
     assert (outcome.verdict, outcome.number) == ("promoted", None)
-    assert registry.in_force("a") is not None
+    assert registry.active_version("a") is not None
 
 
 @pytest.mark.slow

@@ -25,8 +25,8 @@ class Here(Helpers):
     async def _keep_warm(self) -> None:
         pass
 
-    def __call__(self, look: Callable[..., Any], *arguments: Any) -> Any:
-        return look(*arguments)
+    def __call__(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        return work(*arguments)
 
     slowly = __call__
 

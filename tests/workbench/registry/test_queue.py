@@ -202,7 +202,7 @@ def test_what_was_promoted_counts_after_a_rollback_too(queue: Queue, registry: R
     queue.finish(claim, NEWER, DRIFT, by="w", now=NOW)
     registry.rollback("m", reason="it hunts", by="t", now=NOW)
     assert queue.finish(claim, LATE, DRIFT, by="w", now=NOW).verdict == "refused"
-    current = registry.in_force("m")
+    current = registry.active_version("m")
     assert current is not None and current.number == 1
 
 

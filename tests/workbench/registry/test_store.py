@@ -32,7 +32,7 @@ def test_a_version_is_what_was_added(registry: Registry) -> None:
     assert registry.document(version, "model") == {"m": 2.0}
     assert registry.document(version, "design") == {"k": 2.0}
     assert registry.document(version, "validation") == {"passed": True}
-    assert registry.in_force("a") is None
+    assert registry.active_version("a") is None
     (decision,) = registry.decisions("a")
     assert (decision.kind, decision.number, decision.reason) == ("added", 1, "a test")
 

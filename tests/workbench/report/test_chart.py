@@ -41,12 +41,12 @@ def example(n: int = 1000) -> Chart:
     v = np.array([3.0, -2.0, 3.0, 3.0])
     over_time = Panel(
         "time [s]", "position [mm]",
-        [Line("measured", t, np.sin(t), "measured"), Line("model", t, np.cos(t), look="dashed")],
+        [Line("measured", t, np.sin(t), "measured"), Line("model", t, np.cos(t), style="dashed")],
         bands=[Band("noise", -0.1, 0.1)], marks=[Mark(0.5, "x")], y_range=(-2.0, 2.0),
     )  # fmt: skip
     curve = np.array([-3.0, 0.0, 4.0])
     against = Panel(
-        "v", "F", [Line("model", curve, curve, look="bold"), Line("dots", v, 2 * v, look="dots")],
+        "v", "F", [Line("model", curve, curve, style="bold"), Line("dots", v, 2 * v, style="dots")],
         areas=[Area("95 %", curve, curve - 1, curve + 1)],
     )  # fmt: skip
     return Chart("example", "two panels", [over_time, against], parts=[Part("first", 0.0, 0.5)])

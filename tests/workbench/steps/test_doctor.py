@@ -63,7 +63,7 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
     found = look(card, table)
     path = card.path.parent / "run.csv"
     model = identify_sources(read_sources([str(path)], str(card.path))).model
-    can = {one.name: one.can for one in found.told}
+    can = {one.name: one.can for one in found.identifiability}
     assert {n for n in NAMES if can[n]} == {n for n in NAMES if model.friction[n].value is not None}
     assert found.verdict == "ready"
 
@@ -75,7 +75,7 @@ def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> 
     y = np.cumsum(np.where(np.diff(table["y"], prepend=table["y"][0]) > 0,
                            np.diff(table["y"], prepend=table["y"][0]), 0.0))  # fmt: skip
     found = look(card, {"t": table["t"], "y": y, "u": np.where(up, table["u"], 0.0)})
-    can = {one.name: one for one in found.told}
+    can = {one.name: one for one in found.identifiability}
     assert not can["F_cn"].can and not can["F_sn"].can
     assert "negative direction" in can["F_cn"].why
     assert any("motion that way" in one for one in found.add)

@@ -12,7 +12,7 @@ from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
-from workbench.page.card_form import OTHER_FIELD, form_of, kept_form
+from workbench.page.card_form import OTHER_FIELD, form_of, stored_form
 from workbench.steps.first_card.answers import BadAnswer, with_rig
 from workbench.steps.first_card.checked_proposal import checked_proposal
 from workbench.steps.first_card.proposal import Proposal, proposed
@@ -119,9 +119,9 @@ def test_the_pages_form_is_kept_with_guesses_of_columns(
     noise = np.random.default_rng(1).standard_normal((2, len(T)))
     y = joint["y"] + 1e-4 * noise[0]
     form = form_of(propose(tmp_path, "t,a1,a2", T, y, joint["F"] + 0.5 * noise[1]), "run.csv")
-    form.keep(tmp_path)
+    form.store(tmp_path)
     assert not all(sure for sure, _ in form.why.values())
-    kept = kept_form(tmp_path)
+    kept = stored_form(tmp_path)
     assert kept is not None and kept.why == form.why and kept.others == form.others
 
 

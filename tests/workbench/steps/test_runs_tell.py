@@ -48,7 +48,9 @@ def both_ways(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Identifie
 def test_identify_and_doctor_promise_the_same(both_ways: tuple[Path, Identified]) -> None:
     folder, found = both_ways
     card = read_sources([str(folder / "run.csv")], str(folder / "card.toml")).card
-    said = {one.name: (one.can, one.within) for one in examine(folder / "run.csv", card).told}
+    said = {
+        one.name: (one.can, one.within) for one in examine(folder / "run.csv", card).identifiability
+    }
     assert {one.name: (one.can, one.within) for one in found.model.identifiability} == said
     assert {one.name for one in found.model.identifiability} >= set(NAMES)
 

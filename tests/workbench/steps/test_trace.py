@@ -29,8 +29,8 @@ from workbench.output import dumps
 from workbench.report.trace import traced_view
 from workbench.report.trace_friction import sliding_friction
 from workbench.report.trace_pictures import (
-    along_rows,
     axis_of,
+    effect_at_rows,
     log_starts,
     pictures,
     running_median,
@@ -345,11 +345,11 @@ def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:
 def test_what_an_effect_takes_away_is_its_own_share_of_the_residual() -> None:
     found = trace_of("effect", ("stribeck", "spring"))
     rows = residual("mechanical", ("stribeck", "spring"))
-    taken = [along_rows(acting, rows, found.plant.friction) for acting in found.plant.effects]
+    taken = [effect_at_rows(acting, rows, found.plant.friction) for acting in found.plant.effects]
     assert taken[0] is not None and taken[1] is not None
     np.testing.assert_allclose(taken[0] + taken[1], rows.before - rows.after, atol=1e-12)
     stateful = trace_of("effect", ("rising_stiction",)).plant
-    assert along_rows(stateful.effects[0], rows, stateful.friction) is None
+    assert effect_at_rows(stateful.effects[0], rows, stateful.friction) is None
 
 
 def test_the_running_median_is_not_drawn_across_a_gap() -> None:

@@ -95,11 +95,11 @@ class Bench:
         """The plant as the search takes it, and what a run identifies of it and of these rivals."""
         own = self.fitted(plant)
 
-        def told(run: LoopRun) -> Information:
+        def information_of(run: LoopRun) -> Information:
             return information(own, self.errors(plant, run), self.drive, rivals)
 
         whole = self.by_command and isinstance(plant.actuator, Actuator)
-        return Machine(lambda r: self.run(plant, r), told, whole)
+        return Machine(lambda r: self.run(plant, r), information_of, whole)
 
 
 def bench_of(model: Model, found: Design | None) -> Bench:
@@ -107,7 +107,7 @@ def bench_of(model: Model, found: Design | None) -> Bench:
 
     Raises BadModel where there is neither, or nothing would follow a reference.
     """
-    if model.imposed:
+    if model.prescribed_motion:
         raise BadModel(
             "the model's logs are of a prescribed motion; no controller moves this machine"
         )

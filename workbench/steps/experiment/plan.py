@@ -51,8 +51,8 @@ def experiment(
     """The run that is most informative of the parameters asked for, within the limits.
 
     design: whose recommended controller moves the machine; None: its present one. Raises BadModel
-    where nothing would follow a reference, NotIdentifiable where no run within the limits tells
-    anything.
+    where nothing would follow a reference, NotIdentifiable where no run within the limits
+    identifies anything.
     """
     limits = limits_of(model, wanted)
     bench = bench_of(model, design)
@@ -92,12 +92,12 @@ def experiment(
         separation=_apart(seen[1][0], keys) if seen and rivals else (),
         safety=safety,
         efficiency=float(np.exp((plan.joined - plan.bound) / per)),
-        loose=seen[1][0].loose if seen else 1.0,
+        chaotic=seen[1][0].loose if seen else 1.0,
         tried=plan.tried,
         seed=wanted.seed,
         remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
         versions=versions(),
-        r=_at_rate(r, bench),
+        r=r[:: max(1, round(bench.loop.law.h / bench.loop.h))],  # where the controller samples
         traces=_traces(bench, plants[: 1 + SHOWN_PLANTS], r),
     )
 
@@ -124,18 +124,14 @@ def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[P
     return tuple(replace(one, effects=(*one.effects, next(turns))) for one in plants)
 
 
-def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
+def _apart(information: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
     """How far the run discriminates each pair, the hardest first."""
+    matrix = information.matrix
     found = [
-        Separation(*pair.names, float(np.sqrt(discriminated(told.matrix, pair.one, pair.others))))
-        for pair in pairs_of(told, keys)
+        Separation(*pair.names, float(np.sqrt(discriminated(matrix, pair.one, pair.others))))
+        for pair in pairs_of(information, keys)
     ]
     return tuple(sorted(found, key=lambda one: one.deviations))
-
-
-def _at_rate(r: Array, bench: Bench) -> Array:
-    """The reference at the samples of the position controller."""
-    return r[:: max(1, round(bench.loop.law.h / bench.loop.h))]
 
 
 def _traces(bench: Bench, plants: Sequence[Plant], r: Array) -> Traces:

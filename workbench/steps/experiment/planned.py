@@ -46,7 +46,7 @@ class Promised:
     value: float
     before: float | None
     after: float | None
-    told: float
+    identified_share: float
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Experiment:
 
     h [s]: period of the reference r [m], (n,); criterion: "D" (surest parameters) or "T" (rivals
     discriminated); efficiency: of the best shares of the time, a parameter, that the run's whole
-    pieces reach as their sum; loose: share of the run that is sensitive to chance.
+    pieces reach as their sum; chaotic: share of the run that is sensitive to chance.
     """
 
     card: str
@@ -105,7 +105,7 @@ class Experiment:
     separation: tuple[Separation, ...]
     safety: Safety
     efficiency: float | None
-    loose: float
+    chaotic: float
     tried: tuple[int, int]
     seed: int
     remarks: tuple[str, ...]
@@ -170,7 +170,7 @@ def experiment_document(found: Experiment) -> dict[str, Any]:
             "peaks": vars(found.safety.peaks),
         },
         "efficiency": found.efficiency,
-        "loose": found.loose,
+        "loose": found.chaotic,
         "tried": {"segments": found.tried[0], "runs": found.tried[1]},
         "seed": found.seed,
         "remarks": found.remarks,

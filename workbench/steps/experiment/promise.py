@@ -49,11 +49,13 @@ def promised(
             for one in found
             if name in one and (half := half_width(one[name])) is not None
         ]
-        told = len(relative) / len(plants)
-        after = abs(value) * float(np.median(relative)) if told >= 0.5 else None
+        identified_share = len(relative) / len(plants)
+        after = abs(value) * float(np.median(relative)) if identified_share >= 0.5 else None
         unit = now.unit if now is not None else units[name].unit
         out.append(
-            Promised(name, unit, value, None if now is None else half_width(now), after, told)
+            Promised(
+                name, unit, value, None if now is None else half_width(now), after, identified_share
+            )
         )
     return tuple(out)
 

@@ -56,13 +56,13 @@ def _positions(
 
     alone: whether the headers are these words alone; then other headers have to hold them too.
     """
-    kept = [(word, k) for word, k in family.items() if _is_position(heads[k])]
-    names = {word for word, _ in kept}
+    positions = [(word, k) for word, k in family.items() if _is_position(heads[k])]
+    names = {word for word, _ in positions}
     elsewhere = sum(names <= set(other) for other in families)
     if alone and elsewhere < 2:
         return ()
     apart = list[tuple[str, int]]()
-    for word, k in kept:
+    for word, k in positions:
         if elsewhere > 1 or all(abs(alike[k, j]) < SAME_MOTION for _, j in apart):
             apart.append((word, k))
     return tuple(word for word, _ in apart)

@@ -26,5 +26,5 @@ def checked_proposal(of: Proposal) -> Proposal:
     except UserError as error:
         return replace(of, refused=str(error))
     before = f"{of.path.name}: "
-    held = [one.removeprefix(before) for one in found.remarks if RENEWED_AT in one]
-    return replace(of, hardly=tuple(dict.fromkeys([*lines, *held])))
+    renewed = [one.removeprefix(before) for one in found.remarks if RENEWED_AT in one]
+    return replace(of, hardly=tuple(dict.fromkeys([*lines, *renewed])))

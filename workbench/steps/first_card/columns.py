@@ -144,10 +144,10 @@ def columns_of(log: UnknownLog) -> Columns:
     others = [one for one in usable if one is not clock and one.raw.number not in clocks]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
-    kept, twice = _without_doubles(signals)
-    kept = _with_axes(kept)
+    distinct, twice = _without_doubles(signals)
+    distinct = _with_axes(distinct)
     return Columns(
-        log.path, log.spec, clock, step, grid, tuple(kept), left_out | twice,
+        log.path, log.spec, clock, step, grid, tuple(distinct), left_out | twice,
         tuple(read), tuple(_column(one) for one in log.scalars), log.notes,
     )  # fmt: skip
 
@@ -264,20 +264,20 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     Of two the one whose header says more is kept, else the finer, else the later: what is made
     from a sensor's output stands behind it.
     """
-    kept, twice = list[Column](), dict[int, str]()
+    distinct, twice = list[Column](), dict[int, str]()
     order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
     if not order:
         return [], {}
     alike = np.abs(correlation(np.column_stack([one.x for one in order])))
     place = {one.raw.number: k for k, one in enumerate(order)}
     for k, one in enumerate(order):
-        near = (other for other in kept if alike[k, place[other.raw.number]] > NEARLY_ALIKE)
+        near = (other for other in distinct if alike[k, place[other.raw.number]] > NEARLY_ALIKE)
         same = next((other for other in near if _same(one, other)), None)
         if same is None:
-            kept.append(one)
+            distinct.append(one)
         else:
             twice[one.raw.number] = f"is {same.shown} in another unit"
-    return sorted(kept, key=lambda one: one.raw.number), twice
+    return sorted(distinct, key=lambda one: one.raw.number), twice
 
 
 def _with_axes(columns: Sequence[Column]) -> list[Column]:

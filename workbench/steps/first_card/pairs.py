@@ -198,10 +198,6 @@ class Seen:
         """What of each column is the force along the position; empty where too little moves."""
         return force_laws(self.motion, self.y.x, self.pairs.x, self.smooth)
 
-    def laws_of(self, f: Array, smooth: Array) -> list[ForceLaw]:
-        """The same of other signals (n, j), and of these smoothed."""
-        return force_laws(self.motion, self.y.x, f, smooth)
-
     def lead(self, k: int) -> Lead:
         """By how much a column is ahead of the position."""
         if k not in self._leads:

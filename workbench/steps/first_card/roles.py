@@ -14,7 +14,13 @@ from scipy.optimize import linear_sum_assignment
 
 from identification.arrays import Array
 from identification.log import RigKind
-from identification.signals.relations import GIVES_SIGN, ForceLaw, actuator_share, force_law
+from identification.signals.relations import (
+    GIVES_SIGN,
+    ForceLaw,
+    actuator_share,
+    force_law,
+    force_laws,
+)
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
 from workbench.steps.first_card.weights import (
@@ -226,7 +232,7 @@ def _chambers(seen: Seen, own: float) -> Iterator[_Way]:
         smooth = np.column_stack(
             [a * seen.smooth[:, i] - ratio * b * seen.smooth[:, j] for ratio in AREA_RATIOS]
         )
-        laws = seen.laws_of(f, smooth)
+        laws = force_laws(seen.motion, seen.y.x, f, smooth)
         at = int(np.argmax([law.share for law in laws]))
         law, ratio = laws[at], AREA_RATIOS[at]
         way = driving(turned(law), float(seen.v_share[i]), False) - 1.0
@@ -289,13 +295,13 @@ def _filled(way: _Way) -> _Choice:
         return _Choice(way, {}, {}, {})
     signals, moved = way.seen.pairs.signals, way.seen.moves(way.force)
     gain = np.array([[_gain(way, k, role, float(moved[k])) for role in roles] for k in rest])
-    kept = np.maximum(gain, LEAST_SCORE)
-    rows, places = linear_sum_assignment(-kept)
+    bounded = np.maximum(gain, LEAST_SCORE)
+    rows, places = linear_sum_assignment(-bounded)
     others, gains, next_best, margins = {}, {}, {}, {}
     for i, j in zip(rows.tolist(), places.tolist(), strict=True):
-        if kept[i, j] <= LEAST_SCORE:
+        if bounded[i, j] <= LEAST_SCORE:
             continue
-        role, others[roles[j]], gains[roles[j]] = roles[j], signals[rest[i]], float(kept[i, j])
+        role, others[roles[j]], gains[roles[j]] = roles[j], signals[rest[i]], float(bounded[i, j])
         behind = [m for m in np.argsort(-gain[:, j]).tolist() if m != i and gain[m, j] > -3.0]
         if behind:
             next_best[role] = signals[rest[behind[0]]]
@@ -370,8 +376,8 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         own = best.gains.get(role)
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
-        told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
-        out[role] = odds if told else min(odds, SURE - 1.0)
+        named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
+        out[role] = odds if named else min(odds, SURE - 1.0)
     return out
 
 

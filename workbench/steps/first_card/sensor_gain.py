@@ -120,6 +120,6 @@ def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGue
         motion = roles.columns["y"].motion
         assert motion is not None
         slope = derivative(motion, roles.columns["v"].x).factor / columns.grid
-        told = abs(slope) * factor(given["v"].unit) / metre(given["y"].unit, given["y"])
-        rate, why = _sensible(told * columns.step), "by the velocity and the position"
+        ratio = abs(slope) * factor(given["v"].unit) / metre(given["y"].unit, given["y"])
+        rate, why = _sensible(ratio * columns.step), "by the velocity and the position"
     return UnitGuess("1", f"{rate:.9g} 1/s", False, why)

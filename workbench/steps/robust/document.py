@@ -40,7 +40,7 @@ def _promise_document(one: Promise) -> dict[str, Any]:
         "measures": {
             name: {
                 "low": _finite(m.low), "median": _finite(m.median), "high": _finite(m.high),
-                "limit": m.limit, "kept": m.kept,
+                "limit": m.limit, "kept": m.share,
             }
             for name, m in one.measures.items()
         },

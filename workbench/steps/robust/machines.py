@@ -34,8 +34,8 @@ class DrawnMachines:
         Raises BadSpecification where the force loop is stable on none.
         """
         each = self.each_linear(h, force)
-        told = [one for one in each if one is not None]
-        return DrawnPlants.of(told, probability, len(each) - len(told))
+        drawn = [one for one in each if one is not None]
+        return DrawnPlants.of(drawn, probability, len(each) - len(drawn))
 
     def each_linear(
         self, h: float, force: ForceLoop | None
@@ -70,12 +70,12 @@ def drawn_machines(
 ) -> DrawnMachines:
     """So many machines, drawn from the errors of the model's parameters, and by `drift_found`."""
     drift = dict(drift or {})
-    errors, walk = rng.spawn(2)
+    errors, drift_rng = rng.spawn(2)
     plants = drawn_plants(model, errors, count)
     if drift:
         names = tuple(drift)
         spread = np.array(list(drift.values()))
-        factors = np.exp(spread * walk.standard_normal((count, len(names))))
+        factors = np.exp(spread * drift_rng.standard_normal((count, len(names))))
         plants = tuple(
             plant_with(plant, names, values_of(plant, names) * row)
             for plant, row in zip(plants, factors, strict=True)

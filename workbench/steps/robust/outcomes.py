@@ -68,7 +68,7 @@ class Outcomes:
 
     values: Mapping[str, Array]
 
-    def kept(self, limits: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
+    def within(self, limits: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
         """Whether each limit is kept on each machine, (k,)."""
         return {
             one.name: self.values[one.name] >= limits[one.name]

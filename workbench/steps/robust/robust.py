@@ -63,7 +63,7 @@ class Spread:
     median: float
     high: float
     limit: float | None
-    kept: float | None
+    share: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,22 +188,24 @@ def promise_of(
     controller: str, compensator: bool, found: Outcomes, limits: Mapping[str, float]
 ) -> Promise:
     """The outcomes as shares and quantiles."""
-    kept, spread = found.kept(limits), spread_of(found)
+    within, spread = found.within(limits), spread_of(found)
     measures = {
-        name: Spread(*own, limits.get(name), float(np.mean(kept[name])) if name in kept else None)
+        name: Spread(
+            *own, limits.get(name), float(np.mean(within[name])) if name in within else None
+        )
         for name, own in spread.items()
     }
-    every = np.all(list(kept.values()), axis=0)
+    every = np.all(list(within.values()), axis=0)
     return Promise(controller, compensator, measures, float(np.mean(every)), found)
 
 
 def _missed(promise: Promise, probability: float) -> tuple[str, ...]:
     words = {one.name: one.words for one in MEASURES}
     return tuple(
-        f"{words[name]}: within its limit on {100 * one.kept:.0f} % of the machines drawn,"
+        f"{words[name]}: within its limit on {100 * one.share:.0f} % of the machines drawn,"
         f" {100 * probability:g} % asked"
         for name, one in promise.measures.items()
-        if one.kept is not None and one.kept < probability
+        if one.share is not None and one.share < probability
     )
 
 
@@ -213,7 +215,7 @@ def _chosen(
     """The design with its choice and the promise as the reason."""
     one = found.chosen
     called = one.name.upper() + (" with the compensator" if one.compensator else "")
-    least = min((m.kept for m in promise.measures.values() if m.kept is not None), default=1.0)
+    least = min((m.share for m in promise.measures.values() if m.share is not None), default=1.0)
     said = (
         f"{called}: of {wanted.draws} machines drawn each limit is met by at least"
         f" {100 * least:.0f} %, all of them by {100 * promise.every:.0f} %; the best of"

@@ -5,7 +5,7 @@ friction decides. A few machines sort the candidates, all of them test the best 
 promised at last is counted on machines drawn anew, so that the choice has no part in it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,7 +72,7 @@ class Searched:
 
     chosen: Candidate
     tried: int
-    keeps: bool
+    passed: bool
 
 
 def searched(
@@ -123,8 +123,10 @@ def candidates(
         first = fastest.get(one.integrator)
         if speed < 1.0 and first is None:
             continue
-        top = None if first is None else _speed(first) * speed
-        period = placing.period if first is None else first.plant.h
+        top, period = None, placing.period
+        if first is not None:
+            top = speed * max(one.dominant[0] for one in first.controllers.values())
+            period = first.plant.h
         try:
             found = placed_design(
                 machines.model, one, goals=replace(placing.goals, fastest=top),
@@ -142,15 +144,11 @@ def candidates(
         raise refusal or BadSpecification("no loop could be placed; give --poles W_N,ZETA")
 
 
-def _speed(found: Design) -> float:
-    return max(one.dominant[0] for one in found.controllers.values())
-
-
 def _of_design(model: Model, found: Design) -> Iterator[Candidate]:
     """Its controllers that keep their goals, each without and with compensators."""
     names = POLES_PLACED
-    kept = [n for n in names if n in found.controllers and not found.controllers[n].missed]
-    for name in kept or [n for n in names if n in found.controllers]:
+    admissible = [n for n in names if n in found.controllers and not found.controllers[n].missed]
+    for name in admissible or [n for n in names if n in found.controllers]:
         yield Candidate(found, name, compensator=False)
         controller = found.controllers[name]
         for own in compensators(model, found.compensator, controller):
@@ -178,8 +176,8 @@ def compensators(
 def _short(one: Candidate, limits: dict[str, float], probability: float) -> float:
     """By how much the shares of machines that keep each limit fall short of the probability."""
     assert one.found is not None
-    kept = one.found.kept(limits)
-    return float(sum(max(probability - float(np.mean(k)), 0.0) for k in kept.values()))
+    within = one.found.within(limits)
+    return float(sum(max(probability - float(np.mean(k)), 0.0) for k in within.values()))
 
 
 def _cost(one: Candidate, model: Model) -> float:
@@ -191,11 +189,10 @@ def _cost(one: Candidate, model: Model) -> float:
     return float(np.mean(np.log(medians))) if np.all(np.isfinite(medians)) else np.inf
 
 
-def spread_of(found: Outcomes, names: Sequence[str] = ()) -> dict[str, tuple[float, float, float]]:
+def spread_of(found: Outcomes) -> dict[str, tuple[float, float, float]]:
     """5 %, median and 95 % of each measure over the machines."""
-    wanted = names or [one.name for one in MEASURES if one.name in found.values]
     out = {}
-    for name in wanted:
+    for name in (one.name for one in MEASURES if one.name in found.values):
         low, middle, high = np.quantile(found.values[name], (0.05, 0.5, 0.95), method="nearest")
         out[name] = (float(low), float(middle), float(high))
     return out

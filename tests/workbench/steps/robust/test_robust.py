@@ -61,7 +61,7 @@ def judged(one: Robust, machines: DrawnMachines, seed: int) -> dict[str, float]:
     limits = limits_by_name(one.asked.limits, one.asked.staircase)
     return {
         name: float(np.mean(share))
-        for name, share in outcomes(machines, loop, motion, rngs).kept(limits).items()
+        for name, share in outcomes(machines, loop, motion, rngs).within(limits).items()
     }
 
 
@@ -72,7 +72,7 @@ def test_what_it_promises_holds_on_machines_that_it_has_not_seen() -> None:
     assert one.passed and one.design.recommended in ("rst", "pid")
     others = drawn_machines(uncertain(), np.random.default_rng(99), 60)
     for name, share in judged(one, others, 98).items():
-        promised = one.promises[ROBUST].measures[name].kept
+        promised = one.promises[ROBUST].measures[name].share
         assert promised is not None and promised >= WANTED.probability
         assert share == pytest.approx(promised, abs=PATIENCE), name
 
@@ -84,7 +84,7 @@ def test_machines_further_off_than_the_model_says_break_the_promise() -> None:
     wide = drawn_machines(uncertain(0.6), np.random.default_rng(99), 60)
     shares = judged(one, wide, 98)
     promised = one.promises[ROBUST].measures
-    assert min(share - (promised[name].kept or 0.0) for name, share in shares.items()) < -PATIENCE
+    assert min(share - (promised[name].share or 0.0) for name, share in shares.items()) < -PATIENCE
 
 
 @pytest.mark.method
@@ -113,7 +113,7 @@ def test_slow_motion_asked_for_is_smaller_than_the_pids() -> None:
     assert promise.compensator and one.design.compensator.excess
     assert not plain.compensator
     assert promise.measures["staircase"].median < 0.5 * plain.measures["staircase"].median
-    assert promise.measures["limit_cycle"].kept == 1.0
+    assert promise.measures["limit_cycle"].share == 1.0
     assert not one.passed and "staircase" in " ".join(one.missed)
 
 
@@ -132,7 +132,7 @@ def test_a_machine_that_runs_away_keeps_no_limit() -> None:
     machines = DrawnMachines(model, (Plant(wild, model.simulated.actuator),), {})
     step = np.repeat([0.0, 0.05], 500)
     got = outcomes(machines, loop, Motion(step, step, step), np.random.default_rng(0).spawn(1))
-    share = got.kept(limits_by_name(Limits()))
+    share = got.within(limits_by_name(Limits()))
     assert not share["modulus"][0] or not share["tracking"][0]
 
 
