@@ -15,7 +15,7 @@ from identification.estimation.windowed_run.parameters import values_of
 from identification.log import Log
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant
-from identification.thresholds import ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, A
 
 def allowed_misfit(active: float) -> float:
     """Misfit up to which a log's run is followed; active: what the model left of its own."""
-    return ASTRAY * max(active, 1.0)
+    return ADEQUATE if active <= ADEQUATE else ASTRAY * active
 
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:

@@ -274,16 +274,16 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
     itself; root mean squares.
 
     None where too little slides. Of rows faster than the plant's band, in which it says something
-    else of friction.
+    else of friction; of all where hardly any are, as a band that takes the sliding is none.
     """
     logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
     made = rows_and_windows(logs, theta)
     rows = stacked([one.rows for one in made])
     fast = np.concatenate([one.outside(p) for one in made])
-    if np.count_nonzero(fast) < FEWEST_COMPARED:
+    if len(fast) < FEWEST_COMPARED:
         return None
-    rows = rows.at(fast)
+    rows = rows.at(fast) if np.count_nonzero(fast) >= FEWEST_COMPARED else rows
     own = rows.b - rows.X @ theta
     return rms(own), rms(left_unseen(rows)), rms(rows.b)
 

@@ -23,7 +23,7 @@ BEND_SHARE = 1.5  # times the change of the step, that a jump is larger than
 CLEAR_OF_LINES = 5.0  # times what the lines leave of their samples, that a jump is
 SUDDEN_SHARE = 1.5  # times the largest change of step elsewhere, that a jump is
 WHOLE_PERIODS = 1.5  # median periods between two samples, beyond which the clock has a gap
-STANDS_OUT = 2.5  # times the largest elsewhere, that a jump is
+JUMP_STANDS_OUT = 2.5  # times the largest elsewhere, that a jump is
 MOST_JUMPS = 12  # of one size
 PARABOLA_SIDE = 5  # samples to either side of a spike that the parabola goes through
 LONGEST_SMALL = 3  # samples of a spike
@@ -155,9 +155,9 @@ def outstanding(steps: Array, least: float) -> NDArray[np.intp]:
     if not len(order) or size[order[0]] < least:
         return order[:0]
     after = np.append(size[order[1:]], 0.0)
-    ratio = size[order] / np.maximum(after, least / STANDS_OUT)
+    ratio = size[order] / np.maximum(after, least / JUMP_STANDS_OUT)
     count = int(np.argmax(np.where(size[order] >= least, ratio, 0.0))) + 1
-    if ratio[count - 1] < STANDS_OUT or count > MOST_JUMPS:
+    if ratio[count - 1] < JUMP_STANDS_OUT or count > MOST_JUMPS:
         return order[:0]
     return np.sort(order[:count])
 

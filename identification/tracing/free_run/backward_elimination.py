@@ -15,7 +15,7 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
-from identification.estimation.windowed_run.parameters import even, loose
+from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
@@ -33,7 +33,6 @@ from identification.thresholds import (
     NEARLY_FOLLOWED,
     PENALTY,
 )
-from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
@@ -80,14 +79,6 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
 def seconds(setting: Setting) -> float:
     """Duration of all logs [s]; what a run leaves counts as one independent sample a second."""
     return sum(one.log.duration for one in setting.logs)
-
-
-def known(setting: Setting) -> bool:
-    """Whether the plain plant's sliding is right: its run, or at least the equations, show no less.
-
-    Then an effect in stops and reversals is searched in the run itself, without nudging.
-    """
-    return setting.plain.misfit <= NEARLY_FOLLOWED or equations_explained(setting.first)
 
 
 def fitted(choice: Choice, setting: Setting) -> FittedStructure:
@@ -158,8 +149,6 @@ def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
     if whole:
         return min(enough(setting, choice.steps), NEARLY_FOLLOWED)
     bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
-    if bristle and loose(setting.plain.plant, setting.drive):  # minima are many and narrow
-        return ADEQUATE
     return ADEQUATE if bristle or setting.drive == "force" else COMPLETE
 
 
@@ -175,10 +164,10 @@ def first_steps(choice: Choice, count: int) -> Choice:
     return only(choice, choice.steps[:count])
 
 
-def only(choice: Choice, stay: tuple[Step, ...], gone: Sequence[EffectCandidate] = ()) -> Choice:
-    """The choice with these of its steps; gone: to be tried again beside them."""
+def only(choice: Choice, stay: tuple[Step, ...]) -> Choice:
+    """The choice with these of its steps."""
     end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, (*choice.tried, *gone))
+    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
 
 
 def pruned(

@@ -11,13 +11,15 @@ from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation import fit as fitting
 from identification.estimation.fit import fit_plant
-from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.imposed_motion import left_by
+from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.structure_fit import FittedStructure, plain_structure
 from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from tests.identification.motor_logs import K_A, NINE, made
 from tests.identification.plants import ACTUATOR, made_log, table
 
 FORCE = Rig("force")
@@ -246,3 +248,11 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     monkeypatch.setattr(fitting, "_by_equation", lambda *_: other)
     found: Any = fitting.on_the_floor(run, recorded, np.random.default_rng(0))
     assert (found.name, found.adequate) == (by, adequate)
+
+
+def test_a_band_that_takes_the_sliding_does_not_hide_what_a_plant_leaves() -> None:
+    recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
+    own = left_by(NINE, recorded)
+    wide = left_by(replace(NINE, dv_p=10.0, dv_n=-10.0, F_cp=2.0 * NINE.F_cp), recorded)
+    assert own is not None and own[0] == pytest.approx(own[1], rel=0.05)
+    assert wide is not None and wide[0] > 3.0 * wide[1]

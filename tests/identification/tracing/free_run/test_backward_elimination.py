@@ -20,7 +20,6 @@ from identification.tracing.free_run.backward_elimination import (
     first_steps,
     followed_up_to,
     keeping,
-    known,
     levelled,
     pruned,
     suffices,
@@ -150,16 +149,6 @@ def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
     assert followed_up_to(choice, far, False) == COMPLETE
     assert followed_up_to(choice, replace(far, drive="force"), False) > COMPLETE
     assert equations_explained(choice.base) and not equations_explained(setting.first)
-
-
-def test_what_stops_lack_is_searched_in_the_run_where_sliding_is_explained(
-    found: tuple[Setting, Choice],
-) -> None:
-    setting, choice = found
-    far = replace(setting, plain=replace(setting.plain, misfit=41.0))
-    assert not known(far)  # its spring is missing from the equations
-    assert known(replace(far, first=choice.base))
-    assert known(replace(setting, plain=replace(setting.plain, misfit=4.0)))
 
 
 def test_without_effects_a_measured_force_is_contested_sooner(
