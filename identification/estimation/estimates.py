@@ -81,7 +81,8 @@ def reported_estimate(
     wrong = _beyond(value, bounds)
     where = _bound_of(value, bounds, at_bound)
     wide = not high - low <= 2.0 * NORMAL_95 * WIDEST_SD * abs(value)
-    if wrong is None and (where == 0.0 or wide) and sd <= SMALL_TERM * beside:
+    small = sd <= SMALL_TERM * beside and low <= 0.0 <= high
+    if wrong is None and (where == 0.0 or wide) and small:
         most = max(abs(low), abs(high))
         reason = f"not significantly different from 0 (|x| < {most:.2g}, 95 %)"
         return Estimate(None, unit, sd, reason=reason, assumed=value, at_most=most)
@@ -204,12 +205,22 @@ def effect_estimates(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict
     for acting in effects:
         for p in acting.effect.params:
             name = f"{acting.key}.{p.name}"
-            out[name] = of_effect(p, acting.values[p.name], sd.get(name))
+            out[name] = of_effect(p, acting.values[p.name], sd.get(name), beside_in(acting, p))
     return out
 
 
-def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
-    """Estimate of an effect's parameter from its value and deviation [p.unit].
+def beside_in(acting: Acting, p: Param) -> float:
+    """Size of the largest other term of an effect's sum in the unit of this one [p.unit], 0 where
+    there is none: a wave's cosine is known to be small beside its sine."""
+    linear = acting.effect.linear
+    others = [one.name for one in acting.effect.params if one.unit == p.unit and one is not p]
+    sizes = [abs(acting.values[name]) for name in others if name in linear]
+    return max(sizes, default=0.0) if p.name in linear else 0.0
+
+
+def of_effect(p: Param, value: float, sd: float | None, beside: float = 0.0) -> Estimate:
+    """Estimate of an effect's parameter from its value and deviation [p.unit]; beside: the size at
+    which it would be as large as another term of the effect (`beside_in`).
 
     A part of the law's form that no log has moved from its default is given as that, without an
     interval: it belongs to the equation.
@@ -219,5 +230,5 @@ def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
     share = p.name == "asymmetry" or p.name in AT_REST  # of the effect itself
     return reported_estimate(
         value, p.unit, sd, bounds=(p.low, p.high), at_bound=LEAST_SD * abs(p.typical or 1.0),
-        beside=1.0 if share else 0.0,
+        beside=1.0 if share else beside,
     )  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.estimates import of_effect, reported_estimate
+from identification.estimation.estimates import beside_in, of_effect, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
     NOTHING_KNOWN,
@@ -173,7 +173,10 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
         deviations |= {f"{acting.key}.a": one.sine.sd, f"{acting.key}.b": one.cosine.sd}
     known = {
         f"{acting.key}.{p.name}": of_effect(
-            p, acting.values[p.name], deviations.get(f"{acting.key}.{p.name}")
+            p,
+            acting.values[p.name],
+            deviations.get(f"{acting.key}.{p.name}"),
+            beside_in(acting, p),
         )
         for acting in around.effects
         for p in acting.effect.params

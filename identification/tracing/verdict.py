@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.estimates import of_effect
+from identification.estimation.estimates import beside_in, of_effect
 from identification.estimation.imposed_motion import imposed_estimates
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
@@ -92,7 +92,9 @@ def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEff
     effect = step.candidate.effect
     acting = next(a for a in after.plant.effects if a.key == effect.key)
     params = {
-        p.name: of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
+        p.name: of_effect(
+            p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"), beside_in(acting, p)
+        )
         for p in effect.params
     }
     explained = step.explained

@@ -96,6 +96,18 @@ def test_what_no_log_moves_from_its_default_is_given_with_the_law() -> None:
     assert (told["asymmetry"].value, told["asymmetry"].sd) == (0.0, None)
 
 
+def test_a_wave_that_has_no_cosine_says_how_small_it_is() -> None:
+    cogging = built_in()["cogging"]
+    wave = cogging.acting({"a": 4.0, "b": 0.0, "period": 0.012})
+    sd = {"cogging.a": 0.01, "cogging.b": 0.01, "cogging.period": 1e-5}
+    none = effect_estimates([wave], sd)["cogging.b"]
+    assert none.reason == "not significantly different from 0 (|x| < 0.02, 95 %)"
+    assert none.value is None and none.at_most == pytest.approx(0.0196)
+    slight = cogging.acting({"a": 4.0, "b": 0.03, "period": 0.012})
+    reason = effect_estimates([slight], sd)["cogging.b"].reason
+    assert reason is not None and "is wider than the value" in reason  # but surely not 0
+
+
 @pytest.mark.parametrize(
     ("value", "sd", "said"),
     [
