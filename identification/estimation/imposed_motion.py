@@ -274,16 +274,19 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
     itself; root mean squares.
 
     None where too little slides. Of rows faster than the plant's band, in which it says something
-    else of friction; of all where hardly any are, as a band that takes the sliding is none.
+    else of friction; where hardly any are, of all of a body driven by the measured force, whose run
+    begins anew in every window, so that a band may take the sliding and still be followed.
     """
     logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
     made = rows_and_windows(logs, theta)
     rows = stacked([one.rows for one in made])
     fast = np.concatenate([one.outside(p) for one in made])
-    if len(fast) < FEWEST_COMPARED:
-        return None
-    rows = rows.at(fast) if np.count_nonzero(fast) >= FEWEST_COMPARED else rows
+    if np.count_nonzero(fast) < FEWEST_COMPARED:
+        if recorded.drive == "command" or len(fast) < FEWEST_COMPARED:
+            return None
+        fast = np.ones(len(fast), dtype=np.bool_)
+    rows = rows.at(fast)
     own = rows.b - rows.X @ theta
     return rms(own), rms(left_unseen(rows)), rms(rows.b)
 
