@@ -73,4 +73,5 @@ ACTUATOR_SHARE = 0.02  # of the force, that an actuator leaves which is no linea
 FAULT_FROM = 9.0  # step of a position, or distance of 1 to 3 samples, that no body can have made
 RUN_FAULT_FROM = 6.0  # the same in what a run that follows the log leaves, in its own deviations
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
-SHARE_EXCLUDED = 1e-3  # of a log, by the word of a run that follows it but for these samples
+PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
+SHARE_EXCLUDED = 1e-3  # of its samples, the same

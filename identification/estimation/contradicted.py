@@ -45,6 +45,7 @@ from identification.thresholds import (
     RUN_FAULT_FROM,
 )
 
+CORRECTION_ROUNDS = 3  # in which a fit searches for bad samples, again without those found
 RUN_SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
 CLEAR_OF_ERRORS = 2.5  # times what lines through them leave of the errors, that a jump is
 MEDIAN_OVER = 11  # samples whose median a single one is compared to

@@ -19,7 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.contradicted import Corrected, corrected, lines_of
+from identification.estimation.contradicted import (
+    CORRECTION_ROUNDS,
+    Corrected,
+    corrected,
+    lines_of,
+)
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
@@ -58,13 +63,13 @@ from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, wi
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_driven
 from identification.signals.one_way import ONE_WAY_WHY
-from identification.signals.steps import LONGEST_SMALL
 from identification.thresholds import (
     ACTUATOR_SHARE,
     COMPLETE,
     HOPELESS,
     MATERIAL,
     NEARLY_FOLLOWED,
+    PLACES_EXCLUDED,
     SHARE_EXCLUDED,
     WORSE,
 )
@@ -80,7 +85,6 @@ LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
     " a noisy clock or command; stick limits and band are not identifiable"
 )
-CORRECTIONS = 3  # rounds in which bad samples are searched for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
@@ -232,7 +236,7 @@ def _without_bad(
     """
     given, none = recorded, excluded
     found = first = plain_structure(recorded, rng)
-    for seed in rng.spawn(CORRECTIONS):
+    for seed in rng.spawn(CORRECTION_ROUNDS):
         if found.imposed or recorded.halt.reached():
             break
         with recorded.halt.closing():
@@ -255,7 +259,8 @@ def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
         by_log.setdefault(one.log, []).append(one.samples)
     lengths = {one.log.name: len(one.log) for one in logs}
     return all(
-        sum(found) <= max(LONGEST_SMALL, SHARE_EXCLUDED * lengths.get(name, 0))
+        len(found) <= PLACES_EXCLUDED
+        and sum(found) <= max(PLACES_EXCLUDED, SHARE_EXCLUDED * lengths.get(name, 0))
         for name, found in by_log.items()
     )
 

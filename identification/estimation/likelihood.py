@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.contradicted import corrected
+from identification.estimation.contradicted import CORRECTION_ROUNDS, corrected
 from identification.estimation.imposed_motion import force_fit
 from identification.estimation.likely_windows import LikelyWindows
 from identification.estimation.plain_search.likely_sets import (
@@ -32,7 +32,6 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
 from identification.thresholds import ADEQUATE
 
-CORRECTION_ROUNDS = 3  # rounds in which a fit's bad samples are searched again, as in the fit
 ROOM = 4.0  # times the search's box, in which parameters of a whole run may lie
 WHOLE_RUNS = "the run over the whole of each log"
 IN_WINDOWS = "the run in windows from measured states"
