@@ -289,9 +289,7 @@ def in_run(
             return Dependence((), 0.0)
         at = np.arange(0, len(one.log), max(THINNED, samples(THINNED, one.log.h)))
         s = one.signals
-        own = {k: v[at] for k, v in s.items() if k not in NOT_SIGNALS}
-        own["t"] = s["t"][at] - s["t"][0]
-        own["reversal"] = since_reversal(s["d"], one.log.h)[at]
+        own = {k: v[at] for k, v in signals_of(one).items()}
         window = window_of(begun, len(one.log))
         if "u" in s:
             own["du"] = np.gradient(s["u"], one.log.h)[at]
@@ -330,6 +328,14 @@ def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> 
     return np.asarray(np.where(window[low] == window[high], found, 0.0))
 
 
+def signals_of(one: MotionLog) -> dict[str, Array]:
+    """Signals of a log on which a residual may depend, (n,) each: those logged, velocity, command,
+    time since the log's start and since the last reversal [s]."""
+    s = one.signals
+    own = {k: v for k, v in s.items() if k not in NOT_SIGNALS}
+    return {**own, "t": s["t"] - s["t"][0], "reversal": since_reversal(s["d"], one.log.h)}
+
+
 def signals_at(stage: EffectRows, equation: str) -> dict[str, Array]:
     """Signals that vary, at the middle of an equation's rows over all logs."""
     out: dict[str, list[Array]] = {}
@@ -342,12 +348,9 @@ def signals_at(stage: EffectRows, equation: str) -> dict[str, Array]:
         else:
             assert rows is not None
             middle = rows.middle
-        s = one.signals
-        own = {k: v[middle] for k, v in s.items() if k not in NOT_SIGNALS}
-        own["t"] = s["t"][middle] - s["t"][0]
-        own["reversal"] = since_reversal(s["d"], one.log.h)[middle]
+        own = {k: v[middle] for k, v in signals_of(one).items()}
         if rows is not None and (equation == ACTUATOR or (equation == MECHANICAL and one.held)):
-            own["du"] = rows.first @ s["u"]
+            own["du"] = rows.first @ one.signals["u"]
         if equation == BREAKAWAY:
             own["rest"] = stage.events[i].rested
         for k, v in own.items():

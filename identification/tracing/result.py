@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 from identification.arrays import Array
 from identification.effects._base import Effect
+from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
@@ -98,6 +97,23 @@ class Residual:
 
 
 @dataclass(frozen=True, eq=False)
+class MissingForce:
+    """The latent force of the plain model and of that with the effects, on the test logs (on the
+    training logs where there are none), and both while the body slides as a residual: applied force
+    less modelled, against the signals there."""
+
+    before: LatentForces
+    after: LatentForces
+    sliding: Residual
+
+    @property
+    def gained(self) -> float:
+        """What the effects gain of the log-likelihood of what was measured there [nats], the latent
+        force as large as each model needs it."""
+        return float(self.after.log_likelihood - self.before.log_likelihood)
+
+
+@dataclass(frozen=True, eq=False)
 class FreeCurve:
     """An effect's part of an equation against a signal, free of its law and by its law.
 
@@ -129,6 +145,7 @@ class Trace:
     for, so that its verdict is one for the time being. command_period: as of a fit. curves: of the
     effects named that are a function of a logged signal. surroundings: what acts beside the applied
     force, which is part of the plain model: errors and parameters are of logs without it.
+    missing_force: None where no body slides.
     """
 
     verdict: TraceVerdict
@@ -155,14 +172,17 @@ class Trace:
     command_period: float | None = None
     curves: tuple[FreeCurve, ...] = ()
     surroundings: Surroundings = NO_SURROUNDINGS
+    missing_force: MissingForce | None = None
 
-    def missing(self, errors: Errors) -> float | None:
-        """Root mean square force that a model lacks beyond the sensors' noise, as a share of the
-        Coulomb level; None where no force error was seen, or nothing rubs."""
+    @property
+    def missing(self) -> tuple[float, float] | None:
+        """Root mean square latent force before and after, as a share of the Coulomb level; None
+        where no body slides, or nothing rubs."""
         level = max(self.plant.friction.F_cp, self.plant.friction.F_cn)
-        if errors.force_rms is None or not rubs(level, errors.force_rms):
+        if self.missing_force is None:
             return None
-        return float(np.sqrt(max(errors.force_rms**2 - self.noise_force**2, 0.0)) / level)
+        before, after = self.missing_force.before.rms, self.missing_force.after.rms
+        return (before / level, after / level) if rubs(level, after) else None
 
 
 def rubs(level: float, left: float) -> bool:

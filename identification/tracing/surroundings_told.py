@@ -59,18 +59,25 @@ def with_surroundings(
         without, with_them = left["test"]
         if named is delay or explains_much(without**2, with_them**2):
             of = _with_named(of, named, around, left)
-            of = of if named is delay else replace(of, residuals=_with_orders(of, around))
+            of = of if named is delay else _with_orders(of, around)
     return of
 
 
-def _with_orders(of: Trace, around: Surroundings) -> tuple[Residual, ...]:
-    """The residuals, before with the orders' force that was taken out of the logs."""
-    return tuple(
-        replace(one, before=one.before - sum(o.force(one.signals["y"]) for o in around.orders))
-        if one.equation == MECHANICAL and "y" in one.signals
-        else one
-        for one in of.residuals
-    )
+def _with_orders(of: Trace, around: Surroundings) -> Trace:
+    """The trace whose residuals, before, have the orders' force that was taken out of the logs."""
+    residuals = tuple(_less_orders(one, around) for one in of.residuals)
+    missing = of.missing_force
+    if missing is not None:
+        missing = replace(missing, sliding=_less_orders(missing.sliding, around))
+    return replace(of, residuals=residuals, missing_force=missing)
+
+
+def _less_orders(one: Residual, around: Surroundings) -> Residual:
+    """The residual, before with the orders' force."""
+    if one.equation != MECHANICAL or "y" not in one.signals:
+        return one
+    force = sum(order.force(one.signals["y"]) for order in around.orders)
+    return replace(one, before=one.before - force)
 
 
 def orders_alone(

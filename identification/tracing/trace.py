@@ -21,7 +21,7 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     motion_log,
 )
-from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -52,6 +52,7 @@ from identification.tracing.structure_search import (
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
 from identification.tracing.verdict import (
     found_effect,
+    missing_force,
     next_experiment,
     parameters_of,
     residuals_of,
@@ -226,6 +227,7 @@ def _told(
     """All of it as the trace's result; seen: the test logs."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
+    slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(after))
     return Trace(
         verdict=_so_far(judged.verdict, after, not_tried),
         before=judged.before,
@@ -250,6 +252,7 @@ def _told(
         left=judged.rest,
         command_period=rows.recorded.command_period,
         curves=free_curves(choice),
+        missing_force=missing_force(before, after, seen or logs, slowest),
     )
 
 

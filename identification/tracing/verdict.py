@@ -7,6 +7,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.estimates import beside_in, of_effect
 from identification.estimation.imposed_motion import imposed_estimates
+from identification.estimation.latent_force import latent_forces
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
@@ -22,12 +23,13 @@ from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
 from identification.tracing.regression.stepwise import Choice, Step, explained_part
-from identification.tracing.remaining_structure import signals_at
+from identification.tracing.remaining_structure import signals_at, signals_of
 from identification.tracing.result import (
     Change,
     Dependence,
     EffectRival,
     FoundEffect,
+    MissingForce,
     Residual,
     TraceVerdict,
 )
@@ -207,6 +209,35 @@ def residuals_of(
             )
         )
     return tuple(out)
+
+
+def missing_force(
+    before: FittedStructure, after: FittedStructure, logs: Sequence[MotionLog], slowest: float
+) -> MissingForce | None:
+    """The force that either model lacks on these logs, above a speed [m/s]; None where no body
+    slides."""
+    was = latent_forces(before.plant, logs, slowest)
+    if not any(np.any(one.slides) for one in was.logs):
+        return None
+    now = latent_forces(after.plant, logs, slowest) if after is not before else was
+    every: dict[str, list[Array]] = {}
+    t, number, offset = [], [], 0.0
+    left: list[tuple[Array, Array, Array]] = []
+    for i, (one, old, new) in enumerate(zip(logs, was.logs, now.logs, strict=True)):
+        at = np.flatnonzero(old.slides & new.slides)
+        t.append(offset + one.log["t"][at] - one.log["t"][0])
+        number.append(np.full(len(at), float(i)))
+        offset += one.log.duration
+        left.append((-old.force[at], -new.force[at], new.sd[at]))
+        for name, values in signals_of(one).items():
+            every.setdefault(name, []).append(values[at])
+    signals = {k: np.concatenate(v) for k, v in every.items() if len(v) == len(logs)}
+    old_force, new_force, sd = (np.concatenate(parts) for parts in zip(*left, strict=True))
+    sliding = Residual(
+        MECHANICAL, np.concatenate(t), np.concatenate(number), old_force, new_force, sd,
+        {k: v for k, v in signals.items() if len(v) and np.ptp(v) > 0},
+    )  # fmt: skip
+    return MissingForce(was, now, sliding)
 
 
 def run_residual(

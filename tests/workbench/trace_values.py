@@ -6,8 +6,10 @@ from functools import cache
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.estimates import of_effect
+from identification.estimation.latent_force import LatentForce, LatentForces
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
@@ -17,6 +19,7 @@ from identification.tracing.result import (
     EffectRival,
     Errors,
     FoundEffect,
+    MissingForce,
     Residual,
     Trace,
     TraceVerdict,
@@ -75,6 +78,22 @@ def residual(equation: str, keys: Sequence[str]) -> Residual:
     return Residual(equation, t, np.floor(t / 20.1), before, after, noise, signals)
 
 
+def missing_force(keys: Sequence[str]) -> MissingForce:
+    """What the rows of `residual` say of two logs, over time."""
+    sliding = residual("mechanical", keys)
+
+    def of(left: Array, sigma: float) -> LatentForces:
+        parts = [
+            LatentForce(sliding.t[own] % 20.0, -left[own], 0.01 + 0.0 * left[own],
+                        np.ones(np.count_nonzero(own), dtype=np.bool_), 0.0 * left[own])
+            for own in (sliding.log == 0.0, sliding.log == 1.0)
+        ]  # fmt: skip
+        return LatentForces(sigma, 0.06, tuple(parts))
+
+    before, after = of(sliding.before, 1.5), of(0.01 * sliding.after, 1e-3)
+    return MissingForce(before, after, replace(sliding, after=0.01 * sliding.after))
+
+
 def trace_of(
     verdict: TraceVerdict = "effect", keys: Sequence[str] = ("stribeck",), *, actuator: bool = False
 ) -> Trace:
@@ -114,6 +133,7 @@ def trace_of(
         residuals=tuple(residuals),
         remarks=("a remark of the trace",),
         complete=verdict != "unknown",
+        missing_force=missing_force(keys),
     )
 
 

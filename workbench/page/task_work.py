@@ -24,6 +24,7 @@ from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE
 from workbench.registry.bench import TaskKind
 from workbench.report.fit import fit
+from workbench.report.missing_force import missing_over_time
 from workbench.report.model_tables import (
     MODEL_HEAD,
     fit_lines,
@@ -49,7 +50,7 @@ from workbench.steps.validate import validate, validation_document
 
 MODEL_SHARE = 0.9  # of the bar, for the model; the rest for its design
 LAST_STAGES = {"designing": (MODEL_SHARE, 0.95), "validating": (0.95, 1.0)}
-MOST_PICTURES = 3  # of a trace: residuals against the signals that explain them
+MOST_PICTURES = 3  # of a trace: what is missing, over time and against what explains it
 WORK_STAGES = {"identify": IDENTIFY_STAGES, "trace": TRACE_STAGES}
 
 
@@ -125,8 +126,9 @@ def _traced(sources: Sources, course: Course) -> Made:
     }
     documents = {"trace": trace_document(found), "model": model_document(model)}
     command = model.rig.command_unit
-    shown = pictures(found.trace)[:MOST_PICTURES]
-    return model, documents, result, [against_signal(one, rotary, command) for one in shown]
+    shown = missing_over_time(found.trace, rotary, [one.file for one in found.train])
+    shown += [against_signal(one, rotary, command) for one in pictures(found.trace)]
+    return model, documents, result, shown[:MOST_PICTURES]
 
 
 def _notes(remarks: Sequence[str], logs: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
+from workbench.report.missing_force import missing_chart, missing_over_time
 from workbench.report.notes import report_notes
 from workbench.report.page import Section, lines_section, table_section
 from workbench.report.response import over_frequency
@@ -54,10 +55,15 @@ def traced_view(traced: Traced) -> View:
 
 
 def _main_chart(traced: Traced) -> Chart:
-    """The residual against the signal that explains it, else the friction before and after."""
+    """What is missing against the signal that explains it, else over time, else the friction before
+    and after."""
     drawn, rig = pictures(traced.trace), traced.model.rig
     if drawn:
         return signal_chart(drawn[0], traced.model.rotary, rig.command_unit)
+    if traced.trace.missing_force is not None:
+        return missing_chart(
+            traced.trace, traced.trace.missing_force, traced.model.rotary, _unseen(traced)
+        )
     return friction_chart(traced)
 
 
@@ -65,7 +71,8 @@ def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
     drawn = pictures(found)
     logs = [source.file for source in traced.train]
-    sections = [*_drawn(traced, drawn), *_hidden(traced, drawn)]
+    sections = missing_over_time(found, model.rotary, _unseen(traced))
+    sections += [*_drawn(traced, drawn), *_hidden(traced, drawn)]
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
     errors = errors_table(found, model.rotary, bool(traced.test))
@@ -90,11 +97,18 @@ def _sections(traced: Traced) -> list[Section]:
 
 
 def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
-    """The residual of each equation against every signal that explains it, then over time."""
+    """What is left of each equation against every signal that explains it, then over time."""
     model, logs = traced.model, [source.file for source in traced.train]
     out = [against_signal(picture, model.rotary, model.rig.command_unit) for picture in drawn]
     of = {picture.residual.equation: picture.residual for picture in drawn}
+    if traced.trace.missing_force is not None:  # the report begins with it
+        of.pop("mechanical", None)
     return [*out, *(over_time(residual, model.rotary, logs) for residual in of.values())]
+
+
+def _unseen(traced: Traced) -> list[str]:
+    """Names of the logs that the model has not seen, or of the others where there are none."""
+    return [source.file for source in traced.test or traced.train]
 
 
 def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:

@@ -83,7 +83,7 @@ def in_equation(effect: Effect) -> Equation | None:
 
 def pictures(found: Trace) -> list[Picture]:
     """What to draw: each effect against its signal, and what is left against those unexplained."""
-    residuals = {r.equation: r for r in found.residuals}
+    residuals = {r.equation: r for r in shown_residuals(found)}
     out: list[Picture] = []
     for e in found.effects:
         equation = in_equation(e.effect)
@@ -103,6 +103,14 @@ def pictures(found: Trace) -> list[Picture]:
     if rest is not None and all(_place(p) != _place(rest) for p in out):
         out.append(rest)
     return _once(out)
+
+
+def shown_residuals(found: Trace) -> list[Residual]:
+    """What is left of each equation: of motion, the force that is missing while the body slides."""
+    if found.missing_force is None:
+        return list(found.residuals)
+    others = (one for one in found.residuals if one.equation != "mechanical")
+    return [found.missing_force.sliding, *others]
 
 
 def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> Picture:
@@ -146,11 +154,11 @@ def _place(picture: Picture) -> tuple[str, str]:
 
 def _unexplained(found: Trace) -> Picture | None:
     """What no effect explains, or (where there is no effect) the residual that is largest."""
-    wanted = found.unknown.depends_on
-    if not found.residuals or (found.effects and not wanted):
+    wanted, residuals = found.unknown.depends_on, shown_residuals(found)
+    if not residuals or (found.effects and not wanted):
         return None
-    having = [r for r in found.residuals if set(wanted) & set(r.signals)]
-    residual = max(having or found.residuals, key=_in_noise)
+    having = [r for r in residuals if set(wanted) & set(r.signals)]
+    residual = max(having or residuals, key=_in_noise)
     if found.unknown.swing > 0.0 and "t" in residual.signals:
         folded = folded_at(residual, found.unknown.swing)
         return Picture(folded, "phase", None, folded.before, "before", None)

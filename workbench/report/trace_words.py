@@ -41,15 +41,17 @@ def trace_sentence(traced: Traced) -> str:
 
 def _of_friction(found: Trace) -> str:
     """The force that is missing on the held-out logs, as a share of friction."""
-    before, after = (found.missing(one["test"]) for one in (found.before, found.after))
-    if before is None or after is None:
+    if found.missing is None:
         return ""
+    before, after = found.missing
     if not found.effects:
-        return f" Force missing: {_share(after)} of friction."
-    return f" Force missing: {_share(before)} of friction before, {_share(after)} after."
+        return f" Force missing: {share_of_friction(after)} of friction."
+    was, now = share_of_friction(before), share_of_friction(after)
+    return f" Force missing: {was} of friction before, {now} after."
 
 
-def _share(part: float) -> str:
+def share_of_friction(part: float) -> str:
+    """A part of the Coulomb level as text [%]."""
     return f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
 
 

@@ -14,14 +14,10 @@ from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING
 from identification.model.plant import Plant
 from identification.signals.differentiate import Motion, differentiate
+from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import dead_time
-from workbench.steps.predicted_force import (
-    of_body,
-    opposing_force,
-    refuse_missing,
-    with_motor_force,
-)
+from workbench.steps.predicted_force import refuse_missing
 
 LINEAR_EFFECTS = frozenset({"compliance", "input_delay"})  # they stay in the response
 RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest
@@ -74,7 +70,7 @@ def freed(log: Log, model: Model) -> Freed:
     moved = of_body(with_motor_force(log, plant), plant)
     motion, late = differentiate(moved["y"], log.h), dead_time(model)
     d = _direction(motion, plant)
-    opposed, slides = opposing_force(moved, plant, motion, d), d != 0
+    opposed, slides = opposing_force(moved, plant, motion.y, motion.v, d), d != 0
     if zero_order_hold:
         opposed, slides = _over_period(opposed), slides & _following(slides)
     y, F = np.asarray(moved["y"]), np.asarray(moved["F"])

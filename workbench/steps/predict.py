@@ -19,15 +19,14 @@ from identification.model.surroundings import Surroundings
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
+from identification.simulation.inverse_dynamics import of_body, with_motor_force
 from workbench.documents.model import Model, used
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import (
     force_by_model,
-    of_body,
     refuse_missing,
     seen_moving,
     with_applied_force,
-    with_motor_force,
 )
 
 if TYPE_CHECKING:

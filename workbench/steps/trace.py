@@ -204,10 +204,9 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             "explained": found.unknown.explained,
         },
         "complete": found.complete,
-        "missing_of_friction": {
-            "before": found.missing(found.before["test"]),
-            "after": found.missing(found.after["test"]),
-        },
+        "missing_of_friction": dict(
+            zip(("before", "after"), found.missing or (None, None), strict=True)
+        ),
         "left": {"share": found.left.share, "depends_on": list(found.left.depends_on)},
         "drift": [asdict(change) for change in found.drift],
         "next_experiment": found.next_experiment,

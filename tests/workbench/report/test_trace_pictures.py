@@ -1,10 +1,14 @@
-"""Pictures of a trace: a vibration is drawn over its own period."""
+"""Pictures of a trace: the missing force with its band, a vibration over its own period."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from identification.tracing.result import Residual
-from workbench.report.trace_pictures import folded_at
+from tests.workbench.trace_values import trace_of
+from workbench.report.missing_force import missing_chart, missing_over_time
+from workbench.report.trace_pictures import folded_at, pictures
 
 
 def test_a_swing_is_drawn_over_its_period_in_the_first_log() -> None:
@@ -17,3 +21,34 @@ def test_a_swing_is_drawn_over_its_period_in_the_first_log() -> None:
     assert len(found.before) == 901 and phase.min() >= 0.0 and phase.max() < 1.0
     assert found.before == pytest.approx(np.sin(2 * np.pi * phase), abs=1e-9)
     assert "phase" not in whole.signals
+
+
+def test_the_missing_force_is_drawn_before_and_after_with_its_band() -> None:
+    found = trace_of("effect", ("stribeck",))
+    assert found.missing_force is not None and found.missing is not None
+    (panel,) = missing_chart(found, found.missing_force, False, ["a.csv", "b.csv"]).panels
+    before, after = panel.lines
+    first = found.missing_force.before.logs[0]
+    assert np.std(before.y) > 10.0 * np.std(after.y)
+    assert before.y[: len(first.t)] == pytest.approx(-first.force)
+    assert panel.areas[0].high - panel.areas[0].low == pytest.approx(2 * 1.96 * 0.01)
+    assert panel.y_range is not None and panel.y_range[1] > np.max(np.abs(before.y))
+    assert len(panel.marks) == 1
+    before_share, after_share = found.missing
+    (section,) = missing_over_time(found, False, ["a.csv", "b.csv"])
+    assert "of friction before" in str(section.html)
+    assert before_share > 10.0 * after_share
+
+
+def test_what_is_missing_against_its_signal_is_the_latent_force() -> None:
+    found = trace_of("effect", ("stribeck",))
+    assert found.missing_force is not None
+    (one,) = [picture for picture in pictures(found) if picture.effect is not None]
+    assert one.residual is found.missing_force.sliding and one.signal == "v"
+    without = pictures(replace(found, missing_force=None))[0]
+    assert without.residual is found.residuals[0]
+
+
+def test_where_no_body_slides_no_force_is_drawn() -> None:
+    found = replace(trace_of("none", ()), missing_force=None)
+    assert found.missing is None and missing_over_time(found, False, []) == []

@@ -13,6 +13,7 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log, Rig
 from identification.model.plant import Motor
 from identification.signals.excitation import Steps
+from identification.simulation.inverse_dynamics import of_body
 from tests.chain import EMPS, designed, model_of, short_recipe
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import exact
@@ -30,7 +31,6 @@ from workbench.logs.runs import read_log
 from workbench.steps.closed_loop import effects_left_out, in_the_loop, run_loop
 from workbench.steps.demo import recipe_of, simulated_log
 from workbench.steps.predict import Prediction, predict
-from workbench.steps.predicted_force import of_body
 from workbench.steps.simulate import record, truth
 
 PRESSURES = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=5e5)

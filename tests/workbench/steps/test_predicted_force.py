@@ -9,9 +9,10 @@ from identification.log import Log
 from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
+from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.documents.model import Model
-from workbench.steps.predicted_force import force_by_model, force_needed, seen_moving
+from workbench.steps.predicted_force import force_by_model, seen_moving
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
 

@@ -19,6 +19,7 @@ from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.signals.differentiate import differentiate
+from identification.simulation.inverse_dynamics import force_needed, opposing_force
 from tests.chain import model_of
 from tests.made import made_once
 from workbench.cards.card import card_from
@@ -33,7 +34,6 @@ from workbench.report.response import (
     response_view,
 )
 from workbench.steps.linear_force import freed, of_load, of_model
-from workbench.steps.predicted_force import force_needed, opposing_force
 from workbench.steps.response import (
     Responded,
     curves_of,
@@ -199,7 +199,7 @@ def test_what_is_opposed_is_the_needed_force_but_for_the_linear_part() -> None:
     d = np.where(motion.v >= p.dv_p, 1.0, np.where(motion.v <= p.dv_n, -1.0, 0.0))
     needed = force_needed(log, plant, Smoothing())
     linear = p.m * motion.a + 0.5 * (p.F_vp + p.F_vn) * motion.v
-    opposed = opposing_force(log, plant, motion, d)
+    opposed = opposing_force(log, plant, motion.y, motion.v, d)
     np.testing.assert_allclose(opposed[d != 0], (needed - linear)[d != 0], atol=1e-9)
 
 

@@ -230,9 +230,10 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
         traced(shown)
     )
     assert "On stretches left out, error of" in trace_sentence(traced(shown, tested=False))
-    assert "Force missing: 0.079 % of friction before, " in trace_sentence(traced(shown))
+    assert "Force missing: 0.34 % of friction before, " in trace_sentence(traced(shown))
     none = {where: Errors(None, None, None, None) for where in before}
-    assert trace_sentence(traced(replace(found, before=none))).endswith("(valve overlap).")
+    unseen = replace(found, before=none, missing_force=None)
+    assert trace_sentence(traced(unseen)).endswith("(valve overlap).")
 
 
 def test_rows_of_the_tables() -> None:
@@ -295,7 +296,7 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
     found = traced(trace_of(verdict, keys))
     html = checked(traced_view(found).page(), figures)
     assert re.sub("[<>'&]", "", trace_sentence(found))[:20] in html
-    wanted = ["residual [N]", "95 % of its points in the band", "moving towards +", "Parameters"]
+    wanted = ["residual [N]", "with its 95 % band", "moving towards +", "Parameters"]
     if keys:
         wanted += ["Rivals, by the force", "Armstrong-Helouvry", "fitted: stribeck"]
     if len(keys) > 1:
@@ -309,16 +310,16 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
 
 
 def test_an_effect_without_a_picture_is_named() -> None:
-    html = checked(traced_view(traced(trace_of("effect", ("rising_stiction",)))).page(), 2)
+    html = checked(traced_view(traced(trace_of("effect", ("rising_stiction",)))).page(), 3)
     assert "rising stiction shows in neither equation" in html
-    assert pictures(replace(trace_of(), residuals=())) == []
+    assert pictures(replace(trace_of(), residuals=(), missing_force=None)) == []
 
 
 def test_the_free_run_is_drawn_before_and_after() -> None:
     found = trace_of("effect", ("rising_stiction",))
     t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
     run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
-    html = checked(traced_view(traced(replace(found, run=run))).page(), 3)
+    html = checked(traced_view(traced(replace(found, run=run))).page(), 4)
     assert "rising stiction shows in neither" in html and "residual [mm]" in html
     assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
     assert "residual [rad]" in traced_view(traced(replace(found, run=run), rotary=True)).page()

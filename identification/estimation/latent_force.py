@@ -1,0 +1,197 @@
+"""The force that a model lacks, over time, with its band: what moves the body beside model and log.
+
+The body under its measured force F, its modelled friction f and a force d that no model has:
+
+    m dv/dt = F(t) - f(y, v, t) - F_v v + d,   dd/dt = -d/tau + noise,   rms(d) = sigma          (1)
+
+Along the measured motion f is known, so y, v, d are a linear Gaussian chain of which y is measured
+(`signals/kalman`): d is smoothed, with its standard deviation, and what is left of y is white.
+Where the body rests, or its direction is not significant, friction takes whatever is applied: no
+force is seen there, and the band is as wide as d may be. Where a rig prescribes the motion the
+force is measured instead, and d is what it leaves of the equation. sigma and tau are those of
+largest likelihood. Sources: latent force models, Alvarez, Luengo, Lawrence, IEEE TPAMI 35 (2013)
+2693; Sarkka, Solin, Applied Stochastic Differential Equations (2019), ch. 10, 12; of bodies with
+friction, Marino, Cicirello, arXiv 2303.03858.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.optimize import minimize_scalar
+
+from identification.arrays import Array, BoolArray
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.model.plant import Plant
+from identification.signals.kalman import Chain, N, innovations, smoothed
+from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
+
+MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
+FEWEST_IN_MEMORY = 5  # samples of tau, below which d would pass for the sensor's noise
+LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # of the force's range, that sigma may be
+LEAST_NOISE_F = 1e-6  # of the force's range, to which any force is uncertain
+SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
+CLOSE_ENOUGH = 0.02  # of log sigma
+FORCE, VELOCITY = 2, 1  # states beside the position
+
+
+@dataclass(frozen=True, eq=False)
+class LatentForce:
+    """The force on a log's body that a model lacks, towards +y.
+
+    t [s], force, sd [N], slides (where the log tells of it), each (n,); log_density (n,): of each
+    measured sample given those before it, 0 where it is not judged.
+    """
+
+    t: Array
+    force: Array
+    sd: Array
+    slides: BoolArray
+    log_density: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LatentForces:
+    """The latent forces of several logs under one sigma [N] and one memory tau [s]."""
+
+    sigma: float
+    tau: float
+    logs: tuple[LatentForce, ...]
+
+    @property
+    def rms(self) -> float:
+        """Expected root mean square force while the bodies slide [N]; 0 where none does."""
+        square = [(one.force**2 + one.sd**2)[one.slides] for one in self.logs]
+        every = np.concatenate(square) if square else np.zeros(0)
+        return float(np.sqrt(np.mean(every))) if len(every) else 0.0
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of all samples measured while the bodies slide [nats]."""
+        return float(sum(np.sum(one.log_density) for one in self.logs))
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What a plant says of one log's chain: measured z with variance R, both (n,), input c (n, 3),
+    transition but for d's memory and its size. Of prescribed motion z is what is left of the force.
+    """
+
+    one: MotionLog
+    z: Array
+    R: Array
+    slides: BoolArray
+    free: BoolArray
+    c: Array
+    A: Array
+    Q: Array
+    Q_free: Array
+
+    def chain(self, sigma: float, tau: float) -> Chain:
+        """The chain under a latent force of rms sigma [N] and memory tau [s]."""
+        kept = float(np.exp(-self.one.log.h / tau))
+        at = 0 if self.one.imposed else FORCE
+        A, Q, Q_free = self.A.copy(), self.Q.copy(), self.Q_free.copy()
+        A[at, at] = kept
+        Q[at, at] = Q_free[at, at] = sigma**2 * (1.0 - kept**2)
+        A_free = np.diag(np.diag(A))
+        if not self.one.imposed:
+            A_free[0, VELOCITY], A_free[VELOCITY, VELOCITY] = self.one.log.h, 1.0
+        P0 = np.array([self.R[0], self.Q_free[1, 1] * len(self.z), sigma**2])
+        if self.one.imposed:
+            P0 = np.array([sigma**2, 0.0, 0.0])
+        return Chain(A, Q, A_free, Q_free, self.c, P0)
+
+    def log_density(self, sigma: float, tau: float) -> Array:
+        """Of each sample measured while the body slides, given those before it, (n,)."""
+        seen = self.slides if self.one.imposed else np.ones_like(self.slides)
+        found = innovations(self.z, self.R, seen, self.free, self.chain(sigma, tau))
+        return np.where(self.slides, found, 0.0)
+
+    def latent(self, sigma: float, tau: float) -> LatentForce:
+        """d of this log."""
+        seen = self.slides if self.one.imposed else np.ones_like(self.slides)
+        at = 0 if self.one.imposed else FORCE
+        chain = self.chain(sigma, tau)
+        force, sd = smoothed(self.z, self.R, seen, self.free, chain, at)
+        t = np.asarray(self.one.log["t"])
+        return LatentForce(t, force, sd, self.slides, self.log_density(sigma, tau))
+
+
+def latent_forces(plant: Plant, logs: Sequence[MotionLog], slowest: float) -> LatentForces:
+    """What a plant lacks on each of the logs, sigma and tau those of largest likelihood on them.
+
+    slowest [m/s]: speed up to which friction is not that of sliding. Equation (1).
+    """
+    known = [_known(plant, one, slowest) for one in logs]
+    scale = max(float(np.max(np.abs(one.log["F"]))) for one in logs)
+    shortest = FEWEST_IN_MEMORY * max(one.log.h for one in logs)
+    memories = [tau for tau in MEMORIES if tau > shortest] or [shortest]
+
+    def best(tau: float) -> tuple[float, float]:
+        def cost(log_sigma: float) -> float:
+            sigma = float(np.exp(log_sigma))
+            return -float(sum(np.sum(one.log_density(sigma, tau)) for one in known))
+
+        bounds = float(np.log(LEAST_SIGMA * scale)), float(np.log(MOST_SIGMA * scale))
+        found: Any = minimize_scalar(
+            cost, bounds=bounds, method="bounded", options={"xatol": CLOSE_ENOUGH}
+        )
+        return float(found.fun), float(np.exp(found.x))
+
+    (_, sigma), tau = min((best(tau), tau) for tau in memories)
+    return LatentForces(sigma, tau, tuple(one.latent(sigma, tau) for one in known))
+
+
+def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
+    """What the plant says of a log's chain."""
+    log = of_body(with_motor_force(one.log, plant), plant)
+    if log is not one.log:
+        one = replace(one.again(log), noise_y=one.noise_y, noise_F=one.noise_F)
+    y, v, a, d = (one.signals[name] for name in ("smooth", "v", "a", "d"))
+    opposed, F, n = opposing_force(log, plant, y, v, d), np.asarray(log["F"]), len(log)
+    slides = _slides(one, slowest)
+    p, viscous = plant.friction, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
+    noise_F = max(one.noise_F, LEAST_NOISE_F * float(np.max(np.abs(F))))
+    if one.imposed:
+        left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
+        R = np.full(n, noise_F**2)
+        return _Known(one, left, R, slides, ~slides, np.zeros((n, N)), none, none, none)
+    free = ~(slides & np.append(slides[1:], False))
+    force = (F if one.held else _over_sample(F)) - _over_sample(opposed)
+    push, A = _pushed(p.m, viscous, log.h)
+    c = np.where(free, 0.0, force)[:, np.newaxis] * push
+    # Where its direction is open the body may go as any force of the log could send it.
+    any_force = float(np.max(np.abs(F))) + max(p.F_sp, -p.F_sn)
+    sent = np.array([0.5 * log.h, 1.0, 0.0]) * any_force * log.h / p.m
+    by_noise, by_any = (np.outer(one, one) for one in (noise_F * push, sent))
+    R = one.position_sd**2
+    return _Known(one, np.asarray(log["y"]), R, slides, free, c, A, by_noise, by_any)
+
+
+def _slides(one: MotionLog, slowest: float) -> BoolArray:
+    """Samples around which the body slides one way, as far as the velocity is smoothed, (n,)."""
+    v = np.where(one.signals["d"] != 0, one.signals["v"], 0.0)
+    around = 2 * (one.sliding.length // (2 * SHARE_OF_WINDOW)) + 1
+    up, down = minimum_filter1d(v, around), maximum_filter1d(v, around)
+    return np.asarray((up > slowest) | (down < -slowest))
+
+
+def _over_sample(values: Array) -> Array:
+    """Mean of each value and the next, (n,)."""
+    return np.asarray(0.5 * (values + np.append(values[1:], values[-1:])))
+
+
+def _pushed(m: float, viscous: float, h: float) -> tuple[Array, Array]:
+    """What a force of 1 N over a step does to position, velocity and itself (3,), and the
+    transition (3, 3) of the three: m dv/dt = F - viscous v, solved exactly."""
+    rate = viscous / m
+    coasted = h if rate == 0.0 else -float(np.expm1(-rate * h)) / rate
+    # The difference h - coasted by its series where rounding would take it.
+    slow = abs(rate * h) < 1e-4
+    shift = 0.5 * h**2 / m * (1.0 - rate * h / 3.0) if slow else (h - coasted) / viscous
+    push = np.array([shift, coasted / m, 0.0])
+    A = np.array([[1.0, coasted, push[0]], [0.0, 1.0 - rate * coasted, push[1]], [0.0, 0.0, 1.0]])
+    return push, A

@@ -1,0 +1,83 @@
+"""The force that a model lacks, against the one that was hidden in the log."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.estimation.latent_force import LatentForces, latent_forces
+from identification.estimation.regression.equation_rows import motion_log
+from identification.log import Log
+from identification.model.plant import Plant
+from tests.identification.motor_logs import NINE, made, plant, seen
+from tests.identification.plants import made_log, table
+
+SLOWEST = 0.012  # m/s, above the bands of these plants
+SPRING = {"spring": {"k": 60.0}}
+LEVEL = max(NINE.F_cp, NINE.F_cn)
+
+
+def of_motor(log: Log, of: Plant) -> LatentForces:
+    return latent_forces(of, [seen(log)], SLOWEST)
+
+
+def test_nothing_is_missing_of_the_machine_itself() -> None:
+    assert of_motor(made(1), plant()).rms < 1e-3 * LEVEL
+    assert of_motor(made(2, SPRING), plant(SPRING)).rms < 1e-3 * LEVEL
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_spring_that_the_model_lacks_is_seen_with_its_band(seed: int) -> None:
+    log = made(seed, SPRING)
+    (one,) = of_motor(log, plant()).logs
+    true = -60.0 * np.asarray(log["y"])
+    at = one.slides
+    assert np.std((one.force - true)[at]) < 0.1 * np.std(true[at])
+    inside = np.abs(one.force - true) <= 1.96 * one.sd
+    assert 0.85 < np.mean(inside[at]) <= 1.0
+
+
+def test_the_right_effect_gains_likelihood_and_a_wrong_one_loses_it() -> None:
+    log = made(5, SPRING)
+    lacking, right = (of_motor(log, plant(effects)) for effects in (None, SPRING))
+    wrong = of_motor(log, plant({"spring": {"k": -60.0}}))
+    assert wrong.log_likelihood < lacking.log_likelihood < right.log_likelihood - 100.0
+    assert right.rms < 0.01 * lacking.rms < 0.01 * wrong.rms
+
+
+def test_a_body_at_rest_shows_no_force() -> None:
+    found = of_motor(made(6, SPRING), plant())
+    (one,) = found.logs
+    resting = np.convolve(one.slides, np.ones(21), "same") == 0
+    assert np.any(resting) and np.any(one.slides)
+    assert np.median(one.sd[resting]) > 2.0 * np.median(one.sd[one.slides])
+    assert np.max(one.sd) <= 1.001 * found.sigma
+    assert not np.any(one.log_density[~one.slides])
+
+
+def test_friction_that_is_twice_too_high_is_what_is_missing() -> None:
+    p = table(1)
+    log = motion_log(made_log(p, 3), held=False, by_command=True)
+    double = replace(p, F_cp=2.0 * p.F_cp, F_cn=2.0 * p.F_cn)
+    found = latent_forces(Plant(double), [log], 1.2 * max(p.dv_p, -p.dv_n))
+    (one,) = found.logs
+    up, down = (one.slides & (np.sign(log.signals["v"]) == way) for way in (1.0, -1.0))
+    assert np.median(one.force[up]) == pytest.approx(p.F_cp, rel=0.03)
+    assert np.median(one.force[down]) == pytest.approx(-p.F_cn, rel=0.03)
+    assert latent_forces(Plant(p), [log], 1.2 * max(p.dv_p, -p.dv_n)).rms < 2e-3 * p.F_cp
+
+
+def test_of_prescribed_motion_the_force_alone_is_told() -> None:
+    rng, h = np.random.default_rng(0), 2e-3
+    t = h * np.arange(8000, dtype=np.float64)
+    y = 0.05 * np.sin(2.0 * np.pi * 0.5 * t)
+    v, a = np.gradient(y, h), -((np.pi) ** 2) * y
+    missing = 0.8 * np.sin(2.0 * np.pi * y / 0.02)
+    force = NINE.m * a + np.where(v > 0, NINE.F_cp + NINE.F_vp * v, -NINE.F_cn + NINE.F_vn * v)
+    noisy = y + 1e-6 * rng.standard_normal(len(t))
+    log = Log("rig", {"t": t, "y": noisy, "F": force - missing + 0.02 * rng.standard_normal(8000)})
+    one = motion_log(log, held=False, by_command=False, imposed=True)
+    found = latent_forces(Plant(NINE), [one], 0.02)
+    of = found.logs[0]
+    assert np.std((of.force - missing)[of.slides]) < 0.05
+    assert found.rms == pytest.approx(float(np.std(missing)), rel=0.1)
