@@ -43,6 +43,7 @@ from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
+from workbench.steps.missing_force import missing_force
 from workbench.steps.predict import fitted_run
 from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import Traced, trace_document, trace_sources
@@ -110,7 +111,8 @@ def _identified(sources: Sources, course: Course) -> Made:
         "report": identified_view(found).page(),
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
-    drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs))
+    missing = missing_force(model, [one.log for one in found.sources])
+    drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs, missing))
     return model, {"model": model_document(model)}, result, drawn
 
 

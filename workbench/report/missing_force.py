@@ -41,23 +41,31 @@ def missing_chart(found: Trace, force: MissingForce, rotary: bool, logs: Sequenc
     drawn: list[tuple[LatentForces, str, Colour]] = [(force.after, "model", "model")]
     if found.effects:
         drawn = [(force.before, "before", "before"), (force.after, "after", "model")]
-    lines, areas = [], []
-    for of, name, colour in drawn:
-        t, middle, wide = (np.concatenate(parts) for parts in zip(*_in_a_row(of), strict=True))
-        lines.append(Line(name, t, unit.factor * middle, colour))
-        low, high = unit.factor * (middle - wide), unit.factor * (middle + wide)
-        areas.append(Area(f"{name}, 95 % band", t, low, high, colour))
+    parts = [force_lines(of, name, colour, unit.factor) for of, name, colour in drawn]
+    lines, areas = ([each for part in own for each in part] for own in zip(*parts, strict=True))
+    level = max(found.plant.friction.F_cp, found.plant.friction.F_cn)
     ends = np.cumsum([one.t[-1] - one.t[0] for one in force.after.logs])
     starts = [0.0, *ends[:-1].tolist()]
     names = logs if len(logs) == len(starts) > 1 else ()
     panel = Panel(
         "time, logs in a row [s]" if len(starts) > 1 else "time [s]",
         f"force that is missing [{unit.name}]", lines, areas=areas,
-        marks=[Mark(at, "x") for at in starts[1:]], y_range=_shown(found, force, unit.factor),
+        marks=[Mark(at, "x") for at in starts[1:]],
+        y_range=range_of(force.before, level, unit.factor),
     )  # fmt: skip
-    parts = [Part(*one) for one in zip(names, starts, ends.tolist(), strict=False)]
+    named = [Part(*one) for one in zip(names, starts, ends.tolist(), strict=False)]
     what = "force that the model lacks against time, with its 95 % band"
-    return Chart("trace-missing-force", what, [panel], parts=parts)
+    return Chart("trace-missing-force", what, [panel], parts=named)
+
+
+def force_lines(
+    of: LatentForces, name: str, colour: Colour, factor: float = 1.0
+) -> tuple[list[Line], list[Area]]:
+    """The force of all logs in a row, applied less modelled, times `factor`, and its 95 % band."""
+    t, middle, wide = (np.concatenate(parts) for parts in zip(*_in_a_row(of), strict=True))
+    low, high = factor * (middle - wide), factor * (middle + wide)
+    line = Line(name, t, factor * middle, colour)
+    return [line], [Area(f"{name}, 95 % band", t, low, high, colour)]
 
 
 def _in_a_row(of: LatentForces) -> Iterator[tuple[Array, Array, Array]]:
@@ -69,9 +77,9 @@ def _in_a_row(of: LatentForces) -> Iterator[tuple[Array, Array, Array]]:
         begin = float(t[-1])
 
 
-def _shown(found: Trace, force: MissingForce, factor: float) -> tuple[float, float]:
-    """Range that holds all but the rarest of what is missing while the body slides."""
-    level = max(found.plant.friction.F_cp, found.plant.friction.F_cn)
-    largest = float(np.quantile(np.abs(force.sliding.before), SHOWN_SHARE))
+def range_of(of: LatentForces, level: float, factor: float = 1.0) -> tuple[float, float]:
+    """Range that holds nearly all of the force while the body slides; level [N]: of Coulomb."""
+    slid = np.concatenate([np.abs(one.force[one.slides]) for one in of.logs])
+    largest = float(np.quantile(slid, SHOWN_SHARE)) if len(slid) else 0.0
     top = 1.3 * factor * max(largest, LEAST_RANGE * level, 1e-300)
     return -top, top

@@ -37,6 +37,7 @@ from workbench.report.page import Section, lines_section
 from workbench.report.residual import residual
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
+from workbench.report.trace_words import share_of_friction
 from workbench.report.validation_tables import (
     then_of_validation,
     validation_parts,
@@ -45,6 +46,7 @@ from workbench.report.validation_tables import (
 from workbench.report.view import View
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
+from workbench.steps.missing_force import missing_force, share_of_coulomb
 from workbench.steps.predict import fitted_run
 from workbench.steps.validate import Validation, validation_document
 
@@ -60,7 +62,7 @@ def identified_view(found: Identified) -> View:
     def sections() -> Sequence[Section]:
         said = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
         return (
-            residual(model, sources, runs()),
+            residual(model, sources, runs(), missing),
             parameters_section(model),
             friction_curve(model, found.fit, sources),
             fit(model, sources, runs()),
@@ -68,9 +70,12 @@ def identified_view(found: Identified) -> View:
             lines_section("In words", report_notes(said, logs_of(model))),
         )
 
+    missing = missing_force(model, [one.log for one in sources])
+    share = share_of_coulomb(model, missing)
+    lacks = "" if share is None else f" Force missing: {share_of_friction(share)} of friction."
     return View(
         f"Identification of {model.card}",
-        summary(model),
+        summary(model) + lacks,
         model_parts(model, found.remarks),
         lambda: model_document(model),
         {"model.json": lambda: model_document(model)},

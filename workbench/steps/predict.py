@@ -99,7 +99,7 @@ def predict(
         raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
     plant = model.simulated
     refuse_missing(log, plant.effects)
-    log = _of_one_instant(with_motor_force(with_applied_force(log, model.rig), plant), model)
+    log = of_one_instant(with_motor_force(with_applied_force(log, model.rig), plant), model)
     body = of_body(log, plant)
     restarts = None if window is None else _restarts(body, window)
     how = Smoothing(held=model.rig.kind == "motor")
@@ -256,7 +256,7 @@ def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
     )
 
 
-def _of_one_instant(log: Log, model: Model) -> Log:
+def of_one_instant(log: Log, model: Model) -> Log:
     """The log with its force at the instants of its position, where its columns are apart and no
     effect of the model says so."""
     if model.lag is None or "input_delay" in model.effects:

@@ -1,0 +1,37 @@
+"""Model + its logs -> the force that the model lacks on them, over time."""
+
+from collections.abc import Sequence
+
+from identification.estimation.latent_force import LatentForces, latent_forces
+from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.structure_fit import ABOVE_BAND
+from identification.log import Log
+from workbench.documents.model import Model
+from workbench.steps.predict import of_one_instant
+from workbench.steps.predicted_force import seen_moving, with_applied_force
+
+
+def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
+    """The latent force of a model on logs of its machine; None where two masses swing behind each
+    other, of which the one body of a latent force is none."""
+    if model.resonance is not None:
+        return None
+    held = model.rig.kind == "motor"
+    given = [of_one_instant(with_applied_force(log, model.rig), model) for log in logs]
+    moved = [
+        motion_log(
+            log, held=held, by_command=False, rotary=model.rotary, imposed=model.prescribed_motion
+        )
+        for log in given
+    ]
+    plants = [seen_moving(model, log) for log in given]
+    bands = [max(plant.friction.dv_p, -plant.friction.dv_n) for plant in plants]
+    return latent_forces(plants[0], moved, ABOVE_BAND * max(bands))
+
+
+def share_of_coulomb(model: Model, found: LatentForces | None) -> float | None:
+    """Root mean square of the latent force as a share of the Coulomb level; None without either."""
+    level = max(model.karnopp.F_cp, model.karnopp.F_cn)
+    if found is None or not any(one.slides.any() for one in found.logs) or not level > 0.0:
+        return None
+    return found.rms / level
