@@ -25,7 +25,7 @@ from scipy.optimize import minimize_scalar
 from identification.arrays import Array, BoolArray
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.model.plant import Plant
-from identification.signals.kalman import Chain, N, innovations, smoothed
+from identification.signals.kalman import Chain, N, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 
 MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
@@ -75,47 +75,39 @@ class LatentForces:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What a plant says of one log's chain: measured z with variance R, both (n,), input c (n, 3),
-    transition but for d's memory and its size. Of prescribed motion z is what is left of the force.
+    """What a plant says of one log's chain, but for size and memory of d, its state `at`.
+
+    z: what is measured, R: its variance, seen: where; slides, free: where d is judged, and where
+    the body may go anywhere, (n,) each.
     """
 
     one: MotionLog
+    at: int
     z: Array
     R: Array
+    seen: BoolArray
     slides: BoolArray
     free: BoolArray
-    c: Array
-    A: Array
-    Q: Array
-    Q_free: Array
+    known: Chain
 
     def chain(self, sigma: float, tau: float) -> Chain:
         """The chain under a latent force of rms sigma [N] and memory tau [s]."""
-        kept = float(np.exp(-self.one.log.h / tau))
-        at = 0 if self.one.imposed else FORCE
-        A, Q, Q_free = self.A.copy(), self.Q.copy(), self.Q_free.copy()
-        A[at, at] = kept
+        kept, at, of = float(np.exp(-self.one.log.h / tau)), self.at, self.known
+        A, Q, A_free, Q_free, P0 = (x.copy() for x in (of.A, of.Q, of.A_free, of.Q_free, of.P0))
+        A[at, at] = A_free[at, at] = kept
         Q[at, at] = Q_free[at, at] = sigma**2 * (1.0 - kept**2)
-        A_free = np.diag(np.diag(A))
-        if not self.one.imposed:
-            A_free[0, VELOCITY], A_free[VELOCITY, VELOCITY] = self.one.log.h, 1.0
-        P0 = np.array([self.R[0], self.Q_free[1, 1] * len(self.z), sigma**2])
-        if self.one.imposed:
-            P0 = np.array([sigma**2, 0.0, 0.0])
-        return Chain(A, Q, A_free, Q_free, self.c, P0)
+        P0[at] = sigma**2
+        return Chain(A, Q, A_free, Q_free, of.c, P0)
 
     def log_density(self, sigma: float, tau: float) -> Array:
         """Of each sample measured while the body slides, given those before it, (n,)."""
-        seen = self.slides if self.one.imposed else np.ones_like(self.slides)
-        found = innovations(self.z, self.R, seen, self.free, self.chain(sigma, tau))
+        found = log_densities(self.z, self.R, self.seen, self.free, self.chain(sigma, tau))
         return np.where(self.slides, found, 0.0)
 
     def latent(self, sigma: float, tau: float) -> LatentForce:
         """d of this log."""
-        seen = self.slides if self.one.imposed else np.ones_like(self.slides)
-        at = 0 if self.one.imposed else FORCE
         chain = self.chain(sigma, tau)
-        force, sd = smoothed(self.z, self.R, seen, self.free, chain, at)
+        force, sd = smoothed(self.z, self.R, self.seen, self.free, chain, self.at)
         t = np.asarray(self.one.log["t"])
         return LatentForce(t, force, sd, self.slides, self.log_density(sigma, tau))
 
@@ -157,8 +149,8 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     noise_F = max(one.noise_F, LEAST_NOISE_F * float(np.max(np.abs(F))))
     if one.imposed:
         left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
-        R = np.full(n, noise_F**2)
-        return _Known(one, left, R, slides, ~slides, np.zeros((n, N)), none, none, none)
+        known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N))
+        return _Known(one, 0, left, np.full(n, noise_F**2), slides, slides, ~slides, known)
     free = ~(slides & np.append(slides[1:], False))
     force = (F if one.held else _over_sample(F)) - _over_sample(opposed)
     push, A = _pushed(p.m, viscous, log.h)
@@ -166,9 +158,13 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     # Where its direction is open the body may go as any force of the log could send it.
     any_force = float(np.max(np.abs(F))) + max(p.F_sp, -p.F_sn)
     sent = np.array([0.5 * log.h, 1.0, 0.0]) * any_force * log.h / p.m
-    by_noise, by_any = (np.outer(one, one) for one in (noise_F * push, sent))
+    A_free = np.array([[1.0, log.h, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    by_noise, by_any = (np.outer(x, x) for x in (noise_F * push, sent))
     R = one.position_sd**2
-    return _Known(one, np.asarray(log["y"]), R, slides, free, c, A, by_noise, by_any)
+    at_first = np.array([R[0], n * by_any[VELOCITY, VELOCITY], 0.0])
+    known = Chain(A, by_noise, A_free, by_any, c, at_first)
+    y_seen = np.ones_like(slides)
+    return _Known(one, FORCE, np.asarray(log["y"]), R, y_seen, slides, free, known)
 
 
 def _slides(one: MotionLog, slowest: float) -> BoolArray:

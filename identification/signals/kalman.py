@@ -128,7 +128,7 @@ def smoother_kernel(
             _sandwich(step, B, nothing, half)
 
 
-def innovations(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chain) -> Array:
+def log_densities(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chain) -> Array:
     """Log density of each measured z (n,) given those before it, (n,); 0 where none is seen.
 
     R: variance of each; seen, free: (n,). Source: Kalman (1960); prediction-error decomposition,

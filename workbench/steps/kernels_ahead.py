@@ -23,7 +23,10 @@ def compile_fits() -> None:
     from identification.arx.model import fit_arx
     from identification.effects._library import built_in
     from identification.estimation.fit import fit_plant
+    from identification.estimation.latent_force import latent_forces
+    from identification.estimation.regression.equation_rows import motion_log
     from identification.log import Log, Rig
+    from identification.model.plant import Plant
     from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
 
     driven = trial_log(LONG, h=SAMPLE)
@@ -31,7 +34,9 @@ def compile_fits() -> None:
     noise = np.random.default_rng(0).normal(size=(2, len(run.y)))
     seen = {"y": run.y + 1e-6 * noise[0], "F": run.F + 0.1 * noise[1]}
     log = Log("made", {"t": driven["t"], "u": driven["u"], **seen})
-    fit_plant([log], np.random.default_rng(0), rig=Rig("force"))
+    fit = fit_plant([log], np.random.default_rng(0), rig=Rig("force"))
+    moved = motion_log(log, held=False, by_command=False)
+    latent_forces(Plant(fit.friction), [moved], 0.0)
     fit_arx([(driven["u"], run.y)], 2, 1, 1, SAMPLE)
     run_with(HYDRAULIC, driven, typical(built_in()["stribeck"]))
 

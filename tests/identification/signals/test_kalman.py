@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from identification.arrays import Array, BoolArray
-from identification.signals.kalman import Chain, innovations, smoothed
+from identification.signals.kalman import Chain, log_densities, smoothed
 
 H, LENGTH = 0.01, 40
 
@@ -51,7 +51,7 @@ def test_likelihood_and_smoothed_state_are_those_of_the_dense_gaussian(
     at = np.flatnonzero(seen)
     of_z = (cov[:, :, 0, 0] + np.diag(R))[np.ix_(at, at)]
     whole = multivariate_normal(mean[at, 0], of_z, allow_singular=True).logpdf(z[at])
-    assert np.sum(innovations(z, R, seen, free, of)) == pytest.approx(whole, rel=1e-5, abs=1e-3)
+    assert np.sum(log_densities(z, R, seen, free, of)) == pytest.approx(whole, rel=1e-5, abs=1e-3)
     for which in range(3):
         gain = np.linalg.solve(of_z, cov[at, :, 0, which]).T
         expected = mean[:, which] + gain @ (z[at] - mean[at, 0])
@@ -66,4 +66,4 @@ def test_likelihood_and_smoothed_state_are_those_of_the_dense_gaussian(
 def test_what_is_not_measured_has_no_density() -> None:
     rng = np.random.default_rng(0)
     of, nothing = chain(LENGTH, 0.9, rng), np.zeros(LENGTH, dtype=np.bool_)
-    assert not np.any(innovations(rng.random(LENGTH), np.ones(LENGTH), nothing, nothing, of))
+    assert not np.any(log_densities(rng.random(LENGTH), np.ones(LENGTH), nothing, nothing, of))
