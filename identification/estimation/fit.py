@@ -178,7 +178,7 @@ def _fit(
             recorded, excluded = made.recorded, excluded.and_of(made)
             near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
+            fit = settled(near.plant, recorded, near.misfit, settle, report)
             return excluded.reported(fit, given)
     recorded, found, excluded = _without_bad(recorded, begin, excluded)
     if near is not None and near.misfit < found.misfit:
@@ -241,6 +241,10 @@ def _without_bad(
             break
         with recorded.halt.closing():
             made = corrected(found.plant, recorded, found.misfit)
+        if made.bad:  # or the run is not at its minimum yet
+            found = over_long_runs(found, recorded)
+            with recorded.halt.closing():
+                made = corrected(found.plant, recorded, found.misfit)
         if not made.bad:
             break
         if not are_few((*excluded.bad, *made.bad), given.logs):
@@ -250,6 +254,17 @@ def _without_bad(
             break
         recorded, found, excluded = made.recorded, again, excluded.and_of(made)
     return recorded, found, excluded
+
+
+def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStructure:
+    """The plant at its minimum over runs as long as can be followed, where that leaves less."""
+    try:
+        near = refit(found.plant, recorded.logs, recorded.drive, prior={}, effort="long")
+    except Halted:
+        return found
+    if near.misfit > found.misfit:
+        return found
+    return replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit)
 
 
 def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:

@@ -5,6 +5,7 @@ Levenberg, Q. Appl. Math. 2 (1944) 164; Marquardt, SIAM J. 11 (1963) 431.
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,9 @@ WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the 
 # Near it: the scale common to masses and forces shows in a small difference of large columns.
 FINE_STEP = 1e-7
 DAMPING_TRIES = 6  # of the damping in one step
+# Of a descent: dampings tried at once, steps at most, fall of the cost that ends it
+DAMPINGS, DESCENT_STEPS, LEAST_FALL = 15, 30, 1e-3
+SPAN, LEAST_SPAN, MOST_SPAN = 0.3, 1e-9, 1e-3  # of a conditional deviation, and bounds in x
 ALIKE = 0.5  # of a derivative, by which those to either side may differ
 LAST_STEP = 1e-5  # share of the cost below which a step is the last
 LITTLE = 1e-3  # the same, where more than noise is left
@@ -94,6 +98,46 @@ def gauss_newton(
         if gained < max(ends, little) * cost:
             break
     return Minimum(fun, x, cost / len(r))
+
+
+def descended(fun: Callable[[Array], Array], x: Array) -> Minimum:
+    """Minimum of the square sum of `fun` below x (k,), down to where no damping leads further.
+
+    For errors that are noise at the minimum, but rough: every stop that comes or goes is a step
+    in them. Differences over a third of a conditional deviation pass what is finer, and of many
+    dampings tried at once the best crosses what is coarser. Halted, it gives the x reached.
+    Sources: Levenberg (1944), Marquardt (1963); spans of the differences are ours.
+    """
+    r = fun(x)
+    cost, damping, span = float(r @ r), 1e-3, np.full(len(x), 1e-5)
+    powers = damping_powers()
+    with ThreadPoolExecutor(2) as pool, suppress(Halted):
+        for _ in range(DESCENT_STEPS):
+            moved = list(pool.map(fun, x + np.diag(span)))
+            J = np.column_stack([(one - r) / by for one, by in zip(moved, span, strict=True)])
+            A, g = J.T @ J, J.T @ r
+            if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
+                break
+            size = np.diag(A)
+            tried = [x - np.linalg.lstsq(A + np.diag(damping * one * size), g, rcond=1e-14)[0]
+                     for one in powers]  # fmt: skip
+            costs = [float(after @ after) for after in pool.map(fun, tried)]
+            best = int(np.argmin(costs))
+            gained = cost - costs[best]
+            if not gained > 0.0:
+                break
+            x, r, cost = tried[best], fun(tried[best]), costs[best]
+            damping = float(np.clip(damping * max(powers[best], 1e-3), 1e-9, 1e3))
+            by = SPAN / np.sqrt(np.maximum(size, 1e-30))
+            span = np.where(size > 0.0, np.clip(by, LEAST_SPAN, MOST_SPAN), span)
+            if gained < LEAST_FALL:
+                break
+    return Minimum(fun, x, cost / len(r))
+
+
+def damping_powers() -> list[float]:
+    """None, and powers of ten about the damping that served last."""
+    return [0.0, *(10.0 ** (i - 3) for i in range(1, DAMPINGS))]
 
 
 def _step(

@@ -118,7 +118,6 @@ def _made(
             for log, part in zip(logs, fit.residuals, strict=True)
         ),
         breakaways=(0, 0),
-        evaluations=0,
         remarks=(
             f"{why}: fitted on the force equation, which leaves {100 * fit.relative:.1f} % of the"
             " force",

@@ -35,7 +35,7 @@ Cost = Callable[[Array], Array]
 class SampledChains:
     """Chains (ensembles, steps, walkers, d) of the last round, and how they agree.
 
-    r_hat, ess (j,): of the first j unknowns, those compared; steps: of each walker, of all rounds.
+    r_hat, ess (d,): of each unknown; steps: of each walker, of all rounds.
     """
 
     chains: Array
@@ -58,16 +58,16 @@ def walkers_for(unknowns: int) -> int:
 
 
 def independent_ensembles(
-    cost: Cost, seeds: Array, rng: np.random.Generator, *, compared: int,
-    steps: int = MOST_CHAIN_STEPS, on_progress: Callable[[float], None] | None = None,
+    cost: Cost, seeds: Array, rng: np.random.Generator, *, steps: int = MOST_CHAIN_STEPS,
+    on_progress: Callable[[float], None] | None = None,
 ) -> SampledChains:  # fmt: skip
     """Samples of exp(-cost / 2), in rounds that double until the ensembles agree.
 
     cost: members (k, d) to costs (k,), infinite where a member cannot be; called from a thread for
-    each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; compared: how
-    many of the unknowns, from the first on, have to agree; steps: of a walker at most. A round
-    begins with moves made to what the one before has seen, and only the last round counts. Sources:
-    Goodman, Weare (2010); Foreman-Mackey et al. (2013); limits, Vehtari et al. (2021).
+    each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; steps: of a
+    walker at most. A round begins with moves made to what the one before has seen, and only the
+    last round counts. Sources: Goodman, Weare (2010); Foreman-Mackey et al. (2013); limits, Vehtari
+    et al. (2021).
     """
     walks = [_Ensemble(cost, own, one) for own, one in zip(seeds, rng.spawn(len(seeds)),
                                                            strict=True)]  # fmt: skip
@@ -84,7 +84,7 @@ def independent_ensembles(
             jobs = [pool.submit(one.round, now, report, i) for i, one in enumerate(walks)]
             chains = np.array([job.result() for job in jobs])
             done += now
-            found = _compared(chains, walks, compared, done)
+            found = _compared(chains, walks, done)
             if (done > WARM_STEPS and found.converged) or done >= steps:
                 break
             now = min(done, steps - done)
@@ -164,16 +164,14 @@ class _OwnDraw:
         return np.asarray(-0.5 * (OWN_FREEDOM + at.shape[1]) * np.log1p(square))
 
 
-def _compared(
-    chains: Array, walks: Sequence[_Ensemble], compared: int, steps: int
-) -> SampledChains:
+def _compared(chains: Array, walks: Sequence[_Ensemble], steps: int) -> SampledChains:
     """The chains (ensembles, steps, walkers, d) with how they agree."""
-    e, n, w, _ = chains.shape
+    e, n, w, d = chains.shape
     # An ensemble is one chain in order of time; its walkers are separated for how much it is
     # worth, since a draw says little of the next of the same walker.
-    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(compared)]
+    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(d)]
     apart = np.moveaxis(chains, 2, 1)
-    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(compared)]
+    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(d)]
     return SampledChains(
         chains, np.array(r_hat), np.array(ess),
         float(np.mean([one.accepted / max(one.moves, 1) for one in walks])), steps,

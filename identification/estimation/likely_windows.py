@@ -23,19 +23,17 @@ from identification.estimation.gauss_newton import smooth_jacobian
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import (
     on_bristle,
-    plant_is_motor,
     plant_with,
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.refinement import MOTOR_WINDOW
+from identification.estimation.windowed_run.refinement import longest_window
 from identification.estimation.windowed_run.run_errors import (
     NOISE_LOSS,
     ROBUST_FROM,
 )
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
-    WHOLE,
     Freed,
     freed,
     starts,
@@ -63,7 +61,7 @@ class LikelyWindows:
     found: by log, how its run changes with the windows' states; low, high (d,): bounds; center
     (d,): the plant's own values; stretch (d, d): of what is off them, in cost; factor: of the
     robust square sum; granted: independent samples for which a residual that is no noise counts, 0
-    where it is noise.
+    where it is noise; whole: whether the windows are as long as a run by the command may be.
     """
 
     plant: Plant
@@ -76,6 +74,7 @@ class LikelyWindows:
     stretch: Array | None = None
     factor: float = 1.0
     granted: float = 0.0
+    whole: bool = False
 
     @classmethod
     def of(
@@ -90,10 +89,9 @@ class LikelyWindows:
         """
         walking = any(walks(one, drive) for one in logs)
         steady = drive == "command" and not walking and not on_bristle(plant)
-        longest = MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
         low, high = _bounds(plant, names)
         tried = []
-        for seconds in (longest, RUN_WINDOW) if steady else (RUN_WINDOW,):
+        for seconds in (longest_window(plant), RUN_WINDOW) if steady else (RUN_WINDOW,):
             found = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
             own = tuple(one for one in found if one is not None)
             if len(own) < len(logs):
@@ -104,7 +102,7 @@ class LikelyWindows:
                 return replace(posed, factor=factor, stretch=stretch)
             left = posed.square(plant) / posed.count / NOISE_LOSS
             if left <= ADEQUATE:
-                return replace(posed, factor=AS_NOISE / left)
+                return replace(posed, factor=AS_NOISE / left, whole=seconds > RUN_WINDOW)
             # What the model lacks is correlated over a window.
             windows = float(sum(len(one.begun.at) for one in own))
             tried.append((left, replace(posed, granted=windows)))

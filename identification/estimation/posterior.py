@@ -87,10 +87,8 @@ def sample_posterior(
     found = likelihood_of(fit, logs, rig)
     seeding, walking, between = rng.spawn(3)
     seeds = _seeds(found, seeding)
-    walks = independent_ensembles(
-        found.cost, seeds, walking, compared=len(found.names), steps=steps, on_progress=on_progress
-    )
-    chains = np.moveaxis(walks.chains, 2, 1)[..., : len(found.names)]
+    walks = independent_ensembles(found.cost, seeds, walking, steps=steps, on_progress=on_progress)
+    chains = np.moveaxis(walks.chains, 2, 1)
     chains = chains.reshape(len(seeds), -1, len(found.names))
     return Posterior(
         names=found.names,

@@ -43,9 +43,9 @@ def _sums(r: Array, length: int) -> Array:
     return np.asarray(whole / (spread * np.sqrt(length)))
 
 
-def widened(samples: Array, center: Array, size: float) -> Array:
-    """Sets (k, d) about their center (d,), as wide as a part of this size may have moved them.
+def widening(size: float) -> float:
+    """By how much deviations are wider for a part of this size, which may have moved parameters.
 
     Ours: `README.md`, (7).
     """
-    return np.asarray(center + float(np.hypot(1.0, size / INTERVAL_HALF)) * (samples - center))
+    return float(np.hypot(1.0, size / INTERVAL_HALF))

@@ -241,8 +241,8 @@ def searched(
     for attempt in range(attempts):
         try:
             plant = searched_plant(
-                recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
-                attempt=attempt, halt=recorded.halt,
+                recorded.plain, rng, drive=recorded.drive, report=report, attempt=attempt,
+                halt=recorded.halt,
             )  # fmt: skip
         except (UserError, Halted):
             return model

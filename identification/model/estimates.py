@@ -90,7 +90,6 @@ class KarnoppFit:
     adequate: bool
     logs: tuple[LogFit, ...]
     breakaways: tuple[int, int]
-    evaluations: int
     remarks: tuple[str, ...]
     effects: tuple[Acting, ...] = ()
     bad: tuple[BadSamples, ...] = ()

@@ -149,7 +149,7 @@ def _summary(fit: KarnoppFit, errors: ForceError | None, closed: Sequence[str]) 
         noise_F=fit.noise_F,
         chi_square=fit.chi_square,
         adequate=fit.adequate,
-        evaluations=fit.evaluations,
+        evaluations=0,
         force_relative=errors.relative if errors else None,
         force_rms=errors.rms if errors else None,
         remarks=(*fit.remarks, *closed),

@@ -1,1 +1,1 @@
-"""The nine parameters from the simulated response: search, refinement, weighing (`README.md`)."""
+"""The nine parameters searched on simulated runs of many plants at once (`README.md`)."""

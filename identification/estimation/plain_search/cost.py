@@ -25,12 +25,12 @@ from identification.simulation.karnopp_step import K1, K2
 
 COMMAND, LOGGED_FORCE = 0, 1
 CHUNK = 128
-START_Y, START_V, START_G = range(3)
 
 
 @dataclass(frozen=True)
 class RestartWindows:
-    """Where the model restarts: sample `at` (k,), with position `y` [m] and velocity `v` [m/s]."""
+    """Where the model starts: samples `at` (k,), 0 first, with position `y` [m], velocity `v` [m/s]
+    there."""
 
     at: IntArray
     y: Array
@@ -41,7 +41,8 @@ class RestartWindows:
 class Measured:
     """One log as the kernels take it.
 
-    y [m], force [N], u [V], `impulse` = h * sum of u before each sample [V s]; slopes of force and
+    y [m], force [N], u [V], `impulse` = h * sum of u before each sample [V s], `constant` [N] that
+    the actuator's equation adds to F = k1 impulse - k2 y; slopes of force and
     position between samples for LOGGED_FORCE; weights 1/sigma_y, 1/sigma_F (0: not compared).
     """
 
@@ -51,6 +52,7 @@ class Measured:
     force: Array
     u: Array
     impulse: Array
+    constant: float
     slope_y: Array
     slope_force: Array
     weight_y: float
@@ -76,33 +78,15 @@ def _chunk_cost(
 
 
 @compiled
-def _chunk_rows(
-    out: Array, y: Array, force: Array, w_y: float, w_f: float, cap: float, rows: Array
-) -> None:
-    """Residual rows (2 n, WIDTH): lane 0 as it is, the others less lane 0, robustly weighted."""
-    for k in range(len(y)):
-        r_y = (out[k, 0, 0] - y[k]) * w_y
-        r_f = (out[k, 1, 0] - force[k]) * w_f
-        weight = 1.0
-        if cap > 0.0:
-            weight = cap / (cap + r_y * r_y + r_f * r_f)
-        for i in range(WIDTH):
-            rows[2 * k, i] = weight * w_y * (out[k, 0, i] - out[k, 0, 0])
-            rows[2 * k + 1, i] = weight * w_f * (out[k, 1, i] - out[k, 1, 0])
-        rows[2 * k, 0] = weight * r_y
-        rows[2 * k + 1, 0] = weight * r_f
-
-
-@compiled
 def cost_kernel(
     p: Array,
-    start: Array,
     drive: int,
     h: float,
     y: Array,
     force: Array,
     u: Array,
     impulse: Array,
+    constant: float,
     slope_y: Array,
     slope_force: Array,
     w_y: float,
@@ -112,35 +96,26 @@ def cost_kernel(
     at_v: Array,
     cap: float,
     cost: Array,
-    gram: Array,
-    stretch: int,
 ) -> None:
-    """Cost of WIDTH parameter sets and, where `gram` is not empty, its local quadratic form.
+    """Cost of WIDTH parameter sets.
 
     Sources: friction, the paper's eq. (1) (Karnopp 1985); actuator, its dF/dt = k1 u - k2 v; bound
     of a square, Geman, McClure, Bull. Int. Stat. Inst. 52 (1987) 5.
 
-    p: (WIDTH, 11) rows of kernel parameters; start: (WIDTH, 3) first position, first velocity and
-    the constant F + k2 y - k1 * impulse; at, at_y, at_v: the windows, the first of which starts
-    from `start`. cost: (WIDTH,). gram (stretches, WIDTH, WIDTH), one a stretch of `stretch`
-    samples: [0, 0] is r'r of lane 0, [0, i] is d_i' r, [i, j] d_i' d_j with
-    d_i the change of the residual from lane 0 to lane i.
+    p: (WIDTH, 11) rows of kernel parameters; at, at_y, at_v (windows,): where the run begins and
+    begins anew; constant [N]: F + k2 y - k1 * impulse. cost: (WIDTH,).
     """
     s, modes, tables = work_space()
     out = np.zeros((CHUNK, 2, WIDTH))
-    rows = np.zeros((2 * CHUNK, WIDTH))
     prepare_lanes(p, h, tables, s)
     cost[:] = 0.0
-    gram[:, :, :] = 0.0
     n = len(y)
     for window in range(len(at)):
         first = at[window]
         last = at[window + 1] if window + 1 < len(at) else n
         for i in range(WIDTH):
             here, v = at_y[window], at_v[window]
-            if window == 0:
-                here, v = start[i, START_Y], start[i, START_V]
-            f = start[i, START_G] + p[i, K1] * impulse[first] - p[i, K2] * here
+            f = constant + p[i, K1] * impulse[first] - p[i, K2] * here
             if drive == LOGGED_FORCE:
                 f = force[first] + p[i, K2] * (y[first] - here)
             place(s, modes, tables, p, i, here, v, f)
@@ -161,40 +136,21 @@ def cost_kernel(
                     h,
                     out,
                 )
-            if len(gram) > 0:
-                _chunk_rows(out, y[low:high], force[low:high], w_y, w_f, cap, rows)
-                used = rows[: 2 * (high - low)]
-                part = min(low // stretch, len(gram) - 1)
-                gram[part] += np.dot(used.T, used)
-            else:
-                _chunk_cost(out, y[low:high], force[low:high], w_y, w_f, cap, cost)
+            _chunk_cost(out, y[low:high], force[low:high], w_y, w_f, cap, cost)
 
 
-def cost_of_lanes(
-    p: Array,
-    start: Array,
-    log: Measured,
-    windows: RestartWindows,
-    cap: float,
-    stretches: int,
-) -> tuple[Array, Array]:
-    """`cost_kernel` (the paper's plant) over a log: costs (WIDTH,), and Gram matrices (stretches,
-    WIDTH, WIDTH).
-
-    stretches: parts of the log, each with its own matrix; 0 for costs alone.
-    """
+def cost_of_lanes(p: Array, log: Measured, windows: RestartWindows, cap: float) -> Array:
+    """`cost_kernel` (the paper's plant) over a log: costs (WIDTH,)."""
     cost = np.zeros(WIDTH)
-    gram = np.zeros((stretches, WIDTH, WIDTH))
-    stretch = len(log.y) // max(stretches, 1) + 1
     cost_kernel(
         p,
-        start,
         log.drive,
         log.h,
         log.y,
         log.force,
         log.u,
         log.impulse,
+        log.constant,
         log.slope_y,
         log.slope_force,
         log.weight_y,
@@ -204,7 +160,5 @@ def cost_of_lanes(
         windows.v,
         cap,
         cost,
-        gram,
-        stretch,
     )
-    return cost, gram
+    return cost

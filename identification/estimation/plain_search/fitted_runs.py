@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,9 +10,6 @@ from identification.arrays import Array, IntArray
 from identification.estimation.plain_search.cost import (
     COMMAND,
     LOGGED_FORCE,
-    START_G,
-    START_V,
-    START_Y,
     Measured,
     RestartWindows,
     cost_of_lanes,
@@ -31,24 +28,12 @@ SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
 
 @dataclass(frozen=True)
 class FittedRun:
-    """One log ready for the kernels, with its restart windows and its own start (3,).
-
-    `open` lists the entries of `start` that are fitted: a body that begins at rest has v = 0, a run
-    driven by a force has no constant, and a motor's run begins in its measured state, since a
-    fitted one would take up what the model lacks. halt: asked before the runs of a cost.
-    """
+    """One log ready for the kernels, with its restart windows; halt: asked before its runs."""
 
     name: str
     measured: Measured
     windows: RestartWindows
-    start: Array
-    open: tuple[int, ...]
     halt: Halt = field(default_factory=Halt, compare=False)
-
-    def whole(self) -> "FittedRun":
-        """The same log as one free run."""
-        first = RestartWindows(self.windows.at[:1], self.windows.y[:1], self.windows.v[:1])
-        return replace(self, windows=first)
 
 
 def signal_noise(x: Array, h: float) -> float:
@@ -68,13 +53,12 @@ def prepare_run(
     *,
     constant: float,
     window: float,
-    hold: bool,
     noise: tuple[float, float],
 ) -> FittedRun:
     """A log for the kernels.
 
-    constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; hold:
-    a zero-order hold has no slope between samples; noise: sigma of y [m] and F [N].
+    constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; noise:
+    sigma of y [m] and F [N].
     """
     h, y, force = log.h, log["y"], log["F"]
     sigma_y, sigma_f = noise
@@ -86,20 +70,15 @@ def prepare_run(
         force=force,
         u=log["u"] if by_command else np.zeros(len(y)),
         impulse=impulse_of(log) if by_command else np.zeros(len(y)),
+        constant=constant,
         slope_y=np.append(np.diff(y) / h, 0.0),
-        slope_force=force_slope(force, h, hold),
+        slope_force=force_slope(force, h, hold=False),
         weight_y=1.0 / sigma_y,
         weight_force=1.0 / sigma_f if by_command else 0.0,
     )
     windows = rest_windows(y, sigma_y, h, window)
-    y_0, v_0, _ = measured_start(log)
-    start = np.array([y_0, v_0, constant])
-    unknown = [] if hold else [START_Y]
-    if v_0 != 0.0 and not hold:
-        unknown.append(START_V)
-    if by_command:
-        unknown.append(START_G)
-    return FittedRun(log.name, measured, windows, start, tuple(unknown))
+    windows.y[0], windows.v[0], _ = measured_start(log)
+    return FittedRun(log.name, measured, windows)
 
 
 def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> RestartWindows:
@@ -132,10 +111,8 @@ def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> RestartWin
     return RestartWindows(index, np.array(level), np.zeros(len(at)))
 
 
-def total_cost(
-    runs: Sequence[FittedRun], p: Array, cap: float, starts: Array | None = None
-) -> Array:
-    """Cost of parameter sets `p` (k, 11) over all runs, (k,); starts (runs, k, 3) where they vary.
+def total_cost(runs: Sequence[FittedRun], p: Array, cap: float) -> Array:
+    """Cost of parameter sets `p` (k, 11) over all runs, (k,).
 
     cap: bound of one sample's squared residual, 0 for none. Works on all cores. Raises Halted where
     the runs' `halt` says so. Source of the bound: Geman, McClure (1987); `README.md`, (2), (3).
@@ -148,13 +125,8 @@ def total_cost(
     def block(task: tuple[int, int]) -> tuple[int, Array]:
         index, low = task
         run = runs[index]
-        if starts is None:
-            start = np.tile(run.start, (WIDTH, 1))
-        else:
-            own = starts[index, low : low + WIDTH]
-            start = np.concatenate([own, np.repeat(own[:1], WIDTH - len(own), axis=0)])
         rows = np.ascontiguousarray(padded[low : low + WIDTH])
-        return low, cost_of_lanes(rows, start, run.measured, run.windows, cap, 0)[0]
+        return low, cost_of_lanes(rows, run.measured, run.windows, cap)
 
     costs = np.zeros(len(padded))
     tasks = [(index, low) for low in range(0, len(padded), WIDTH) for index in range(len(runs))]

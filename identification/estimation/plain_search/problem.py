@@ -1,11 +1,11 @@
-"""Logs posed as a fitting problem: how they are driven, their noise, and where to look."""
+"""Logs posed as a search: how they are driven, their noise, and where to look."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
+from identification.arrays import Array
 from identification.estimation.plain_search.actuator_fit import ActuatorFit, fit_actuator
 from identification.estimation.plain_search.fitted_runs import (
     FittedRun,
@@ -13,41 +13,24 @@ from identification.estimation.plain_search.fitted_runs import (
     prepare_run,
     signal_noise,
 )
-from identification.estimation.plain_search.local_search import Optimum
 from identification.estimation.plain_search.search_bounds import Box, search_box
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
-from identification.log import Log, Rig
+from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Actuator, Plant
 from identification.progress import Halt
-from identification.simulation.free_run import FreeRun, free_run
-from identification.simulation.karnopp_step import K1, K2
-from identification.thresholds import ADEQUATE
-
-LONGEST_RUN = 40.0  # s; a run without a stiffness that holds it is compared at most this long
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Logs, how they are driven, and where to look; noise of position [m] and force [N]; the
-    motor's k_a [N/V], 0 for other rigs."""
+    """Logs as runs of the kernels, the box to search, and the row (11,) in its middle; drives: what
+    drives the plants, with its first estimate."""
 
-    logs: tuple[Log, ...]
     runs: tuple[FittedRun, ...]
-    firsts: tuple[FirstEstimate, ...]
     box: Box
     row: Array
-    free: IntArray
-    drive: Drive
-    hold: bool
-    noise: tuple[float, float]
-    k_a: float
-
-    @property
-    def adequate(self) -> float:
-        """Chi-square up to which a fit counts as found; a measured force brings its own noise."""
-        return ADEQUATE if self.drive == "command" else 2.0 * ADEQUATE
+    drives: Actuator | None
 
     @property
     def count(self) -> int:
@@ -63,62 +46,33 @@ class Problem:
         )
         return float(max(1e4, noise))
 
-    @property
-    def long_runs(self) -> tuple[FittedRun, ...]:
-        """Runs as long as the model may be asked to follow without a restart."""
-        if self.drive == "command":
-            return tuple(run.whole() for run in self.runs)
-        if not self.hold:
-            return self.runs
-        out = []
-        for run in self.runs:
-            at = run.windows.at * run.measured.h
-            keep = np.concatenate([[True], np.diff(np.floor(at / LONGEST_RUN)) > 0])
-            windows = replace(
-                run.windows, at=run.windows.at[keep], y=run.windows.y[keep], v=run.windows.v[keep]
-            )
-            out.append(replace(run, windows=windows))
-        return tuple(out)
 
+def pose(logs: Sequence[Log], drive: Drive, halt: Halt | None = None) -> Problem:
+    """The logs as a search: noise estimated, search box drawn.
 
-def pose(logs: Sequence[Log], rig: Rig, drive: Drive, halt: Halt | None = None) -> Problem:
-    """The logs as a fitting problem: noise estimated, search box drawn.
-
-    drive: what drives their runs (`recorded_logs.chosen_drive`), the command of a motor; halt:
-    asked before each of them. Raises NotIdentifiable where nothing moves.
+    drive: what drives their runs (`recorded_logs.chosen_drive`), no motor's command; halt: asked
+    before each of them. Raises NotIdentifiable where nothing moves.
     """
-    hold = rig.kind == "motor"
-    firsts = tuple(first_estimate(log, held=hold) for log in logs)
-    by_command = drive == "command" and not hold
+    firsts = tuple(first_estimate(log) for log in logs)
+    by_command = drive == "command"
     actuator = fit_actuator(logs) if by_command else None
     k1, k2 = (actuator.k1, actuator.k2) if actuator else (0.0, 0.0)
-    # A motor's run is driven by its force, that of its command.
-    chosen: Drive = "command" if by_command else "force"
-    window = 1.0 if by_command or hold else 2.0
+    window = 1.0 if by_command else 2.0
     runs = tuple(
         prepare_run(
             log,
-            chosen,
+            drive,
             constant=float(actuator.constants[i]) if actuator else 0.0,
             window=window,
-            hold=hold,
             noise=_noise(log, first, actuator),
         )
         for i, (log, first) in enumerate(zip(logs, firsts, strict=True))
     )
     if halt is not None:
         runs = tuple(replace(run, halt=halt) for run in runs)
-    stiffness = None if by_command or hold else _stiffness_bounds(logs, firsts)
+    stiffness = None if by_command else _stiffness_bounds(logs, firsts)
     box, row = search_box(firsts, k1, k2, stiffness)
-    # A coupling is chosen by the search alone: the refinement would stiffen it without end.
-    free: IntArray = np.arange(9, dtype=np.int64)
-    if by_command:
-        free = np.concatenate([free, np.array([K1, K2], dtype=np.int64)])
-    noise = _noise(logs[0], firsts[0], actuator)
-    if hold:
-        noise = (noise[0], 0.0)
-    k_a = rig.force_per_command or 0.0
-    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, noise, k_a)
+    return Problem(runs, box, row, Actuator(k1, k2) if by_command else None)
 
 
 def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tuple[float, float]:
@@ -145,33 +99,9 @@ def _stiffness_bounds(logs: Sequence[Log], firsts: Sequence[FirstEstimate]) -> t
     return low, max(high, 3.0 * low)
 
 
-def simulated(problem: Problem, optimum: Optimum, index: int) -> FreeRun:
-    """Free run of the fitted model along one log, from its fitted start."""
-    plant = plant_of(problem, optimum)
-    stiffness = 0.0 if problem.drive == "command" or problem.hold else float(optimum.p[K2])
-    drive: Drive = "command" if problem.drive == "command" or problem.hold else "force"
-    run = problem.long_runs[index]
-    restarts = (run.windows.at, run.windows.y, run.windows.v)
-    start = start_of(problem, optimum, index)
-    log = problem.logs[index]
-    return free_run(plant, log, start, drive, stiffness=stiffness, restarts=restarts)
-
-
-def plant_of(problem: Problem, optimum: Optimum) -> Plant:
-    """The plant of an optimum; a friction of 0, which a step may leave a little below, is 0."""
+def plant_of(problem: Problem, row: Array) -> Plant:
+    """The plant of kernel parameters (11,); a friction of 0, which may be a little below, is 0."""
     negative = np.array([name in NEGATIVE for name in NAMES])
-    nine = optimum.p[:9]
+    nine = row[:9]
     friction = Karnopp.from_array(np.where(negative, np.minimum(nine, 0.0), np.maximum(nine, 0.0)))
-    if problem.drive == "command":
-        return Plant(friction, Actuator(float(optimum.p[K1]), float(optimum.p[K2])))
-    if problem.hold:
-        return Plant(friction, Motor(problem.k_a))
-    return Plant(friction)
-
-
-def start_of(problem: Problem, optimum: Optimum, index: int) -> tuple[float, float, float]:
-    y, v, constant = (float(x) for x in optimum.starts[index])
-    force = float(problem.logs[index]["F"][0])
-    if problem.drive == "command":
-        force = constant - float(optimum.p[K2]) * y
-    return y, v, force
+    return Plant(friction, problem.drives)

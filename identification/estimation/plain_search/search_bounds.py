@@ -51,13 +51,6 @@ class Box:
         z[0] = center
         return z
 
-    def holds(self, rows: Array) -> BoolArray:
-        """Which rows (k, 11) lie in the box, (k,)."""
-        values = rows[:, self.free] * SIGN[self.free]
-        inside: BoolArray = (values >= self.low) & (values <= self.high)
-        every: BoolArray = np.all(inside, axis=1)
-        return every
-
     def wider(self, factor: float) -> "Box":
         """The box with the bounds of the nine moved out by `factor`; a coupling keeps its own."""
         by = np.where(self.free == K2, 1.0, factor)

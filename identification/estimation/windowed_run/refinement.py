@@ -13,7 +13,12 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.estimation.gauss_newton import FINE_STEP, Minimum, gauss_newton
+from identification.estimation.gauss_newton import (
+    FINE_STEP,
+    Minimum,
+    descended,
+    gauss_newton,
+)
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import (
     even,
@@ -70,7 +75,8 @@ class Refit:
     """The plant refined and its misfit.
 
     names (d,): parameters that were free; prior: their deviations from the regression, where they
-    have one; spread: gives `covariance` (d, d), which takes many runs.
+    have one; spread: gives `covariance` (d, d), which takes many runs; whole: whether it is
+    followed as long as a run by the command may be, and not from one window to the next.
     """
 
     plant: Plant
@@ -78,10 +84,11 @@ class Refit:
     names: tuple[str, ...]
     prior: Mapping[str, float]
     spread: Callable[[], Array]
+    whole: bool = False
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the errors of `names`, (d, d): `README.md`, (7) to (9) (Liang, Zeger 1986)."""
+        """Of the errors of `names`, (d, d): `README.md`, (8) to (10) (Liang, Zeger 1986)."""
         return self.spread()
 
     @cached_property
@@ -100,7 +107,7 @@ class HaltedRefit(Halted):
         self.plant = plant
 
 
-Effort = Literal["quick", "near", "far", "rough", "whole"]
+Effort = Literal["quick", "near", "far", "rough", "whole", "long"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +197,12 @@ def refit(
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
-    steps from the plant as it is, "near" goes on from there, "far" comes there through short
+    steps from the plant as it is, "near" goes on from there, "long" to the end over whole runs, if
+    these are followed, "far" comes there through short
     windows, "rough" searches the band first and goes on while much is gained, "whole" as long as
     anything is; rescues: how often at most another band is searched, where more than noise
     is left. Sources: multiple shooting, Bock (1983); Levenberg (1944), Marquardt (1963); Cauchy's
-    weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`, (5), (7) to (9).
+    weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`, (5), (8) to (10).
     """
     quick = effort == "quick"
     if effort in ("rough", "whole"):
@@ -205,7 +213,7 @@ def refit(
     passing = PASSING if effort == "rough" else 0.0
     unknowns = _Unknowns.of(plant, logs, drive, prior, steps, passing)
     try:
-        at, found = _minimum(unknowns, effort, rescues)
+        at, found, whole = _minimum(unknowns, effort, rescues)
     except Halted:
         if not unknowns.reached:
             raise
@@ -225,11 +233,12 @@ def refit(
         return factor * at.covariance(_windows(logs, drive)) * scale
 
     names = tuple(unknowns.names[i] for i in free)
-    return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread)
+    return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)
 
 
-def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum, float]:
-    """The minimum that a refinement of this effort ends in, and its misfit."""
+def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum, float, bool]:
+    """The minimum that a refinement of this effort ends in, its misfit, and whether it is one of
+    runs as long as the command's can be followed."""
     plant, logs, drive = unknowns.plant, unknowns.logs, unknowns.drive
     quick, slow = effort == "quick", on_bristle(plant)
     at = _approached(unknowns, effort)
@@ -238,8 +247,8 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
     hopeless = effort == "rough" and at.mean > NEARLY_FOLLOWED
     rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
-    longest = MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
-    if steady and not slow and rounds:
+    longest = longest_window(plant)
+    if steady and not slow and rounds and effort != "long":
         rounds.append(longest)
     for seconds in rounds:
         again = unknowns.refined(at.x, seconds, False)
@@ -254,7 +263,31 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
         left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
-    return at, found
+    if effort == "long" and steady and not slow and found <= ADEQUATE:
+        return _over_long_runs(unknowns, at, found, longest)
+    return at, found, False
+
+
+def longest_window(plant: Plant) -> float:
+    """Windows [s] in which a plant driven by an exact command is followed in the end."""
+    return MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
+
+
+def _over_long_runs(
+    unknowns: _Unknowns, at: Minimum, found: float, longest: float
+) -> tuple[Minimum, float, bool]:
+    """The minimum over runs so long [s], where these are followed down to the noise.
+
+    While a stop comes late, what is far off must pull: so by plain least squares first.
+    """
+    now = unknowns.plant_at(at.x)
+    errors_of = judge(now, unknowns.logs, unknowns.drive, longest)
+    first = descended(lambda x: errors_of(unknowns.plant_at(x)), at.x)
+    whole = unknowns.refined(first.x, longest, False)
+    left_by = unknowns.misfit(whole.x)
+    if whole.followed and left_by <= max(found, COMPLETE):
+        return whole, left_by, True
+    return at, found, False
 
 
 def _worse(unknowns: _Unknowns, again: Minimum, at: Minimum) -> bool:

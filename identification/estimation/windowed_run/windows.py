@@ -346,7 +346,7 @@ def noise_errors(
     """Errors (k, n), less their states' part, that every signal's noise alone makes of a run.
 
     Noise of force and command enters the run and drifts, that of the states moves whole windows,
-    that of the position is white. Draws of them make the covariance of `README.md`, (8); ours.
+    that of the position is white. Draws of them make the covariance of `README.md`, (9); ours.
     """
     base = window_run(plant, one, drive, found.begun)
     noisy = _noisier(plant, one, drive, rng)

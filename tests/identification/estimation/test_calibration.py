@@ -5,17 +5,13 @@ the square of its normal deviate is 1 in the mean.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
 from benchmarks.calibration import drawn
-from identification.arrays import Array
-from identification.estimation import likelihood
-from identification.estimation.plain_search.fitted_runs import FittedRun
-from identification.estimation.plain_search.likely_sets import reweighed
+from identification.estimation import likely_windows
 from identification.model.karnopp import NAMES
 
 SECONDS = 2.5  # of a log
@@ -40,14 +36,5 @@ def test_with_the_noise_of_the_logs_ranks_are_uniform() -> None:
 def test_a_wrong_noise_is_seen(
     monkeypatch: pytest.MonkeyPatch, factor: float, low: float, high: float
 ) -> None:
-    def surer(run: FittedRun, p: Array) -> FittedRun:
-        """The run with a noise taken so many times too small."""
-        one = reweighed(run, p)
-        force = factor * one.measured.weight_force
-        measured = replace(
-            one.measured, weight_y=factor * one.measured.weight_y, weight_force=force
-        )
-        return replace(one, measured=measured)
-
-    monkeypatch.setattr(likelihood, "reweighed", surer)
+    monkeypatch.setattr(likely_windows, "AS_NOISE", factor**2 * likely_windows.AS_NOISE)
     assert low < mean_square(range(700, 703)) < high

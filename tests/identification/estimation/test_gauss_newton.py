@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.estimation.gauss_newton import FINE_STEP, Minimum, jacobian, smooth_jacobian
+from identification.estimation.gauss_newton import (
+    FINE_STEP,
+    Minimum,
+    descended,
+    jacobian,
+    smooth_jacobian,
+)
 
 RNG = np.random.default_rng(0)
 X = RNG.standard_normal((400, 3))
@@ -39,3 +45,15 @@ def test_the_covariance_is_that_of_noise(fun: Callable[[Array], Array]) -> None:
     np.testing.assert_allclose(found.covariance(), expected, rtol=1e-4, atol=1e-8)
     spread = np.sqrt(np.diag(found.covariance_by(noise)))
     np.testing.assert_allclose(spread, np.sqrt(np.diag(expected)), rtol=0.1)
+
+
+def test_a_descent_passes_steps_in_which_a_stop_comes_and_goes() -> None:
+    t = np.linspace(0.0, 1.0, 400)
+
+    def errors(x: Array) -> Array:
+        a, b = np.floor(x * 2e4) / 2e4  # finer than any difference at the minimum
+        return np.asarray((a * np.exp(-b * t) - np.exp(-2.0 * t)) / 1e-3)
+
+    found = descended(errors, np.array([3.0, 5.0]))
+    assert np.allclose(found.x, [1.0, 2.0], atol=2e-3)
+    assert found.mean < 1.0

@@ -28,7 +28,7 @@ def seeds(seed: int, d: int = 3) -> Array:
 def test_spread_of_a_normal_density() -> None:
     shares: list[float] = []
     found = independent_ensembles(
-        bowl, seeds(1), np.random.default_rng(1), compared=3, on_progress=shares.append
+        bowl, seeds(1), np.random.default_rng(1), on_progress=shares.append
     )
     assert found.converged
     assert np.std(found.chains.reshape(-1, 3), axis=0) == pytest.approx(SPREAD, rel=0.05)
@@ -41,7 +41,7 @@ def test_a_bent_density_is_walked_until_the_ensembles_agree() -> None:
     def banana(x: Array) -> Array:
         return np.asarray(x[:, 0] ** 2 + 25.0 * (x[:, 1] - x[:, 0] ** 2) ** 2)
 
-    found = independent_ensembles(banana, seeds(2, 2), np.random.default_rng(2), compared=2)
+    found = independent_ensembles(banana, seeds(2, 2), np.random.default_rng(2))
     assert found.converged
     first, second = found.chains.reshape(-1, 2).T
     assert np.std(first) == pytest.approx(1.0, rel=0.05)
@@ -55,7 +55,7 @@ def test_ensembles_in_different_places_do_not_converge() -> None:
 
     begun = np.sign(np.arange(ENSEMBLES) - 1.5)[:, np.newaxis, np.newaxis] * 30.0
     first = begun + np.random.default_rng(3).standard_normal((ENSEMBLES, WALKER_BLOCK, 2))
-    found = independent_ensembles(two, first, np.random.default_rng(4), compared=2, steps=400)
+    found = independent_ensembles(two, first, np.random.default_rng(4), steps=400)
     assert not found.converged
     assert found.steps == 400
     assert np.min(found.r_hat) > 1.05
@@ -65,7 +65,7 @@ def test_forbidden_regions_are_not_entered() -> None:
     def half(z: Array) -> Array:
         return np.where(np.all(z > 0, axis=1), bowl(z), np.inf)
 
-    found = independent_ensembles(half, np.abs(seeds(5)), np.random.default_rng(5), compared=3)
+    found = independent_ensembles(half, np.abs(seeds(5)), np.random.default_rng(5))
     assert np.all(found.chains > 0)
     assert np.mean(found.chains, axis=(0, 1, 2)) == pytest.approx(
         SPREAD * np.sqrt(2.0 / np.pi), rel=0.05
@@ -76,7 +76,7 @@ def test_forbidden_regions_are_not_entered() -> None:
 def test_the_same_seed_gives_the_same_chains() -> None:
     def once() -> Array:
         rng = np.random.default_rng(6)
-        return independent_ensembles(bowl, seeds(6), rng, compared=3, steps=150).chains
+        return independent_ensembles(bowl, seeds(6), rng, steps=150).chains
 
     assert np.array_equal(once(), once())
 

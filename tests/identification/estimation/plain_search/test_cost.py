@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.estimation.plain_search.cost import cost_of_lanes
 from identification.estimation.plain_search.fitted_runs import (
     FittedRun,
     prepare_run,
@@ -26,10 +25,10 @@ def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> Fitte
         "command" if by_command else "force",
         constant=0.0,
         window=window,
-        hold=False,
         noise=(NOISE_Y, NOISE_F),
     )
-    return FittedRun(run.name, run.measured, run.windows, np.zeros(3), run.open)
+    run.windows.y[0] = run.windows.v[0] = 0.0
+    return run
 
 
 def sets(number: int) -> np.ndarray:
@@ -82,17 +81,6 @@ def test_a_bound_keeps_outliers_from_ruling() -> None:
     truth = kernel_parameters(table(1).array, ACTUATOR.k1, ACTUATOR.k2)[None]
     assert total_cost([run], truth, 0.0)[0] > 1e9
     assert total_cost([run], truth, 25.0)[0] < 2 * run.measured.count + 10 * 25.0
-
-
-def test_gram_matrices_add_up_over_stretches() -> None:
-    run, rows = run_of(made_log(table(2), seconds=3.0)), sets(2)
-    start = np.zeros((WIDTH, 3))
-    _, one = cost_of_lanes(rows, start, run.measured, run.windows, 0.0, 1)
-    _, ten = cost_of_lanes(rows, start, run.measured, run.windows, 0.0, 10)
-    assert np.allclose(one[0], ten.sum(axis=0), rtol=1e-9)
-    assert np.allclose(one[0][1:, 1:], one[0][1:, 1:].T)
-    costs = total_cost([run], rows, 0.0)
-    assert one[0, 0, 0] == pytest.approx(costs[0], rel=1e-9)
 
 
 def test_windows_restart_at_sure_rests_only() -> None:
