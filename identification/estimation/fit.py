@@ -54,7 +54,7 @@ from identification.estimation.structure_fit import (
 from identification.estimation.surroundings import surrounding_estimates, widened_friction
 from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.estimation.windowed_run.parameters import even
-from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
+from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant
@@ -407,7 +407,7 @@ def _with_effects(
     if best.misfit > COMPLETE:
         p = prior.friction
         band = max(p.dv_p, -p.dv_n)
-        again = refit(prior, logs, drive, prior=held, band=band, rescues=RESCUES)
+        again = refit(prior, logs, drive, prior=held, band=band)
         best = again if again.misfit < best.misfit else best
     return settled(best.plant, recorded, best.misfit, rng, report, refined=best)
 

@@ -27,7 +27,6 @@ from identification.estimation.regression.row_fit import RowFit, first_stage, me
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import (
-    RESCUES,
     Effort,
     HaltedRefit,
     Refit,
@@ -160,7 +159,7 @@ def _rebegun(
         part = [shortened(one, PIECE_SECONDS) for one in logs]
         begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
         begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
-        close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
+        close = refit(begun, logs, drive, prior=prior, effort="near")
         done = close if close.misfit < done.misfit else done
     return done
 
@@ -212,7 +211,6 @@ def _from_first_estimate(
     try:
         done = refit(
             plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
-            rescues=RESCUES,
         )  # fmt: skip
         return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
     except Halted as halted:

@@ -30,8 +30,13 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.run_errors import ROBUST_FROM, judge, misfit, soft
-from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, by_side, start_band
+from identification.estimation.windowed_run.run_errors import (
+    ROBUST_FROM,
+    judge,
+    misfit,
+    soft,
+)
+from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, start_band
 from identification.estimation.windowed_run.windows import (
     COARSE,
     RUN_WINDOW,
@@ -55,8 +60,6 @@ APPROACH_SAMPLES = 20  # that such a window has at least
 # Of a parameter, or of so much of its unit, that it changes in them
 APPROACH_REACH, LEAST_OF_UNIT = 0.4, 0.5
 PASSING = 0.03  # share of the cost, below which a step of an approach is the last
-RESCUES = 3  # searches beside, of a run that leaves more than noise
-NO_USE = 0.8  # of the misfit, above which another search is of no use
 REACHED = 60.0  # misfit up to which short windows may reach the minimum
 # Of `onward` at most, each to leave this share of the misfit before
 ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
@@ -191,18 +194,17 @@ class _Unknowns:
 
 def refit(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, *, prior: dict[str, float],
-    band: float = 0.0, effort: Effort = "whole", rescues: int = 0,
+    band: float = 0.0, effort: Effort = "whole",
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
     steps from the plant as it is, "near" goes on from there, "long" to the end over whole runs, if
-    these are followed, "far" comes there through short
-    windows, "rough" searches the band first and goes on while much is gained, "whole" as long as
-    anything is; rescues: how often at most another band is searched, where more than noise
-    is left. Sources: multiple shooting, Bock (1983); Levenberg (1944), Marquardt (1963); Cauchy's
-    weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`, (5), (8) to (10).
+    these are followed, "far" comes there through short windows, "rough" searches the band first and
+    goes on while much is gained, "whole" as long as anything is. Sources: multiple shooting, Bock
+    (1983); Levenberg (1944), Marquardt (1963); Cauchy's weights, Holland, Welsch (1977);
+    covariance, Liang, Zeger (1986): `README.md`, (5), (8) to (10).
     """
     quick = effort == "quick"
     if effort in ("rough", "whole"):
@@ -213,7 +215,7 @@ def refit(
     passing = PASSING if effort == "rough" else 0.0
     unknowns = _Unknowns.of(plant, logs, drive, prior, steps, passing)
     try:
-        at, found, whole = _minimum(unknowns, effort, rescues)
+        at, found, whole = _minimum(unknowns, effort)
     except Halted:
         if not unknowns.reached:
             raise
@@ -236,7 +238,7 @@ def refit(
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)
 
 
-def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum, float, bool]:
+def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]:
     """The minimum that a refinement of this effort ends in, its misfit, and whether it is one of
     runs as long as the command's can be followed."""
     plant, logs, drive = unknowns.plant, unknowns.logs, unknowns.drive
@@ -255,8 +257,6 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
         if again.followed and not (seconds == longest and _worse(unknowns, again, at)):
             at = again
     at, found = _ended(unknowns, at, quick)
-    if not (quick or slow):
-        at, found = _rescued(unknowns, at, found, rescues, longest if steady else None)
     if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
         # Without a spring the errors of the sub-steps add up.
         trial = unknowns.refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
@@ -280,10 +280,9 @@ def _over_long_runs(
 
     While a stop comes late, what is far off must pull: so by plain least squares first.
     """
-    now = unknowns.plant_at(at.x)
-    errors_of = judge(now, unknowns.logs, unknowns.drive, longest)
+    errors_of = judge(unknowns.plant_at(at.x), unknowns.logs, unknowns.drive, longest)
     first = descended(lambda x: errors_of(unknowns.plant_at(x)), at.x)
-    whole = unknowns.refined(first.x, longest, False)
+    whole = descended(lambda x: soft(errors_of(unknowns.plant_at(x))), first.x)
     left_by = unknowns.misfit(whole.x)
     if whole.followed and left_by <= max(found, COMPLETE):
         return whole, left_by, True
@@ -316,31 +315,6 @@ def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, floa
     finer = gauss_newton(at.fun, at.x, unknowns.steps, FINE_STEP)
     left_by = unknowns.misfit(finer.x)
     return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
-
-
-def _rescued(
-    unknowns: _Unknowns, at: Minimum, found: float, rescues: int, longest: float | None
-) -> tuple[Minimum, float]:
-    """The best minimum from other bands and stick limits, as long as that helps.
-
-    longest [s]: windows in which it is followed in the end, None where no run is.
-    """
-    for _ in range(rescues):
-        if found <= COMPLETE:
-            break
-        # Band and stick limits have narrow minima, and many: another one of either direction.
-        other = by_side(unknowns.plant_at(at.x), unknowns.logs, unknowns.drive)
-        trial = unknowns.refined(unknowns.of_plant(other), RUN_WINDOW, False)
-        if longest is not None:
-            longer = unknowns.refined(trial.x, longest, False)
-            trial = longer if longer.followed else trial
-        trial, better = _ended(unknowns, trial, quick=False)
-        before = found
-        if better < found:
-            at, found = trial, better
-        if better > NO_USE * before:
-            break
-    return at, found
 
 
 def briefly(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:

@@ -16,8 +16,6 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 
 SHORT_WINDOW = 1.0  # s, of the windows in which the search begins
-BAND_GRID = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
-STICK_GRID = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 FIRST_BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
@@ -45,17 +43,6 @@ def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: floa
     p = _best_of(plant, up, errors_of).friction
     down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(CLOSER, CLOSER)]
     return _best_of(plant, down, errors_of)
-
-
-def by_side(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Plant:
-    """The plant with the best band and stick limit of either direction on a wide grid. Ours."""
-    errors_of = judge(plant, logs, drive, SHORT_WINDOW)
-    p = plant.friction
-    up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(BAND_GRID, STICK_GRID)]
-    best = _best_of(plant, up, errors_of)
-    p = best.friction
-    down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(BAND_GRID, STICK_GRID)]
-    return _best_of(best, down, errors_of)
 
 
 def widest_band(logs: Sequence[MotionLog]) -> float:

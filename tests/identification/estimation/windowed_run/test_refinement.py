@@ -46,7 +46,7 @@ def test_a_rough_refinement_ends_where_it_cannot_follow(monkeypatch: pytest.Monk
         return gauss_newton(fun, x, most, step, reach, little)
 
     monkeypatch.setattr("identification.estimation.windowed_run.refinement.gauss_newton", counted)
-    whole = refit(plant(), [one], "command", prior={}, band=0.012, rescues=0)
+    whole = refit(plant(), [one], "command", prior={}, band=0.012)
     count = len(steps)
     rough = refit(plant(), [one], "command", prior={}, band=0.012, effort="rough")
     assert whole.misfit > 5.0 and rough.misfit < 1.1 * whole.misfit
