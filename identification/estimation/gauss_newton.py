@@ -19,8 +19,8 @@ WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the 
 FINE_STEP = 1e-7
 DAMPING_TRIES = 6  # of the damping in one step
 # Of a descent: dampings tried at once, steps at most, fall of the cost that ends it
-DAMPINGS, DESCENT_STEPS, LEAST_FALL = 15, 30, 1e-3
-SPAN, LEAST_SPAN, MOST_SPAN = 0.3, 1e-9, 1e-3  # of a conditional deviation, and bounds in x
+TRIED_AT_ONCE, DESCENT_STEPS, LEAST_FALL = 15, 30, 0.05
+SPAN, NARROWEST_SPAN, WIDEST_SPAN = 0.3, 1e-9, 1e-3  # of a conditional deviation, and bounds in x
 ALIKE = 0.5  # of a derivative, by which those to either side may differ
 LAST_STEP = 1e-5  # share of the cost below which a step is the last
 LITTLE = 1e-3  # the same, where more than noise is left
@@ -129,7 +129,7 @@ def descended(fun: Callable[[Array], Array], x: Array) -> Minimum:
             x, r, cost = tried[best], fun(tried[best]), costs[best]
             damping = float(np.clip(damping * max(powers[best], 1e-3), 1e-9, 1e3))
             by = SPAN / np.sqrt(np.maximum(size, 1e-30))
-            span = np.where(size > 0.0, np.clip(by, LEAST_SPAN, MOST_SPAN), span)
+            span = np.where(size > 0.0, np.clip(by, NARROWEST_SPAN, WIDEST_SPAN), span)
             if gained < LEAST_FALL:
                 break
     return Minimum(fun, x, cost / len(r))
@@ -137,7 +137,7 @@ def descended(fun: Callable[[Array], Array], x: Array) -> Minimum:
 
 def damping_powers() -> list[float]:
     """None, and powers of ten about the damping that served last."""
-    return [0.0, *(10.0 ** (i - 3) for i in range(1, DAMPINGS))]
+    return [0.0, *(10.0 ** (i - 3) for i in range(1, TRIED_AT_ONCE))]
 
 
 def _step(

@@ -84,7 +84,7 @@ def settled(
     values, left = values_of(plant, near.names), min(near.misfit, misfit)
     adequate, events = is_adequate(left), _events(plant, recorded, seconds)
     covariance = _covariance(near, recorded, values, events)
-    logs = tuple(_log_fit(plant, one, recorded.drive, seconds) for one in recorded.logs)
+    logs = tuple(_log_fit(plant, one, recorded.drive, near.whole) for one in recorded.logs)
     remarks = _remarks(adequate, near, logs, recorded)
     if near.whole:
         drift = drift_size(_residuals(plant, recorded, seconds))
@@ -206,16 +206,16 @@ def _as_large_as_can_be(plant: Plant, names: Sequence[str], values: Array, event
     return np.maximum(np.abs(values), [largest.get(name, 0.0) for name in names])
 
 
-def _log_fit(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> LogFit:
-    """What runs of so many seconds leave of a log: of its force too where it is followed whole."""
-    begun = starts(one, drive, seconds)
+def _log_fit(plant: Plant, one: MotionLog, drive: Drive, whole: bool) -> LogFit:
+    """What runs leave of a log: of its force too where it is followed whole."""
+    begun = starts(one, drive, longest_window(plant) if whole else RUN_WINDOW)
     r = window_residual(plant, one, drive, freed(plant, one, drive, begun, even=True))
     y, *F = [CANNOT_BE_FOLLOWED] if r is None else np.sqrt(np.mean(r**2, axis=1)).tolist()
     return LogFit(
         log=one.log.name,
         start=measured_start(one.log),
         position_rms=y * one.noise_y,
-        force_rms=F[0] * one.noise_F if F and seconds > RUN_WINDOW else None,
+        force_rms=F[0] * one.noise_F if F and whole else None,
         chi_square=y**2,
     )
 

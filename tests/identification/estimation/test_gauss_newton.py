@@ -13,6 +13,7 @@ from identification.estimation.gauss_newton import (
     jacobian,
     smooth_jacobian,
 )
+from identification.progress import Halted
 
 RNG = np.random.default_rng(0)
 X = RNG.standard_normal((400, 3))
@@ -47,13 +48,22 @@ def test_the_covariance_is_that_of_noise(fun: Callable[[Array], Array]) -> None:
     np.testing.assert_allclose(spread, np.sqrt(np.diag(expected)), rtol=0.1)
 
 
-def test_a_descent_passes_steps_in_which_a_stop_comes_and_goes() -> None:
+def test_a_descent_comes_down_from_far_and_halted_keeps_what_it_has() -> None:
     t = np.linspace(0.0, 1.0, 400)
+    left = [1000]
 
     def errors(x: Array) -> Array:
-        a, b = np.floor(x * 2e4) / 2e4  # finer than any difference at the minimum
-        return np.asarray((a * np.exp(-b * t) - np.exp(-2.0 * t)) / 1e-3)
+        left[0] -= 1
+        if left[0] < 0:
+            raise Halted
+        return errors_at(t, x)
 
-    found = descended(errors, np.array([3.0, 5.0]))
-    assert np.allclose(found.x, [1.0, 2.0], atol=2e-3)
-    assert found.mean < 1.0
+    begun = np.array([3.0, 5.0])
+    assert np.allclose(descended(errors, begun).x, [1.0, 2.0], atol=1e-6)
+    left[0] = 40
+    halted = descended(errors, begun)
+    assert 0.0 < halted.mean < float(np.mean(errors_at(t, begun) ** 2))
+
+
+def errors_at(t: Array, x: Array) -> Array:
+    return np.asarray((x[0] * np.exp(-x[1] * t) - np.exp(-2.0 * t)) / 1e-3)
