@@ -30,7 +30,7 @@ def line(family: str, seed: int) -> str:
     left = misfit(Plant(one.nine, actuators[family]), recorded.logs, recorded.drive)
     periods = one.how.loop_rate / one.how.log_rate
     true = 0.0 if family == "force" else (periods - 1.0) / (2.0 * periods)
-    jitter = 1e6 * recorded.logs[0].jitter
+    jitter = 1e6 * recorded.logs[0].noise.jitter
     return (
         f"{family:10} {seed:5} share {recorded.share:.3f} ({true:.3f}) jitter {jitter:5.1f} us"
         f" misfit {left:7.2f} | {one.words}"

@@ -11,12 +11,8 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import (
-    NOTHING_KNOWN,
-    MotionLog,
-    mechanical,
-    motion_log,
-)
+from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.standstill import breakaways
 from identification.estimation.regression.weighted_rows import (

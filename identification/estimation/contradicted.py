@@ -16,6 +16,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import again
 from identification.estimation.windowed_run.run_errors import NOISE_LOSS, loss
 from identification.estimation.windowed_run.windows import (
     Freed,
@@ -133,15 +134,15 @@ def _of_log(
     if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
     r = states(window_errors(run, one, drive))
-    noisier = one.position_sd / one.noise_y
-    y, off = _without_spikes(r[0], log["y"] / one.noise_y, noisier)
-    found += _finding(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
-    seen = log["y"] + (r[0] - y) * one.noise_y
+    noisier = one.position_sd / one.noise.y
+    y, off = _without_spikes(r[0], log["y"] / one.noise.y, noisier)
+    found += _finding(log, "y", "spike", off, np.abs(r[0] - y) * one.noise.y)
+    seen = log["y"] + (r[0] - y) * one.noise.y
     jumped = _jumps(y / noisier, begun)
     for k in jumped.tolist():
-        size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise_y
+        size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise.y
         seen_size = [jump_size(log["y"], k, side) for side in LINE_SIDES]
-        apart = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise_y
+        apart = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise.y
         if np.min(np.abs(seen_size - np.asarray(size))) > apart:
             continue
         seen = np.concatenate([seen[: k + 1], seen[k + 1 :] - size])
@@ -149,9 +150,9 @@ def _of_log(
         found.append(BadSamples(log.name, "y", "jump", t, t, 1, abs(size), "offset removed"))
     log = log.with_signals(y=seen)
     if len(r) > 1:
-        F, off = _without_spikes(r[1], log["F"] / one.noise_F, np.ones(len(log)))
-        found += _finding(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
-        log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise_F)
+        F, off = _without_spikes(r[1], log["F"] / one.noise.F, np.ones(len(log)))
+        found += _finding(log, "F", "spike", off, np.abs(r[1] - F) * one.noise.F)
+        log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise.F)
     return log, found
 
 
@@ -215,7 +216,7 @@ def _driving(one: MotionLog, log: Log, drive: Drive) -> Log:
     """The log that drives a run, with what lies between samples of a measured force."""
     if drive != "force":
         return log
-    return one.again(log).driving if log is not one.log else one.driving
+    return again(one, log).driving if log is not one.log else one.driving
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +239,7 @@ class _Driven:
         one, actuator = self.one, self.plant.actuator
         if not isinstance(actuator, Actuator):
             return 0.0
-        noise = one.walk / (actuator.k1 * one.log.h)
+        noise = one.noise.walk / (actuator.k1 * one.log.h)
         return RUN_FAULT_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
 
     def by(self, x: Array) -> Log:
@@ -296,7 +297,7 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
     now, before, found = x, loss(r), list[BadSamples]()
     near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
     if driven.drive == "force":  # which has noise, so that every run by it drifts off
-        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_FAULT_FROM * driven.one.noise_F)
+        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_FAULT_FROM * driven.one.noise.F)
     else:
         tried = [*_candidates(x, SEEN_FROM), *_kicks(r[0], x)]
     for first, length, rough in tried:

@@ -424,7 +424,7 @@ def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
 def _not_linear(recorded: RecordedLogs) -> str:
     """What to say where a linear actuator leaves much of the force; "" where it does not."""
     found = fit_actuator(recorded.plain)
-    noise = [one.noise_F**2 + (found.k2 * one.noise_y) ** 2 for one in recorded.logs]
+    noise = [one.noise.F**2 + (found.k2 * one.noise.y) ** 2 for one in recorded.logs]
     if not leaves_much(found.relative, found.rms / float(np.sqrt(np.mean(noise)))):
         return ""
     return (

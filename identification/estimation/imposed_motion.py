@@ -26,9 +26,9 @@ from identification.estimation.regression.equation_rows import (
     OF_FORCE,
     MotionLog,
     mechanical,
-    motion_log,
 )
 from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import motion_rows, rows_and_windows
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
@@ -83,7 +83,7 @@ def _made(
     """A fit of the force equation as one of the machine."""
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
-    noise_F = float(np.median([one.noise_F for one in recorded.logs]))
+    noise_F = float(np.median([one.noise.F for one in recorded.logs]))
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
     center = np.zeros(5)

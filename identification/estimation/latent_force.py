@@ -24,6 +24,7 @@ from scipy.optimize import minimize_scalar
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import again
 from identification.model.plant import Plant
 from identification.signals.kalman import Chain, N, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
@@ -141,12 +142,12 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     """What the plant says of a log's chain."""
     log = of_body(with_motor_force(one.log, plant), plant)
     if log is not one.log:
-        one = replace(one.again(log), noise_y=one.noise_y, noise_F=one.noise_F)
+        one = replace(again(one, log), noise=one.noise)
     y, v, a, d = (one.signals[name] for name in ("smooth", "v", "a", "d"))
     opposed, F, n = opposing_force(log, plant, y, v, d), np.asarray(log["F"]), len(log)
     slides = _slides(one, slowest)
     p, viscous = plant.friction, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
-    noise_F = max(one.noise_F, LEAST_NOISE_F * float(np.max(np.abs(F))))
+    noise_F = max(one.noise.F, LEAST_NOISE_F * float(np.max(np.abs(F))))
     if one.imposed:
         left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
         known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N))

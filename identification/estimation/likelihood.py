@@ -66,7 +66,9 @@ def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Like
     """Windows of any plant; the fit's own parameters, of which some may be fixed."""
     covariance = np.atleast_2d(fit.covariance)
     windows = LikelyWindows.of(plant, recorded.logs, recorded.drive, fit.free, covariance)
-    by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
+    by_force = (
+        1.0 if recorded.drive == "force" else max(one.noise.corrected for one in recorded.logs) ** 2
+    )
     center = values_of(plant, fit.free)
     # What the windows are stretched to has that in it already.
     by_force = by_force if windows.stretch is None else 0.0

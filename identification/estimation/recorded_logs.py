@@ -12,7 +12,6 @@ from identification.estimation.regression.equation_rows import (
     NOTHING_KNOWN,
     MotionLog,
     actuator,
-    motion_log,
 )
 from identification.estimation.regression.held_command import (
     between_samples,
@@ -21,6 +20,7 @@ from identification.estimation.regression.held_command import (
     unseen,
 )
 from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
@@ -121,11 +121,11 @@ def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
     """A line on each log whose clock jitters so that it shows."""
     return tuple(
         MinorRemark(
-            f"{one.log.name}: its clock jitters by {1e6 * one.jitter:.2g} us, so in motion the"
-            " position is unsure by that times its speed"
+            f"{one.log.name}: its clock jitters by {1e6 * one.noise.jitter:.2g} us, so in motion"
+            " the position is unsure by that times its speed"
         )
         for one in logs
-        if one.jitter > 0.0
+        if one.noise.jitter > 0.0
     )
 
 
@@ -193,7 +193,7 @@ def recorded_logs(
         if not np.any(one.signals["d"]):
             raise NotIdentifiable(
                 f"{one.log.name}: no motion above the noise of the velocity"
-                f" ({one.v_noise:.3g} m/s); record a run that moves"
+                f" ({one.noise.v:.3g} m/s); record a run that moves"
             )
     return with_clocks(found, slower_remarks(logs, slower))
 

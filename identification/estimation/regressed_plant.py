@@ -56,7 +56,7 @@ def regressed_plant(
         found = outcomes[BREAKAWAY].fit.theta
         stick_p = float(found[0]) if found[0] > 0 else stick_p
         stick_n = -float(found[1]) if found[1] > 0 else stick_n
-    slow = max(sliding.slowest, float(np.min([5.0 * one.v_noise for one in stage.logs])))
+    slow = max(sliding.slowest, float(np.min([5.0 * one.noise.v for one in stage.logs])))
     nine = Karnopp(**five, dv_p=slow, dv_n=-slow, F_sp=stick_p, F_sn=stick_n)
     drives: Actuator | Motor | None = None
     if ACTUATOR in outcomes:

@@ -122,7 +122,7 @@ def settled(
 
 def noise_of(recorded: RecordedLogs) -> tuple[float, float]:
     """Noise of the position [m] and of the force [N], medians over the logs."""
-    y, F = zip(*((one.noise_y, one.noise_F) for one in recorded.logs), strict=True)
+    y, F = zip(*((one.noise.y, one.noise.F) for one in recorded.logs), strict=True)
     return float(np.median(y)), float(np.median(F))
 
 
@@ -162,7 +162,7 @@ def _remarks(
 
 def _why_windows(recorded: RecordedLogs) -> str:
     """What to say of a fit that follows its logs in windows."""
-    walk = max(one.walk for one in recorded.logs)
+    walk = max(one.noise.walk for one in recorded.logs)
     if walk == 0.0:
         return MinorRemark(
             "the model follows the logs in windows of 2 s from measured states, but not the whole:"
@@ -188,7 +188,9 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     covariance[unknown, unknown] = (
         _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
     )
-    by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
+    by_force = (
+        1.0 if recorded.drive == "force" else max(one.noise.corrected for one in recorded.logs) ** 2
+    )
     floor = by_force * np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
     covariance = covariance + np.diag(floor**2)
     if not np.all(np.isfinite(covariance)):
@@ -214,8 +216,8 @@ def _log_fit(plant: Plant, one: MotionLog, drive: Drive, whole: bool) -> LogFit:
     return LogFit(
         log=one.log.name,
         start=measured_start(one.log),
-        position_rms=y * one.noise_y,
-        force_rms=F[0] * one.noise_F if F and whole else None,
+        position_rms=y * one.noise.y,
+        force_rms=F[0] * one.noise.F if F and whole else None,
         chi_square=y**2,
     )
 

@@ -17,12 +17,8 @@ from identification.estimation.regressed_plant import (
 )
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    MECHANICAL,
-    MotionLog,
-    shortened,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle

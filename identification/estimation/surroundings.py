@@ -19,12 +19,8 @@ from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import beside_in, of_effect, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import (
-    NOTHING_KNOWN,
-    MotionLog,
-    mechanical,
-    motion_log,
-)
+from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import OF_EQUATION, rows_and_windows
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,

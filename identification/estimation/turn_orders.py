@@ -17,10 +17,10 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.regression.equation_rows import (
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import (
     LEAST_SAMPLES,
     WINDOW_SECONDS,
-    MotionLog,
     motion_log,
 )
 from identification.estimation.regression.weighted_rows import BLOCKS, spread_of_left_out

@@ -23,7 +23,7 @@ from scipy.signal import cont2discrete, lfilter
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.weighted_rows import spread_of_left_out
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit

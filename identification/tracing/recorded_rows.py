@@ -16,8 +16,9 @@ from identification.estimation.recorded_logs import (
     slower_remarks,
     with_clocks,
 )
-from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
+from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog
 from identification.estimation.regression.inertia import speed_ratio
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive

@@ -15,12 +15,8 @@ from identification.errors import NotIdentifiable
 from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    MECHANICAL,
-    MotionLog,
-    motion_log,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
@@ -232,8 +228,8 @@ def _told(
         verdict=_so_far(judged.verdict, after, not_tried),
         before=judged.before,
         after=judged.after,
-        noise_y=float(np.mean([one.noise_y for one in logs])),
-        noise_F=float(np.mean([one.noise_F for one in logs])),
+        noise_y=float(np.mean([one.noise.y for one in logs])),
+        noise_F=float(np.mean([one.noise.F for one in logs])),
         noise_force=row_noise(choice.base, MECHANICAL) or 0.0,
         noise_actuator=row_noise(choice.base, ACTUATOR),
         effects=tuple(found_effect(s, after, choice) for s in choice.steps),

@@ -264,6 +264,6 @@ def run_residual(
         np.repeat(np.arange(float(len(logs))), sizes),
         np.concatenate(found[0]),
         np.concatenate(found[-1]),
-        np.repeat([log.noise_y for log in logs], sizes),
+        np.repeat([log.noise.y for log in logs], sizes),
         {},
     )

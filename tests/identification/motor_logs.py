@@ -6,7 +6,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._library import built_in
-from identification.estimation.regression.equation_rows import MotionLog, motion_log
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import motion_log
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant

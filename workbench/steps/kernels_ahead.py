@@ -24,7 +24,7 @@ def compile_fits() -> None:
     from identification.effects._library import built_in
     from identification.estimation.fit import fit_plant
     from identification.estimation.latent_force import latent_forces
-    from identification.estimation.regression.equation_rows import motion_log
+    from identification.estimation.regression.motion_log import motion_log
     from identification.log import Log, Rig
     from identification.model.plant import Plant
     from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical

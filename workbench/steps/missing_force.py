@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from identification.estimation.latent_force import LatentForces, latent_forces
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.structure_fit import ABOVE_BAND
 from identification.log import Log
 from workbench.documents.model import Model

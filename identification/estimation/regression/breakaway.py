@@ -68,7 +68,7 @@ def _event(
         return None
     way = float(np.sign(one.signals["d"][high]))
     level = float(np.mean(y[first : first + mean]))
-    if way * (y[last - 1] - level) < MOVED * one.noise_y:
+    if way * (y[last - 1] - level) < MOVED * one.noise.y:
         return None
     driven = one.log if one.held else one.driving
     part = Log(one.log.name, {key: driven[key][first:last] for key in ("t", "y", "F")})
@@ -120,5 +120,5 @@ def _cost(
     y = before
     if len(part):
         y = np.append(before, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
-    r: Array = (y - y_m) / max(one.noise_y, EXACT_POSITION)
+    r: Array = (y - y_m) / max(one.noise.y, EXACT_POSITION)
     return float(np.mean(np.minimum(r**2, 1e4)))

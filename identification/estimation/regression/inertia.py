@@ -5,11 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.regression.equation_rows import (
-    NOTHING_KNOWN,
-    MotionLog,
-    mechanical,
-)
+from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
 
 # Of the force's quick changes, that inertia explains of a body that is free
 SHOWN_BY_INERTIA = 0.15

@@ -14,12 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.estimation.regression.equation_rows import (
-    FIVE,
-    OF_FORCE,
-    SURE_OF_DIRECTION,
-    MotionLog,
-)
+from identification.estimation.regression.equation_rows import FIVE, OF_FORCE, MotionLog
+from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.estimation.regression.weighted_rows import BLOCKS, Rows, solve_rows, stacked
 from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
@@ -97,7 +93,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     fine = weights(max(FINEST_WINDOW, 2 * (half // FINER_WINDOW)), h)[1]
     padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
     v = np.correlate(padded, fine, "valid")[:n]
-    sure = SURE_OF_DIRECTION * one.noise_y * float(np.sqrt(noise_gain(first)))
+    sure = SURE_OF_DIRECTION * one.noise.y * float(np.sqrt(noise_gain(first)))
     sure = max(sure, SLOWEST_SLIDING * float(np.quantile(np.abs(v), FAST_SPEEDS)))
     over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
     w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
@@ -109,7 +105,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
     viscous = np.where(over > 0.0, theta[3], theta[4])[:, np.newaxis]
     by_position = np.sum((theta[0] * second + viscous * first) ** 2, axis=1)
-    variance = one.noise_F**2 * noise_gain(mean) + one.position_sd[w.middle] ** 2 * by_position
+    variance = one.noise.F**2 * noise_gain(mean) + one.position_sd[w.middle] ** 2 * by_position
     # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
     sd = np.maximum(np.sqrt(variance), OF_FORCE * float(np.std(one.log["F"])))
     block = (w.middle * BLOCKS // n).astype(np.int64)
@@ -137,7 +133,7 @@ class _WidthFit:
         force = max(float(np.linalg.norm(every.b)), 1e-300)
         square = max(float(np.sum(every.X[:, 0] ** 2)), 1e-300)
         noise = sum(
-            len(one.rows.b) * log.noise_y**2 * noise_gain(weights(one.windows.length, log.log.h)[2])
+            len(one.rows.b) * log.noise.y**2 * noise_gain(weights(one.windows.length, log.log.h)[2])
             for one, log in zip(made, logs, strict=True)
         )
         inertia = abs(float(plain.theta[0])) * square**0.5 / force

@@ -111,7 +111,7 @@ def rest_rows(one: MotionLog, rest: Rest, moved: Array | None = None) -> Rows:
     y = one.log["y"] if moved is None else one.log["y"] - moved
     mean = samples(MEAN, one.log.h)
     b = means(y, rest, mean)
-    sd = np.full(len(b), one.noise_y / np.sqrt(mean))
+    sd = np.full(len(b), one.noise.y / np.sqrt(mean))
     block = (rest.start * BLOCKS // len(one.log)).astype(np.int64)
     return Rows(b, np.zeros((len(b), 0)), sd, block, np.full(len(b), np.inf), ())
 
@@ -137,8 +137,8 @@ def breakaways(one: MotionLog, m: float) -> Breakaways:
         way = float(np.sign(one.signals["d"][high]))
         end = min(high + mean, len(y))
         seen = way * (y[low:end] - level)
-        moved = np.flatnonzero(seen < ONSET * one.noise_y)
-        if not len(moved) or seen[-1] < RUN * ONSET * one.noise_y:
+        moved = np.flatnonzero(seen < ONSET * one.noise.y)
+        if not len(moved) or seen[-1] < RUN * ONSET * one.noise.y:
             continue
         onset = _onset(seen, way * F[low:end], int(moved[-1]), h, m)
         if onset is None or onset < 2 * mean:

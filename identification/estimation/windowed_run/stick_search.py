@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.global_search import evolve
-from identification.estimation.regression.equation_rows import MotionLog, shortened
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.run_errors import Judge, judge, loss
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
@@ -63,7 +64,7 @@ def stick_search(
     """
     part = [shortened(one, PIECE) for one in logs]
     top = widest_band(part)
-    slow = max(SLOWEST_BAND * min(one.v_noise for one in part), top / BANDS_SPAN)
+    slow = max(SLOWEST_BAND * min(one.noise.v for one in part), top / BANDS_SPAN)
     if not slow < top < np.inf:
         return plant
     for close in (False, True):

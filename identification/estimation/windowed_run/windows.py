@@ -82,13 +82,13 @@ def starts(
     near = [y[max(k - around // 2, 0) : k + around // 2 + 1] for k in at]
     level = np.array([float(np.mean(x)) for x in near])
     # A body at rest on one count of its encoder is anywhere within it, however long.
-    counted = np.array([float(np.std(x)) < ON_ONE_COUNT * one.noise_y for x in near])
-    level_sd = np.where(counted, one.noise_y, one.noise_y / np.sqrt(around))
-    sd_F = 0.0 if one.held or drive == "force" else one.noise_F
+    counted = np.array([float(np.std(x)) < ON_ONE_COUNT * one.noise.y for x in near])
+    level_sd = np.where(counted, one.noise.y, one.noise.y / np.sqrt(around))
+    sd_F = 0.0 if one.held or drive == "force" else one.noise.F
     sd = np.array(
         [
             np.where(rest, level_sd, one.position_sd[index]),
-            np.where(rest, 0.0, one.v_noise),
+            np.where(rest, 0.0, one.noise.v),
             np.full(len(at), sd_F),
         ]
     )
@@ -130,7 +130,7 @@ def window_run(
             start,
             drive,
             restarts=(begun.at, y, v, F),
-            gain=one.gain if drive == "command" else 0.0,
+            gain=one.noise.corrected if drive == "command" else 0.0,
             bristle_step=begun.step,
         )
 
@@ -141,7 +141,7 @@ def window_run(
         run, shift = run_from(y), np.zeros(len(y))
         for _ in range(RETURNS if sensors else 0):  # what was measured is what is shown
             before, shift = shift, (run.shown - run.y)[np.maximum(at, 0)]
-            if np.all(np.abs(shift - before) <= PLACE_CONVERGED * one.noise_y):
+            if np.all(np.abs(shift - before) <= PLACE_CONVERGED * one.noise.y):
                 break
             run = run_from(y - shift)
         return run
@@ -159,10 +159,12 @@ def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
 
     Source of the force's weight: steady gain of a local level, Harvey (1989); `README.md`, (3).
     """
-    out = [(run.shown - one.log["y"]) / one.noise_y]
+    out = [(run.shown - one.log["y"]) / one.noise.y]
     if drive == "command" and not one.held:
         # Beside the sensor's noise, that of the force before it was corrected.
-        out.append((run.F - one.log["F"]) * np.sqrt(1.0 - one.gain) / max(one.noise_F, 1e-12))
+        out.append(
+            (run.F - one.log["F"]) * np.sqrt(1.0 - one.noise.corrected) / max(one.noise.F, 1e-12)
+        )
     return np.array(out)
 
 
@@ -205,7 +207,7 @@ def _creep(one: MotionLog, low: int, high: int) -> tuple[float, float]:
     x = one.log.h * (np.arange(-half, half) + 0.5)
     square = float(x @ x)
     y = np.asarray(one.log["y"])[middle - half : middle + half]
-    return float(x @ y) / square, one.noise_y / float(np.sqrt(square))
+    return float(x @ y) / square, one.noise.y / float(np.sqrt(square))
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +295,7 @@ def _weights(
     square = np.zeros(r.shape)
     if walks(one, drive):
         square[0] = _least_drift(plant, one, drive, begun, base)
-    square[0] += (one.jitter * one.signals["v"] / one.noise_y) ** 2
+    square[0] += (one.noise.jitter * one.signals["v"] / one.noise.y) ** 2
     return np.asarray(1.0 / np.sqrt(1.0 + square))
 
 
@@ -310,7 +312,7 @@ def _least_drift(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base
 
 def walks(one: MotionLog, drive: Drive) -> bool:
     """Whether a run drifts off with the noise of the force that drives or corrects it."""
-    return (drive == "force" or one.held or one.walk > 0.0) and one.noise_F > 0.0
+    return (drive == "force" or one.held or one.noise.walk > 0.0) and one.noise.F > 0.0
 
 
 def _drift_variance(
@@ -322,20 +324,20 @@ def _drift_variance(
         noisy = _noisier(plant, one, drive, np.random.default_rng(seed))
         run = window_run(plant, one, drive, begun, log=noisy)
         if run is not None:
-            square += ((run.shown - base.shown) / one.noise_y) ** 2 / NOISE_RUNS
+            square += ((run.shown - base.shown) / one.noise.y) ** 2 / NOISE_RUNS
     return square
 
 
 def _noisier(plant: Plant, one: MotionLog, drive: Drive, rng: np.random.Generator) -> Log:
     """The log that drives a run, with its force's (and command's) noise once more."""
     own = driven_by(one, drive)
-    sd = np.hypot(one.noise_F, one.kinks) if drive == "force" else one.noise_F
+    sd = np.hypot(one.noise.F, one.kinks) if drive == "force" else one.noise.F
     noise = sd * rng.standard_normal(len(one.log))
     more = {"F": own["F"] + noise}
     if isinstance(plant.actuator, Motor):
         more["u"] = own["u"] + noise / plant.actuator.k_a
     elif drive == "command" and isinstance(plant.actuator, Actuator):
-        step = one.walk / (plant.actuator.k1 * one.log.h)
+        step = one.noise.walk / (plant.actuator.k1 * one.log.h)
         more["u"] = own["u"] + step * rng.standard_normal(len(one.log))
     return own.with_signals(**more)
 
@@ -382,4 +384,4 @@ def position_rms(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float
 def position_errors(plant: Plant, one: MotionLog, drive: Drive) -> Array | None:
     """The shown position's error in windows [m], (n,); None where it cannot be followed."""
     r = window_residual(plant, one, drive, freed(plant, one, drive, starts(one, drive), even=True))
-    return None if r is None else r[0] * one.noise_y
+    return None if r is None else r[0] * one.noise.y

@@ -15,12 +15,8 @@ from scipy.stats import chi2
 from identification.effects._base import Effect
 from identification.estimation.regression.effect_columns import by_load, equations_of
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    MECHANICAL,
-    MotionLog,
-    shortened,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import loose, on_bristle

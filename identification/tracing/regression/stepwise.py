@@ -18,6 +18,7 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
+from identification.estimation.regression.motion_log import again
 from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
@@ -354,7 +355,7 @@ def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, R
     """Whether the effect is large enough to matter to the machine, noise apart. Ours."""
     level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
     if candidate.effect.place.shows:
-        return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
+        return any(shift_rms(candidate, stage, one) > SHIFT * one.noise.y for one in stage.logs)
     for equation in candidate.outcomes:
         size = contribution_rms(candidate, base, equation, stage.band)
         if equation == MECHANICAL and size > MATERIAL * level:
@@ -387,6 +388,6 @@ def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
             whole = reached(effect, values, one, stage.friction)
             more = {"F": driven(one, whole)} if one.held else {}
             log = one.log.with_signals(u=command_of(one, whole), **more)
-        logs.append(one.again(log))
+        logs.append(again(one, log))
     play = stage.play or (effect.place.shows and effect.evolve is not None)
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

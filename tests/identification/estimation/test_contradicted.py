@@ -36,7 +36,8 @@ def test_one_bad_sample_moves_no_parameter(signal: str, at: int, size: float, ki
 def test_what_an_actuators_noisy_command_adds_up_to_is_no_bad_sample() -> None:
     """Over half a second, in which the noise of many samples passes for one."""
     machine = motor(0)
-    one = replace(recorded_logs([machine.log], machine.rig).logs[0], walk=0.2)
+    one = recorded_logs([machine.log], machine.rig).logs[0]
+    one = replace(one, noise=replace(one.noise, walk=0.2))
     begun = starts(one, "command")
     nine = Karnopp(5.0, 10.0, 10.0, 20.0, 20.0, 0.01, -0.01, 14.0, -14.0)
 

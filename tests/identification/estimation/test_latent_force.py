@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.latent_force import LatentForces, latent_forces
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.log import Log
 from identification.model.plant import Plant
 from tests.identification.motor_logs import NINE, made, plant, seen

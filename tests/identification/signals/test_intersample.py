@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log
 from identification.model.karnopp import Karnopp

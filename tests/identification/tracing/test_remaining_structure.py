@@ -241,7 +241,7 @@ def test_how_large_an_error_is_tells_where_its_sign_is_a_matter_of_luck() -> Non
     # Breakaways come a little early or late, by chance: no mean depends on anything.
     _, after = lacking({})
     one = after.stage.logs[0]
-    rng, sigma = np.random.default_rng(2), one.noise_y
+    rng, sigma = np.random.default_rng(2), one.noise.y
     slow = np.abs(one.signals["v"]) < np.quantile(np.abs(one.signals["v"]), 0.4)
     lost = np.cumsum(np.where(slow, 3.0 * sigma * rng.standard_normal(len(slow)), 0.0))
     blurred = replace(one, log=one.log.with_signals(y=one.log["y"] + lost))

@@ -12,8 +12,9 @@ from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog, motion_log
+from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.log import Log, Rig
 from identification.tracing.regression.cross_validation import left_out_error

@@ -42,7 +42,7 @@ def test_a_counted_position_has_the_noise_of_its_step() -> None:
     assert resolution(counted(made(2))["y"]) == pytest.approx(COUNT)
     assert resolution(made(2)["y"]) == 0.0
     one = seen(counted(made(2), 1e-4))
-    assert one.noise_y >= 0.9 * 1e-4 / np.sqrt(12.0)
+    assert one.noise.y >= 0.9 * 1e-4 / np.sqrt(12.0)
     still = np.zeros(200)
     assert resolution(still) == 0.0
 
@@ -79,11 +79,11 @@ def test_noise_of_a_logged_command_is_told_from_what_a_controller_passes() -> No
     log, rng = made(6), np.random.default_rng(0)
     noise = 0.3 * rng.standard_normal(len(log))
     noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
-    assert seen(noisy).noise_F == pytest.approx(0.3, rel=0.15)
+    assert pytest.approx(0.3, rel=0.15) == seen(noisy).noise.F
     assert walks(seen(noisy), "command") and not walks(seen(log), "command")
     filtered = np.convolve(log["y"], [400.0, -300.0, -100.0])[: len(log)]
     passed = log.with_signals(F=log["F"] + filtered, u=log["u"] + filtered / K_A)
-    assert seen(passed).noise_F < 0.02
+    assert seen(passed).noise.F < 0.02
 
 
 def test_a_plant_that_walks_more_is_not_forgiven_for_it() -> None:

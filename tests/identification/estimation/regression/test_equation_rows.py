@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.errors import BadLog
-from identification.estimation.regression.equation_rows import LEAST_PART, motion_log, shortened
+from identification.estimation.regression.motion_log import LEAST_PART, motion_log, shortened
 from identification.estimation.regression.weighted_rows import Rows, solve_rows
 from identification.log import Log
 
@@ -16,7 +16,7 @@ def test_noise_is_never_nothing(noise: float) -> None:
     swing = 0.05 * np.sin(2.0 * np.pi * np.clip(t - 6.0, 0.0, None))
     y = swing + np.where(t > 6.0, noise, 0.0) * np.random.default_rng(3).standard_normal(len(t))
     log = Log("stands", {"t": t, "y": y, "F": np.cos(t)})
-    assert 0.0 < motion_log(log, held=False, by_command=False).noise_y < 1e-3
+    assert 0.0 < motion_log(log, held=False, by_command=False).noise.y < 1e-3
 
 
 def test_what_no_row_tells_comes_out_as_nothing() -> None:
@@ -39,7 +39,7 @@ def test_a_part_of_a_log_begins_where_the_body_does_and_has_the_noise_of_the_who
     part = shortened(one, 5.0)
     assert 11.0 < part.log["t"][0] < 12.0
     assert len(part.log) == 2500
-    assert (part.noise_y, part.noise_F) == (one.noise_y, one.noise_F)
+    assert (part.noise.y, part.noise.F) == (one.noise.y, one.noise.F)
     assert shortened(one, 100.0).log.signals.keys() == one.log.signals.keys()
     slow = motion_log(standing(0.2, 500), held=False, by_command=False)
     assert len(shortened(slow, 5.0).log) == LEAST_PART  # fewer samples show no motion

@@ -80,7 +80,7 @@ def test_the_logs_have_the_mean_force_until_the_next_sample(R: int) -> None:
     # A log that is read later is taken in the same way, and no log is changed.
     again = found.given(log)
     assert np.array_equal(again.log["F"], found.logs[0].log["F"])
-    assert again.noise_F == found.logs[0].noise_F
+    assert again.noise.F == found.logs[0].noise.F
     assert log["F"][0] != again.log["F"][0]
 
 
@@ -101,7 +101,7 @@ def test_where_an_effect_is_missing_the_commands_rate_is_no_share() -> None:
 def test_a_measured_force_is_that_of_its_sample() -> None:
     found = recorded_logs([driven(4)[0]], Rig("force"), "force")
     assert found.share == 0.0
-    assert found.logs[0].between == 0.0
+    assert found.logs[0].noise.between == 0.0
 
 
 def behind_valve(R: int, chatter: float = 0.0) -> Log:
@@ -137,4 +137,4 @@ def test_what_the_loop_adds_between_the_samples_walks(R: int) -> None:
     found = recorded_logs([log], CYLINDER, "command").logs[0]
     tick = H / R
     unlogged = 900.0 * tick * 0.05 * np.sqrt((R - 1) + (R - 1) ** 2)
-    assert found.walk == pytest.approx(unlogged, rel=0.35, abs=2e-4)
+    assert found.noise.walk == pytest.approx(unlogged, rel=0.35, abs=2e-4)

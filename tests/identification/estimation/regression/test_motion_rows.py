@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from identification.arrays import Array
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.regression.equation_rows import FIVE, MotionLog, motion_log
+from identification.estimation.regression.equation_rows import FIVE, MotionLog
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
     HALF_WIDTHS,
     motion_rows,

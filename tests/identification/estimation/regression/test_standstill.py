@@ -4,7 +4,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._library import built_in
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.standstill import MEAN, borne, rests
 from identification.log import Log
 from identification.signals.sampling import samples

@@ -50,7 +50,7 @@ def test_at_rest_on_one_count_a_body_is_anywhere_within_it() -> None:
     begun = starts(counted, "command")
     still = begun.sd[1] == 0.0
     assert np.sum(still) > 4
-    assert np.mean(begun.sd[0][still] == counted.noise_y) > 0.7  # else noise flips it
+    assert np.mean(begun.sd[0][still] == counted.noise.y) > 0.7  # else noise flips it
     assert np.all(white.sd[0][white.sd[1] == 0.0] < 0.5 * NOISE)
 
 
@@ -102,7 +102,8 @@ def test_a_play_is_where_the_motion_left_it() -> None:
 def test_a_run_by_a_noisy_force_is_judged_less_where_it_walks() -> None:
     log = made(5)
     noisy = log["F"] + 0.5 * np.random.default_rng(0).standard_normal(len(log))
-    by_force = replace(seen(log.with_signals(F=noisy)), held=False, noise_F=0.5)
+    one = seen(log.with_signals(F=noisy))
+    by_force = replace(one, held=False, noise=replace(one.noise, F=0.5))
     free = module.freed(plant(), by_force, "force", starts(by_force, "force"))
     assert free is not None
     assert np.min(free.weight) < 0.5 < np.max(free.weight) <= 1.0

@@ -9,7 +9,8 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import MotionLog, shortened
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.parameters import even

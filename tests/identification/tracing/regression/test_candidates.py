@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
-from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.model.karnopp import Karnopp

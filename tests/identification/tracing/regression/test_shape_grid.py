@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
+from identification.estimation.regression.motion_log import again
 from identification.tracing.regression.shape_grid import shape_grid
 from tests.identification.motor_logs import made, seen
 
@@ -32,7 +33,7 @@ def test_a_force_is_seen_to_repeat_but_gravity_where_it_turns(
 
 def test_another_log_of_the_machine_is_seen_alike() -> None:
     one = replace(seen(made(4, {})), rotary=True)
-    again = one.again(one.log)
-    assert again.rotary
-    assert again.held == one.held
-    assert again.noise_F == one.noise_F
+    same = again(one, one.log)
+    assert same.rotary
+    assert same.held == one.held
+    assert same.noise == one.noise

@@ -9,7 +9,8 @@ import pytest
 from benchmarks.outside_rig import EFFECTS, write
 from identification.effects._library import built_in
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, REST, motion_log
+from identification.estimation.regression.equation_rows import ACTUATOR, REST
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.tracing.regression.candidates import best_of
