@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand, Step, step
-from workbench.options import CARD_OPTION, LOG_ARGUMENT, SEED_OPTION
 from workbench.output import JSON_OPTION, OUT_OPTION, results
 from workbench.signature import by_signature, option
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 )
 @by_signature
 def command(
-    log: str = LOG_ARGUMENT,
-    card: str = CARD_OPTION,
+    log: str = options.LOG_ARGUMENT,
+    card: str = options.CARD_OPTION,
     where: str | None = option(
         "SQLite file or postgresql://... whose last 30 logs of the machine give its limits.",
         "--registry", metavar="FILE|URL",
@@ -31,7 +31,7 @@ def command(
     machine: str | None = option(
         "The machine's name in the registry.  [default: the card's]", metavar="NAME"
     ),
-    seed: int = SEED_OPTION,
+    seed: int = options.SEED_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> int:  # fmt: skip

@@ -6,24 +6,9 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from workbench import options
 from workbench.course import running
 from workbench.ending import StatusCommand, step
-from workbench.options import (
-    DELAY_OPTION,
-    EFFECTS_OPTION,
-    FORCE_OPTION,
-    MODEL_ARGUMENT,
-    MODULUS_OPTION,
-    OVERSHOOT_OPTION,
-    POSITIVE,
-    PRESENT_CARD_OPTION,
-    REGISTRY_OPTION,
-    STANDSTILL_OPTION,
-    TRACKING_OPTION,
-    Finite,
-    refuse_for_velocity,
-    refuse_given,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import by_fields, option
 
@@ -49,7 +34,7 @@ NOT_FOR_VELOCITY = (
 class DesignOptions:
     """What the command line says of a design."""
 
-    model_file: Path = MODEL_ARGUMENT
+    model_file: Path = options.MODEL_ARGUMENT
     poles: str | None = option(
         "Dominant poles [rad/s, -].  [default: searched]", metavar="W_N,ZETA"
     )
@@ -75,36 +60,36 @@ class DesignOptions:
         "Plant to design on.  [default: physical where the mass is identified]", "--from"
     )
     design_period: float | None = option(
-        "Period of the position loop [s].", type=POSITIVE, metavar="S"
+        "Period of the position loop [s].", type=options.POSITIVE, metavar="S"
     )
-    modulus: float = MODULUS_OPTION
-    delay: float = DELAY_OPTION
+    modulus: float = options.MODULUS_OPTION
+    delay: float = options.DELAY_OPTION
     robust: bool = option("Choose by the loops of machines drawn from the model's uncertainty.")
     draws: int = option(
         "Machines drawn, with --robust.", type=click.IntRange(20, 10_000), default=200
     )
     probability: float = option(
         "Share of the machines on which each limit has to hold, with --robust.",
-        type=Finite(0.5, 1.0, max_open=True), default=0.95,
+        type=options.Finite(0.5, 1.0, max_open=True), default=0.95,
     )  # fmt: skip
     staircase: float | None = option(
         "Largest staircase on a slow ramp [m, rad], with --robust.  [default: any]",
-        type=POSITIVE, metavar="M",
+        type=options.POSITIVE, metavar="M",
     )  # fmt: skip
-    standstill: float = STANDSTILL_OPTION
-    tracking: float = TRACKING_OPTION
-    overshoot: float = OVERSHOOT_OPTION
-    force: float = FORCE_OPTION
+    standstill: float = options.STANDSTILL_OPTION
+    tracking: float = options.TRACKING_OPTION
+    overshoot: float = options.OVERSHOOT_OPTION
+    force: float = options.FORCE_OPTION
     machine: str | None = option(
         "Machine in the registry by whose drift so far the machines differ, with --robust.",
         metavar="NAME",
     )
-    where: str | None = REGISTRY_OPTION
+    where: str | None = options.REGISTRY_OPTION
     seed: int = option(
         "Of the machines drawn, with --robust.", type=click.IntRange(min=0), default=0
     )
-    card: str | None = PRESENT_CARD_OPTION
-    effects: tuple[Path, ...] = EFFECTS_OPTION
+    card: str | None = options.PRESENT_CARD_OPTION
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION
     as_json: bool = JSON_OPTION
     out: Path | None = OUT_OPTION
 
@@ -129,16 +114,17 @@ def command(given: DesignOptions) -> int:
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
-    from workbench.options import parse_auxiliary, parse_poles
     from workbench.steps.elastic import with_response
     from workbench.steps.present import with_card
 
     model_file = given.model_file
     if is_velocity_model(model_file):
-        refuse_for_velocity(*NOT_FOR_VELOCITY)
+        options.refuse_for_velocity(*NOT_FOR_VELOCITY)
         return _velocity(given)
     model = with_card(read_model(model_file, library(given.effects)), given.card)
-    asked = Asked(parse_poles(given.poles), parse_auxiliary(given.auxiliary), given.integrator)
+    asked = Asked(
+        options.parse_poles(given.poles), options.parse_auxiliary(given.auxiliary), given.integrator
+    )
     _refuse_beside(given)
     if given.robust:
         return _robust(given, model, asked)
@@ -197,9 +183,11 @@ def _refuse_beside(given: DesignOptions) -> None:
     if "p-pi" in given.structures and not given.integrator:
         raise click.UsageError("a P-PI cascade has an integrator; leave out --no-integrator.")
     if given.robust:
-        refuse_given("{} has no meaning with --robust; leave it out.", *NOT_WITH_ROBUST)
+        options.refuse_given("{} has no meaning with --robust; leave it out.", *NOT_WITH_ROBUST)
     else:
-        refuse_given("{} has no meaning without --robust; add it, or leave it out.", *ROBUST_ONLY)
+        options.refuse_given(
+            "{} has no meaning without --robust; add it, or leave it out.", *ROBUST_ONLY
+        )
 
 
 def _limits(given: DesignOptions) -> "Limits":

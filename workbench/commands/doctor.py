@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand, step
-from workbench.options import complete_card, complete_file
 from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
 from workbench.signature import argument, by_signature, option
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 )
 @by_signature
 def command(
-    log: str | None = argument(shell_complete=complete_file),
+    log: str | None = argument(shell_complete=options.complete_file),
     card: str | None = option(
-        "Path of the card, or the name of a shipped one.", shell_complete=complete_card
+        "Path of the card, or the name of a shipped one.", shell_complete=options.complete_card
     ),
     where: str | None = option(
         "Registry to be asked, without LOG.  [default: WORKBENCH_REGISTRY, if set]",

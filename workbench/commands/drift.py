@@ -4,15 +4,8 @@ from pathlib import Path
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import (
-    CARD_OPTION,
-    EFFECTS_OPTION,
-    LOGS_ARGUMENT,
-    MODEL_ARGUMENT,
-    POSITIVE,
-    SEED_OPTION,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import by_signature, option
 
@@ -26,26 +19,26 @@ from workbench.signature import by_signature, option
 )
 @by_signature
 def command(
-    model_file: Path = MODEL_ARGUMENT,
-    logs: tuple[str, ...] = LOGS_ARGUMENT,
-    card: str = CARD_OPTION,
+    model_file: Path = options.MODEL_ARGUMENT,
+    logs: tuple[str, ...] = options.LOGS_ARGUMENT,
+    card: str = options.CARD_OPTION,
     state_file: Path | None = option(
         "File that carries the test from log to log; made where there is none.",
         "--state", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
     ),
     margin: float = option(
-        "Change of a parameter that does not matter [%].", type=POSITIVE, default=2.0
+        "Change of a parameter that does not matter [%].", type=options.POSITIVE, default=2.0
     ),
     variation: float = option(
         "Standard deviation of a parameter from log to log [%], until the logs show it.",
-        type=POSITIVE, default=1.0,
+        type=options.POSITIVE, default=1.0,
     ),
     run_length: float = option(
         "Logs without drift up to a false alarm, on average, at least.",
-        type=POSITIVE, default=1000.0,
+        type=options.POSITIVE, default=1000.0,
     ),
-    seed: int = SEED_OPTION,
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    seed: int = options.SEED_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> int:  # fmt: skip

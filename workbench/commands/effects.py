@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench import options
 from workbench.ending import StatusGroup, step
-from workbench.options import EFFECTS_OPTION
 from workbench.output import JSON_OPTION, emit, progress
 from workbench.signature import argument, by_signature
 
@@ -28,7 +28,7 @@ def command() -> None:
 @by_signature
 def list_effects(
     keys: tuple[str, ...] = argument("[KEY]..."),
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """List the effects, a line each; with --verbose equation, parameters with units, source.

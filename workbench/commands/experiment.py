@@ -5,16 +5,9 @@ from pathlib import Path
 
 import click
 
+from workbench import options
 from workbench.course import running
 from workbench.ending import StatusCommand
-from workbench.options import (
-    EFFECTS_OPTION,
-    MODEL_ARGUMENT,
-    POSITIVE,
-    PRESENT_CARD_OPTION,
-    SEED_OPTION,
-    Finite,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, results
 from workbench.signature import by_fields, option
 
@@ -25,7 +18,7 @@ SEARCH_SECONDS = 30.0
 class ExperimentOptions:
     """What the command line says of an experiment."""
 
-    model_file: Path = MODEL_ARGUMENT
+    model_file: Path = options.MODEL_ARGUMENT
     design_file: Path | None = option(
         "A design whose recommended controller moves the machine.  [default: its present one]",
         "--design", metavar="DESIGN",
@@ -35,17 +28,19 @@ class ExperimentOptions:
     )
     stroke: tuple[float, float] | None = option(
         "Positions between which it may move [m, rad].  [default: the card's, or the logs']",
-        type=(Finite(), Finite()), metavar="LOW HIGH",
+        type=(options.Finite(), options.Finite()), metavar="LOW HIGH",
     )  # fmt: skip
     speed: float | None = option(
-        "Largest speed [m/s, rad/s].  [default: 1.5 times the logs']", type=POSITIVE
+        "Largest speed [m/s, rad/s].  [default: 1.5 times the logs']", type=options.POSITIVE
     )
     force: float | None = option(
-        "Largest force [N, N m].  [default: 1.2 times the logs']", type=POSITIVE
+        "Largest force [N, N m].  [default: 1.2 times the logs']", type=options.POSITIVE
     )
-    limit: float | None = option("Largest command.  [default: any]", "--command", type=POSITIVE)
+    limit: float | None = option(
+        "Largest command.  [default: any]", "--command", type=options.POSITIVE
+    )
     seconds: float = option(
-        "How long the run lasts [s].", "--time", type=Finite(min=2, max=600), default=20.0
+        "How long the run lasts [s].", "--time", type=options.Finite(min=2, max=600), default=20.0
     )
     trace_file: Path | None = option(
         "trace.json whose rivals (or, of an unknown effect, all of the library) the run is to"
@@ -54,11 +49,11 @@ class ExperimentOptions:
     )  # fmt: skip
     budget: float = option(
         "End the search after so long with the best so far; the first Ctrl-C does the same.",
-        type=POSITIVE, default=SEARCH_SECONDS, metavar="SECONDS",
+        type=options.POSITIVE, default=SEARCH_SECONDS, metavar="SECONDS",
     )  # fmt: skip
-    seed: int = SEED_OPTION
-    card: str | None = PRESENT_CARD_OPTION
-    effects: tuple[Path, ...] = EFFECTS_OPTION
+    seed: int = options.SEED_OPTION
+    card: str | None = options.PRESENT_CARD_OPTION
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION
     as_json: bool = JSON_OPTION
     out: Path | None = OUT_OPTION
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import refuse_given
 from workbench.output import JSON_OPTION, OUT_OPTION, OutputFolder, emit, results
 from workbench.signature import argument, by_fields, option
 
@@ -107,9 +107,9 @@ def command(given: ExportOptions) -> int:
     units; what a table cannot hold is said in newtons.
     """
     if _is_of_model(given.file, given.targets):
-        refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
+        options.refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
         return _tables(given)
-    refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
+    options.refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
     from workbench.documents.design_read import read_design
     from workbench.export.exported import exported
     from workbench.export.targets import writers

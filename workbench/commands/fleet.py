@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand, Step, step
 from workbench.jobs.options import clock, worker_name
-from workbench.options import POSITIVE, REGISTRY_OPTION, SEED_OPTION
 from workbench.output import JSON_OPTION, dumps, emit, progress
 from workbench.signature import argument, by_fields, option
 
@@ -46,11 +46,11 @@ class FleetOptions:
         type=click.IntRange(min=1), default=3,
     )  # fmt: skip
     timeout: float = option(
-        "Wait this long for a cluster's answer.", type=POSITIVE, default=30.0, metavar="S"
+        "Wait this long for a cluster's answer.", type=options.POSITIVE, default=30.0, metavar="S"
     )
-    where: str | None = REGISTRY_OPTION
+    where: str | None = options.REGISTRY_OPTION
     no_registry: bool = option("Write Parquet only.")
-    seed: int = SEED_OPTION
+    seed: int = options.SEED_OPTION
     out: Path = option(
         "Folder of the results; the same again goes on there.",
         default=Path("fleet"), metavar="DIR",

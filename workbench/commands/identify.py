@@ -6,16 +6,9 @@ from typing import Literal
 
 import click
 
+from workbench import options
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand
-from workbench.options import (
-    BUDGET_OPTION,
-    CARD_OPTION,
-    LOGS_ARGUMENT,
-    POSITIVE,
-    SEED_OPTION,
-    refuse_for_velocity,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import by_signature, option
 from workbench.steps.stages import IDENTIFY_STAGES
@@ -28,8 +21,8 @@ from workbench.steps.stages import IDENTIFY_STAGES
 )
 @by_signature
 def command(
-    logs: tuple[str, ...] = LOGS_ARGUMENT,
-    card: str = CARD_OPTION,
+    logs: tuple[str, ...] = options.LOGS_ARGUMENT,
+    card: str = options.CARD_OPTION,
     drive: Literal["force", "command"] | None = option(
         "What drives the fitted run.  [default: the command where it explains the force]"
     ),
@@ -38,11 +31,11 @@ def command(
     ),
     design_period: float | None = option(
         "Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
-        type=POSITIVE, metavar="S",
+        type=options.POSITIVE, metavar="S",
     ),
-    budget: float = BUDGET_OPTION,
+    budget: float = options.BUDGET_OPTION,
     posterior: bool = option("Sample the posterior of the parameters too."),
-    seed: int = SEED_OPTION,
+    seed: int = options.SEED_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> None:  # fmt: skip
@@ -53,7 +46,6 @@ def command(
     """
     begun = time.monotonic()
     from workbench.logs.sources import card_of_velocity, read_sources
-    from workbench.options import parse_orders
     from workbench.report.next_steps import after_identify, check_of_refused
     from workbench.report.reports import identified_view
     from workbench.report.view import show
@@ -62,7 +54,7 @@ def command(
     if card_of_velocity(card):
         _velocity(logs, card, budget, as_json, out)
         return
-    options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
+    wanted = Options(drive=drive, orders=options.parse_orders(orders), design_period=design_period)
     with results("identify", out, check_of_refused(logs, card)) as folder:
         with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
@@ -76,7 +68,7 @@ def command(
             with watched(course):
                 found = identify_sources(
                     sources,
-                    options,
+                    wanted,
                     seed,
                     posterior=posterior,
                     on_progress=course.report,
@@ -93,7 +85,7 @@ def _velocity(
 ) -> None:
     """The same of a rig whose velocity follows the command."""
     begun = time.monotonic()
-    refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
+    options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
     from workbench.report.velocity import after_velocity, velocity_view

@@ -5,15 +5,8 @@ from typing import Literal
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import (
-    CARD_OPTION,
-    EFFECTS_OPTION,
-    LOG_ARGUMENT,
-    MODEL_ARGUMENT,
-    POSITIVE,
-    refuse_for_velocity,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import by_signature, option
 
@@ -24,16 +17,16 @@ from workbench.signature import by_signature, option
 )
 @by_signature
 def command(
-    model_file: Path = MODEL_ARGUMENT,
-    log: str = LOG_ARGUMENT,
-    card: str = CARD_OPTION,
+    model_file: Path = options.MODEL_ARGUMENT,
+    log: str = options.LOG_ARGUMENT,
+    card: str = options.CARD_OPTION,
     window: float | None = option(
-        "Restart from the measured state every S.", type=POSITIVE, metavar="S"
+        "Restart from the measured state every S.", type=options.POSITIVE, metavar="S"
     ),
     drive: Literal["force", "command"] | None = option(
         "What drives the run.  [default: the command where the model has an actuator]"
     ),
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> None:
@@ -53,7 +46,7 @@ def command(
     from workbench.steps.predict import predict_sources
 
     if is_velocity_model(model_file):
-        refuse_for_velocity("drive", "effects")
+        options.refuse_for_velocity("drive", "effects")
         _velocity(model_file, (log, card), window, as_json, out)
         return
     model = read_model(model_file, library(effects))

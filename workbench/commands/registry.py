@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench import options
 from workbench.ending import StatusGroup
-from workbench.options import EFFECTS_OPTION, MODEL_ARGUMENT, REGISTRY_OPTION
 from workbench.output import JSON_OPTION, emit, results
 from workbench.signature import argument, by_signature, option
 
@@ -41,7 +41,7 @@ def command() -> None:
 
 @command.command("list", epilog="Example: workbench registry list --registry fleet.db")
 @by_signature
-def list_machines(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
+def list_machines(where: str | None = options.REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
     """List the machines, the active version of each, and how many logs wait."""
     from workbench.registry.views import list_view
 
@@ -56,7 +56,7 @@ def show(
     machine: str = MACHINE_ARGUMENT,
     number: int | None = argument(type=click.IntRange(min=1)),
     out: Path | None = option("Write the files of the version too.", metavar="DIR"),
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Show a machine: the active version, every decision with its reason, every log's result.
@@ -84,7 +84,7 @@ def diff(
     machine: str = MACHINE_ARGUMENT,
     first: int | None = argument(type=click.IntRange(min=1)),
     second: int | None = argument(type=click.IntRange(min=1)),
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Show the parameters of two versions side by side, with units and 95 % intervals.
@@ -114,14 +114,14 @@ def diff(
 @by_signature
 def add(
     machine: str = MACHINE_ARGUMENT,
-    model_file: Path = MODEL_ARGUMENT,
+    model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path | None = argument("[DESIGN]"),
     validation: Path | None = option("validation.json of the design.", metavar="FILE"),
     promote: bool = option("Make it the active version as well."),
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
@@ -161,7 +161,7 @@ def promote(
     number: int = argument(type=click.IntRange(min=1)),
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Activate a version of a machine."""
@@ -177,7 +177,7 @@ def rollback(
     machine: str = MACHINE_ARGUMENT,
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Activate the version before the present one; again goes one further back."""
@@ -194,7 +194,7 @@ def retry(
     logs: tuple[str, ...] = argument("[LOG...]"),
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Have logs tested again by the next pass; their earlier results stay on record.

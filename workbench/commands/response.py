@@ -6,16 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench import options
 from workbench.course import running
 from workbench.ending import StatusCommand
-from workbench.options import (
-    BUDGET_OPTION,
-    CARD_OPTION,
-    EFFECTS_OPTION,
-    LOGS_ARGUMENT,
-    POSITIVE,
-    SEED_OPTION,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import by_signature, option
 from workbench.steps.stages import IDENTIFY_STAGES
@@ -32,8 +25,8 @@ if TYPE_CHECKING:
 )
 @by_signature
 def command(
-    logs: tuple[str, ...] = LOGS_ARGUMENT,
-    card: str = CARD_OPTION,
+    logs: tuple[str, ...] = options.LOGS_ARGUMENT,
+    card: str = options.CARD_OPTION,
     model_file: Path | None = option(
         "model.json whose friction is subtracted.  [default: identified from the logs]",
         "--model", metavar="MODEL",
@@ -41,11 +34,11 @@ def command(
     friction_left_in: bool = option("Subtract nothing from the force."),
     lowest: float | None = option(
         "Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",
-        type=POSITIVE, metavar="HZ",
+        type=options.POSITIVE, metavar="HZ",
     ),
-    budget: float = BUDGET_OPTION,
-    seed: int = SEED_OPTION,
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    budget: float = options.BUDGET_OPTION,
+    seed: int = options.SEED_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> None:  # fmt: skip

@@ -7,8 +7,8 @@ from typing import Literal
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import EVENTS_OPTION, MACHINES_OPTION, POSITIVE, REGISTRY_OPTION
 from workbench.signature import by_fields, option
 
 MEGA = 1e6
@@ -30,8 +30,8 @@ def _prefix(ctx: click.Context, param: click.Parameter, value: str) -> str:
 class ServeOptions:
     """What the command line says of the page."""
 
-    where: str | None = REGISTRY_OPTION
-    machines: Path = MACHINES_OPTION
+    where: str | None = options.REGISTRY_OPTION
+    machines: Path = options.MACHINES_OPTION
     host: str = option("Address to bind to.", default="127.0.0.1")
     port: int = option("", type=click.IntRange(0, 65535), default=8000)
     names: tuple[str, ...] = option(
@@ -48,10 +48,10 @@ class ServeOptions:
     secure: bool = option("The proxy speaks https: send cookies by it alone.")
     silent_days: float = option(
         "A machine without a log for so long counts as not heard from.",
-        type=POSITIVE, default=7.0, metavar="D",
+        type=options.POSITIVE, default=7.0, metavar="D",
     )  # fmt: skip
     most_megabytes: float = option(
-        "Largest log that may be dropped.", type=POSITIVE, default=200.0, metavar="MB"
+        "Largest log that may be dropped.", type=options.POSITIVE, default=200.0, metavar="MB"
     )
     servers: int = option(
         "Processes that answer.", type=click.IntRange(1, 64), default=2, metavar="N"
@@ -60,7 +60,7 @@ class ServeOptions:
         "Processes that identify and trace; more by 'workbench work'.",
         type=click.IntRange(0, 64), default=1, metavar="N",
     )  # fmt: skip
-    as_json: bool = EVENTS_OPTION
+    as_json: bool = options.EVENTS_OPTION
 
 
 @click.command(

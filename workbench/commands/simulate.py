@@ -5,8 +5,8 @@ from typing import Literal
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import EFFECTS_OPTION
 from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
 from workbench.signature import argument, by_signature, option
 
@@ -19,7 +19,7 @@ def command(
     card_name: str = argument("CARD"),
     seed: int | None = option("Instead of the recipe's.", type=click.IntRange(min=0)),
     form: Literal["csv", "parquet"] = option("", "--format", default="csv"),
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from workbench import options
 from workbench.ending import StatusGroup
-from workbench.options import REGISTRY_OPTION
 from workbench.output import JSON_OPTION, emit
 from workbench.signature import argument, by_signature, option
 
@@ -30,7 +30,7 @@ def add_token(
     name: str = argument(),
     role: Literal["read", "change"] = option("", default="read"),
     by: str | None = option("Who makes it.  [default: you]", metavar="NAME"),
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Make a token and show it, this once."""
@@ -46,7 +46,7 @@ def add_token(
 
 @command.command("list", epilog="Example: workbench token list --json")
 @by_signature
-def list_tokens(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
+def list_tokens(where: str | None = options.REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
     """List the tokens by name, role and who made them; not the tokens themselves."""
     from workbench.registry.access import Access
     from workbench.registry.views import moment
@@ -69,7 +69,7 @@ def list_tokens(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION
 def revoke_token(
     name: str = argument(),
     by: str | None = option("Who revokes it.  [default: you]", metavar="NAME"),
-    where: str | None = REGISTRY_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
     """Take a token no more; its name stays taken."""

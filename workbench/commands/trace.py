@@ -5,16 +5,9 @@ from pathlib import Path
 
 import click
 
+from workbench import options
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand
-from workbench.options import (
-    BUDGET_OPTION,
-    CARD_OPTION,
-    EFFECTS_OPTION,
-    SEED_OPTION,
-    complete_file,
-    refuse_for_velocity,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import argument, by_signature, option
 from workbench.steps.stages import TRACE_STAGES
@@ -28,15 +21,15 @@ from workbench.steps.stages import TRACE_STAGES
 )
 @by_signature
 def command(
-    logs: tuple[str, ...] = argument("[LOG...]", shell_complete=complete_file),
+    logs: tuple[str, ...] = argument("[LOG...]", shell_complete=options.complete_file),
     tests: tuple[str, ...] = option(
         "Held-out log, used by neither fit nor model selection; may be given several times.",
-        "--test", metavar="LOG", shell_complete=complete_file,
+        "--test", metavar="LOG", shell_complete=options.complete_file,
     ),
-    card: str = CARD_OPTION,
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
-    budget: float = BUDGET_OPTION,
-    seed: int = SEED_OPTION,
+    card: str = options.CARD_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
+    budget: float = options.BUDGET_OPTION,
+    seed: int = options.SEED_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> None:  # fmt: skip
@@ -56,7 +49,7 @@ def command(
     from workbench.steps.trace import named_logs, trace_sources
 
     if card_of_velocity(card):
-        refuse_for_velocity("effects", "seed")
+        options.refuse_for_velocity("effects", "seed")
         _velocity((logs, tests), card, budget, as_json, out)
         return
     known = library(effects)

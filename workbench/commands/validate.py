@@ -5,20 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import (
-    DELAY_OPTION,
-    EFFECTS_OPTION,
-    FORCE_OPTION,
-    MODEL_ARGUMENT,
-    MODULUS_OPTION,
-    OVERSHOOT_OPTION,
-    PRESENT_CARD_OPTION,
-    SEED_OPTION,
-    STANDSTILL_OPTION,
-    TRACKING_OPTION,
-    refuse_for_velocity,
-)
 from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
 from workbench.signature import argument, by_signature, option
 
@@ -33,20 +21,20 @@ if TYPE_CHECKING:
 )
 @by_signature
 def command(
-    model_file: Path = MODEL_ARGUMENT,
+    model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path = argument("DESIGN"),
     plant_file: Path | None = option(
         "Another machine on which the design has to work too.", "--plant", metavar="MODEL"
     ),
-    modulus: float = MODULUS_OPTION,
-    delay: float = DELAY_OPTION,
-    standstill: float = STANDSTILL_OPTION,
-    tracking: float = TRACKING_OPTION,
-    overshoot: float = OVERSHOOT_OPTION,
-    force: float = FORCE_OPTION,
-    seed: int = SEED_OPTION,
-    card: str | None = PRESENT_CARD_OPTION,
-    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    modulus: float = options.MODULUS_OPTION,
+    delay: float = options.DELAY_OPTION,
+    standstill: float = options.STANDSTILL_OPTION,
+    tracking: float = options.TRACKING_OPTION,
+    overshoot: float = options.OVERSHOOT_OPTION,
+    force: float = options.FORCE_OPTION,
+    seed: int = options.SEED_OPTION,
+    card: str | None = options.PRESENT_CARD_OPTION,
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> int:
@@ -70,7 +58,7 @@ def command(
     from workbench.steps.validate import validate
 
     if is_velocity_model(model_file):
-        refuse_for_velocity("force", "card", "effects")
+        options.refuse_for_velocity("force", "card", "effects")
         limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
         return _velocity((model_file, design_file, plant_file), limits, seed, as_json, out)
     known = library(effects)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
 from workbench.jobs.options import JobOptions, clock, worker
-from workbench.options import EVENTS_OPTION
 from workbench.signature import by_fields, by_signature, option
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def command(
         "Serve Prometheus metrics by HTTP.", type=click.IntRange(1, 65535), metavar="N"
     ),
     address: str = option("Where to serve them.", default="127.0.0.1"),
-    as_json: bool = EVENTS_OPTION,
+    as_json: bool = options.EVENTS_OPTION,
 ) -> None:
     """Do what 'workbench reidentify' does on a schedule, and soon after a log file appears.
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
+from workbench import options
 from workbench.ending import StatusCommand
-from workbench.options import EVENTS_OPTION, MACHINES_OPTION, REGISTRY_OPTION
 from workbench.signature import by_signature, option
 
 
@@ -17,10 +17,10 @@ from workbench.signature import by_signature, option
 )
 @by_signature
 def command(
-    where: str | None = REGISTRY_OPTION,
-    machines: Path = MACHINES_OPTION,
+    where: str | None = options.REGISTRY_OPTION,
+    machines: Path = options.MACHINES_OPTION,
     once: bool = option("End when no task waits."),
-    as_json: bool = EVENTS_OPTION,
+    as_json: bool = options.EVENTS_OPTION,
 ) -> None:
     """Identify and trace the logs that were dropped on the page, one after the other.
 

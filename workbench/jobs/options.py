@@ -13,14 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.options import (
-    EFFECTS_OPTION,
-    REGISTRY_OPTION,
-    SECONDS,
-    SECONDS_ABOVE_0,
-    SEED_OPTION,
-    Finite,
-)
+from workbench import options
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
@@ -44,10 +37,13 @@ class JobOptions:
     """What the command line says, each field as its option; times in s, margin relative."""
 
     root: Path = argument()
-    where: str | None = REGISTRY_OPTION
+    where: str | None = options.REGISTRY_OPTION
     first: bool = option("Give a machine without a model its first from its first log.")
     settle: float = option(
-        "Take a file that has not changed for this long.", type=SECONDS, default=10.0, metavar="S"
+        "Take a file that has not changed for this long.",
+        type=options.SECONDS,
+        default=10.0,
+        metavar="S",
     )
     marker: str | None = option(
         "Take a file once one named <file>SUFFIX lies beside it, as .done; for writers that pause"
@@ -61,19 +57,22 @@ class JobOptions:
     )
     lease: float = option(
         "Take a silent worker's machine over after this long.",
-        type=SECONDS_ABOVE_0, default=120.0, metavar="S",
+        type=options.SECONDS_ABOVE_0, default=120.0, metavar="S",
     )  # fmt: skip
     patience: float = option(
-        "Wait this long for a database that is away.", type=SECONDS, default=60.0, metavar="S"
+        "Wait this long for a database that is away.",
+        type=options.SECONDS,
+        default=60.0,
+        metavar="S",
     )
     margin: float = option(
         "Relative fall of a held-out error that wins.",
-        type=Finite(0, 1, max_open=True), default=0.1,
+        type=options.Finite(0, 1, max_open=True), default=0.1,
     )  # fmt: skip
     webhook: str | None = option("Send alarms there, as JSON by POST.", metavar="URL")
     metrics: Path | None = option("Write Prometheus metrics there after each pass.", metavar="FILE")
-    seed: int = SEED_OPTION
-    effects: tuple[Path, ...] = EFFECTS_OPTION
+    seed: int = options.SEED_OPTION
+    effects: tuple[Path, ...] = options.EFFECTS_OPTION
 
 
 @dataclass(frozen=True)
