@@ -51,51 +51,39 @@ def command(
     from workbench.report.view import show
     from workbench.steps.identify_sources import Options, identify_sources
 
-    if card_of_velocity(card):
-        _velocity(logs, card, budget, as_json, out)
-        return
+    velocity = card_of_velocity(card)
+    if velocity:
+        from workbench.report.velocity import after_velocity, velocity_view
+        from workbench.steps.velocity import identify_velocity
+
+        options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
     wanted = Options(drive=drive, orders=options.parse_orders(orders), design_period=design_period)
     with results("identify", out, check_of_refused(logs, card)) as folder:
         with progress("identifying", 1.0, as_json=as_json) as bar:
-            sources = read_sources(logs, card)
-            if drive == "force" and sources.rig.kind == "motor":
-                raise click.UsageError(
-                    "--drive force: the rig is a motor, whose force is its command times a"
-                    " constant; leave --drive out."
-                )
+            sources = read_sources(logs, card, velocity=velocity)
+            _refuse_force_of_motor(drive, sources.rig.kind)
             left = budget - (time.monotonic() - begun)
             course = Course(bar, IDENTIFY_STAGES, time.monotonic, left, bar.describe)
             with watched(course):
-                found = identify_sources(
-                    sources,
-                    wanted,
-                    seed,
-                    posterior=posterior,
-                    on_progress=course.report,
-                    keep_going=course.keep_going,
-                )
-        view = identified_view(found)
+                if velocity:
+                    valve = identify_velocity(sources, keep_going=course.keep_going)
+                else:
+                    found = identify_sources(
+                        sources, wanted, seed, posterior=posterior, on_progress=course.report,
+                        keep_going=course.keep_going,
+                    )  # fmt: skip
+        view = velocity_view(valve) if velocity else identified_view(found)
         view.write(folder)
-    then = after_identify(found.model, logs, card, folder.final)
-    show(view, folder.final, as_json, then, remarks=found.remarks)
+    if velocity:
+        show(view, folder.final, as_json, after_velocity(valve, logs, card, folder.final))
+    else:
+        then = after_identify(found.model, logs, card, folder.final)
+        show(view, folder.final, as_json, then, remarks=found.remarks)
 
 
-def _velocity(
-    logs: tuple[str, ...], card: str, budget: float, as_json: bool, out: Path | None
-) -> None:
-    """The same of a rig whose velocity follows the command."""
-    begun = time.monotonic()
-    options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
-    from workbench.logs.sources import read_sources
-    from workbench.report.next_steps import check_of_refused
-    from workbench.report.velocity import after_velocity, velocity_view
-    from workbench.report.view import show
-    from workbench.steps.velocity import identify_velocity
-
-    with results("identify", out, check_of_refused(logs, card)) as folder:
-        with progress("identifying", as_json=as_json):
-            sources = read_sources(logs, card, velocity=True)
-            model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)
-        view = velocity_view(model)
-        view.write(folder)
-    show(view, folder.final, as_json, after_velocity(model, logs, card, folder.final))
+def _refuse_force_of_motor(drive: str | None, kind: str) -> None:
+    if drive == "force" and kind == "motor":
+        raise click.UsageError(
+            "--drive force: the rig is a motor, whose force is its command times a constant; leave"
+            " --drive out."
+        )

@@ -39,42 +39,29 @@ def command(
     """
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
-    from workbench.documents.velocity import is_velocity_model
+    from workbench.documents.velocity import is_velocity_model, read_velocity_model
     from workbench.logs.sources import read_sources
     from workbench.report.prediction import prediction_view
     from workbench.report.view import show
     from workbench.steps.predict import predict_sources
 
-    if is_velocity_model(model_file):
+    velocity = is_velocity_model(model_file)
+    if velocity:
+        from workbench.report.velocity import velocity_prediction_view
+        from workbench.steps.velocity import predict_velocity
+
         options.refuse_for_velocity("drive", "effects")
-        _velocity(model_file, (log, card), window, as_json, out)
-        return
-    model = read_model(model_file, library(effects))
-    sources = read_sources([log], card)
+        valve = read_velocity_model(model_file)
+    else:
+        model = read_model(model_file, library(effects))
+    sources = read_sources([log], card, velocity=velocity)
     with results("predict", out) as folder:
         with progress("predicting", as_json=as_json):
-            found = predict_sources(model, sources, drive=drive, window=window)
-        view = prediction_view(found, model.rotary, log, card)
-        view.write(folder)
-    show(view, folder.final, as_json)
-
-
-def _velocity(
-    model_file: Path, given: tuple[str, str], window: float | None, as_json: bool,
-    out: Path | None,
-) -> None:  # fmt: skip
-    """The same of a rig whose velocity follows the command; given: log and card."""
-    from workbench.documents.velocity import read_velocity_model
-    from workbench.logs.sources import read_sources
-    from workbench.report.velocity import velocity_prediction_view
-    from workbench.report.view import show
-    from workbench.steps.velocity import predict_velocity
-
-    log, card = given
-    model = read_velocity_model(model_file)
-    sources = read_sources([log], card, velocity=True)
-    with results("predict", out) as folder:
-        runs = predict_velocity(model, sources, window)
-        view = velocity_prediction_view(runs, window, model.rotary)
+            if velocity:
+                runs = predict_velocity(valve, sources, window)
+                view = velocity_prediction_view(runs, window, valve.rotary)
+            else:
+                found = predict_sources(model, sources, drive=drive, window=window)
+                view = prediction_view(found, model.rotary, log, card)
         view.write(folder)
     show(view, folder.final, as_json)

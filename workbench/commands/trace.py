@@ -48,48 +48,28 @@ def command(
     from workbench.report.view import show
     from workbench.steps.trace import named_logs, trace_sources
 
-    if card_of_velocity(card):
+    velocity = card_of_velocity(card)
+    if velocity:
+        from workbench.report.velocity import velocity_view
+        from workbench.steps.velocity import trace_velocity
+
         options.refuse_for_velocity("effects", "seed")
-        _velocity((logs, tests), card, budget, as_json, out)
-        return
     known = library(effects)
     with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
         with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
-            train = read_sources(names, card)
-            test = read_sources(held_out, card) if held_out else None
+            train = read_sources(names, card, velocity=velocity)
+            test = read_sources(held_out, card, velocity=velocity) if held_out else None
             left = budget - (time.monotonic() - begun)
             course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.describe)
+            going = course.keep_going
             with watched(course):
-                found = trace_sources(
-                    train, test, known, seed, course.report, keep_going=course.keep_going
+                view = (
+                    velocity_view(trace_velocity(train, test, keep_going=going))
+                    if velocity
+                    else traced_view(
+                        trace_sources(train, test, known, seed, course.report, keep_going=going)
+                    )
                 )
-        view = traced_view(found)
-        view.write(folder)
-    show(view, folder.final, as_json)
-
-
-def _velocity(
-    given: tuple[tuple[str, ...], tuple[str, ...]], card: str, budget: float, as_json: bool,
-    out: Path | None,
-) -> None:  # fmt: skip
-    """The same of a rig whose velocity follows the command; given: logs, held-out logs."""
-    begun = time.monotonic()
-    from workbench.logs.sources import read_sources
-    from workbench.report.next_steps import check_of_refused
-    from workbench.report.velocity import velocity_view
-    from workbench.report.view import show
-    from workbench.steps.trace import named_logs
-    from workbench.steps.velocity import trace_velocity
-
-    with results("trace", out, check_of_refused([*given[0], *given[1]], card)) as folder:
-        with progress("trace", as_json=as_json):
-            names, held_out = named_logs(*given, card)
-            train = read_sources(names, card, velocity=True)
-            test = read_sources(held_out, card, velocity=True) if held_out else None
-            found = trace_velocity(
-                train, test, keep_going=lambda: time.monotonic() - begun < budget
-            )
-        view = velocity_view(found)
         view.write(folder)
     show(view, folder.final, as_json)
