@@ -1,18 +1,22 @@
 """The play of an axis in the formats of controls, each by a template of its own."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.readable import number
-from workbench.export.compensation import Compensation, TableFile
-from workbench.export.filled import filled
+from workbench.export.compensation import Compensation, Content, Format
 
 CNC_UNITS = {False: (1e7, "0.0001 mm"), True: (1.8e6 / np.pi, "0.0001 deg")}  # P-AXIS-00103
 CNC_LARGEST = 32767  # SGN16
+AXIS_UNITS = "(the axis's units are to be these)"
+QUADRANTS_LEFT_OUT = (
+    "sinumerik: quadrant error compensation (MD32520) is left out: it is a speed impulse, and how"
+    " large depends on the speed controller, which no model has; the circularity test finds it"
+)
+HALF_OF_THE_PLAY = (
+    "codesys: fBacklash is half of the play: after a reversal the block moves twice as far"
+)
 WHICH_SIDE = (
     "the sign of the value depends on where the control's encoder is; say by --encoder motor"
     " (before the play, the usual case) or --encoder load (the transducer of the logs, behind it)"
@@ -27,78 +31,46 @@ ONLY_BEFORE = (
 )
 
 
-def backlash_csv(what: Compensation) -> TableFile:
+def backlash_csv(what: Compensation) -> Content:
     """The width of the play with its interval."""
     play, (unit, factor) = known_play(what), _length(what)
-    width, low, high = (
-        "" if one is None else f"{factor * one:.9g}" for one in (play.value, play.low, play.high)
-    )
-    text = filled(
-        "backlash.csv", card=what.model.card, unit=unit, width=width, low=low, high=high
-    )  # fmt: skip
-    return TableFile(
-        f"{what.name}_backlash.csv", text, "backlash", "", f"{unit} of the axis",
-        "any program that reads CSV", 1, 0.0,
-    )  # fmt: skip
+    ends = {"width": play.value, "low": play.low, "high": play.high}
+    shown = {key: "" if one is None else f"{factor * one:.9g}" for key, one in ends.items()}
+    return Content(f"{unit} of the axis", values={"unit": unit, **shown})
 
 
-def sinumerik(what: Compensation) -> TableFile:
+def sinumerik(what: Compensation) -> Content:
     """MD32450 of the axis."""
     width, unit, factor = _signed(what)
-    text = filled("sinumerik_backlash.mpf", **_lead(what), width=f"{factor * width:.9g}", unit=unit)
-    left = (
-        "sinumerik: quadrant error compensation (MD32520) is left out: it is a speed impulse, and"
-        " how large depends on the speed controller, which no model has; the circularity test"
-        " finds it"
-    )
-    return TableFile(
-        f"{what.name}_sinumerik_backlash.mpf", text, "backlash", "sinumerik", unit,
-        "SINUMERIK: machine data of the axis, MD32450 (AX1 is to be your axis)", 1, 0.0, (),
-        (left,),
-    )  # fmt: skip
+    values = _values(what, unit, factor * width)
+    return Content(unit, values=values, said=(QUADRANTS_LEFT_OUT,))
 
 
-def codesys(what: Compensation) -> TableFile:
+def codesys(what: Compensation) -> Content:
     """The input fBacklash of SMC_BacklashCompensation: half of the play, as it covers it twice."""
     width, unit, factor = _before(what, "SMC_BacklashCompensation of CODESYS")
-    text = filled(
-        "codesys_backlash.st", **_lead(what), name=what.name, half=f"{factor * width / 2:.9g}",
-        width=f"{number(factor * width, 6)} {unit}", unit=unit,
-    )  # fmt: skip
-    return TableFile(
-        f"{what.name}_codesys_backlash.st", text, "backlash", "codesys",
-        f"{unit} (the axis's units are to be these)", "CODESYS SoftMotion: a program of the axis's"
-        " task", 1, 0.0, (),
-        ("codesys: fBacklash is half of the play: after a reversal the block moves twice as far",),
-    )  # fmt: skip
+    values = {
+        **_values(what, unit, factor * width),
+        "half": f"{factor * width / 2:.9g}",
+        "width": f"{number(factor * width, 6)} {unit}",
+    }
+    return Content(f"{unit} {AXIS_UNITS}", values=values, said=(HALF_OF_THE_PLAY,))
 
 
-def linuxcnc_ini(what: Compensation) -> TableFile:
+def linuxcnc_ini(what: Compensation) -> Content:
     """BACKLASH of a joint in LinuxCNC's INI file."""
     width, unit, factor = _before(what, "BACKLASH of LinuxCNC")
-    text = filled("linuxcnc_backlash.ini", **_lead(what), width=f"{factor * width:.9g}", unit=unit)
-    return TableFile(
-        f"{what.name}_linuxcnc_backlash.ini", text, "backlash", "linuxcnc",
-        f"{unit} (LINEAR_UNITS or ANGULAR_UNITS are to be these)",
-        "LinuxCNC: the INI file, section of the joint", 1, 0.0,
-    )  # fmt: skip
+    units = f"{unit} (LINEAR_UNITS or ANGULAR_UNITS are to be these)"
+    return Content(units, values=_values(what, unit, factor * width))
 
 
-def twincat_nc(what: Compensation) -> TableFile:
+def twincat_nc(what: Compensation) -> Content:
     """The input Backlash of MC_BacklashCompensation."""
     width, unit, factor = _signed(what)
-    text = filled(
-        "twincat_nc_backlash.st", **_lead(what), name=what.name, width=f"{factor * width:.9g}",
-        unit=unit,
-    )  # fmt: skip
-    return TableFile(
-        f"{what.name}_twincat_nc_backlash.st", text, "backlash", "twincat",
-        f"{unit} (the axis's units are to be these)",
-        "TwinCAT NC: a program of the axis, Tc2_MC2", 1, 0.0,
-    )  # fmt: skip
+    return Content(f"{unit} {AXIS_UNITS}", values=_values(what, unit, factor * width))
 
 
-def twincat_cnc_play(what: Compensation) -> TableFile:
+def twincat_cnc_play(what: Compensation) -> Content:
     """getriebe[0].lose of an axis of TwinCAT CNC."""
     width, _unit, _factor = _signed(what)
     factor, unit = CNC_UNITS[what.rotary]
@@ -108,20 +80,23 @@ def twincat_cnc_play(what: Compensation) -> TableFile:
             f"{what.model.card}: a play of {value} times {unit}, where P-AXIS-00103 of TwinCAT CNC"
             f" holds {CNC_LARGEST} at most; take MC_BacklashCompensation"
         )
-    text = filled("twincat_cnc_backlash.lis", **_lead(what), value=value, unit=unit)
-    return TableFile(
-        f"{what.name}_twincat_cnc_backlash.lis", text, "backlash", "twincat", unit,
-        "TwinCAT CNC: the axis's parameter list, P-AXIS-00103", 1,
-        abs(value / (factor * width) - 1.0),
-    )  # fmt: skip
+    off = abs(value / (factor * width) - 1.0)
+    return Content(unit, error=off, values={**_values(what, unit, factor * width), "value": value})
 
 
-BACKLASH: dict[str, tuple[Callable[[Compensation], TableFile], ...]] = {
-    "twincat": (twincat_nc, twincat_cnc_play),
-    "codesys": (codesys,),
-    "linuxcnc": (linuxcnc_ini,),
-    "sinumerik": (sinumerik,),
-}
+BACKLASH = (
+    Format("backlash.csv", "backlash", "", "any program that reads CSV", backlash_csv),
+    Format("twincat_nc_backlash.st", "backlash", "twincat",
+           "TwinCAT NC: a program of the axis, Tc2_MC2", twincat_nc),
+    Format("twincat_cnc_backlash.lis", "backlash", "twincat",
+           "TwinCAT CNC: the axis's parameter list, P-AXIS-00103", twincat_cnc_play),
+    Format("codesys_backlash.st", "backlash", "codesys",
+           "CODESYS SoftMotion: a program of the axis's task", codesys),
+    Format("linuxcnc_backlash.ini", "backlash", "linuxcnc",
+           "LinuxCNC: the INI file, section of the joint", linuxcnc_ini),
+    Format("sinumerik_backlash.mpf", "backlash", "sinumerik",
+           "SINUMERIK: machine data of the axis, MD32450 (AX1 is to be your axis)", sinumerik),
+)  # fmt: skip
 
 
 def known_play(what: Compensation) -> Estimate:
@@ -156,7 +131,7 @@ def _before(what: Compensation, who: str) -> tuple[float, str, float]:
     return width, unit, factor
 
 
-def _lead(what: Compensation) -> dict[str, Any]:
-    """What stands at the head of every file of a control."""
+def _values(what: Compensation, unit: str, width: float) -> dict[str, str]:
+    """What the template of a control is filled with: the width in its unit, and whose side."""
     side = MOTOR_SIDE if what.asked.encoder == "motor" else LOAD_SIDE
-    return {"card": what.model.card, "side": side}
+    return {"side": side, "name": what.name, "unit": unit, "width": f"{width:.9g}"}

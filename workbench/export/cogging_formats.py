@@ -1,15 +1,11 @@
 """Cogging by its orders and over one turn, and in the format of a drive."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from design.compensation_tables import TURN_POINTS, Harmonic, is_cogging, summed
 from identification.errors import BadModel
 from workbench.cards.readable import number, shown_unit
-from workbench.export.compensation import Compensation, Cost, TableFile, in_file
-from workbench.export.filled import filled
+from workbench.export.compensation import Compensation, Content, Cost, Format
 
 AX8000_HARMONICS = 9
 AX8000_HIGHEST = 200  # order n of an object 32CB
@@ -29,7 +25,7 @@ NO_COGGING_TABLE = {
 }
 
 
-def cogging_csv(what: Compensation) -> TableFile:
+def cogging_csv(what: Compensation) -> Content:
     """Order, period, amplitude and phase of each wave."""
     unit, factor = shown_unit("rad" if what.rotary else "m")
     waves = known_harmonics(what)
@@ -38,42 +34,24 @@ def cogging_csv(what: Compensation) -> TableFile:
                                       np.degrees(one.phase))]
         for one in waves
     ]  # fmt: skip
-    text = filled(
-        "cogging.csv",
-        **_lead(what, ()),
-        rows=rows,
-        unit=unit,
-        force=what.force_unit,
-        turn=f"{number(factor * what.turn, 6)} {unit}, {what.turn_words}",
-    )
-    return TableFile(
-        f"{what.name}_cogging.csv", text, "cogging-table", "",
-        f"{what.force_unit}, deg, {unit} of the axis", "any program that reads CSV", len(rows), 0.0,
-        (), _unidentified(what),
-    )  # fmt: skip
+    turn = f"{number(factor * what.turn, 6)} {unit}, {what.turn_words}"
+    values = {"rows": rows, "unit": unit, "force": what.force_unit, "turn": turn}
+    units = f"{what.force_unit}, deg, {unit} of the axis"
+    return Content(units, len(rows), values=values, remarks=_unidentified(what))
 
 
-def turn_csv(what: Compensation) -> TableFile:
+def turn_csv(what: Compensation) -> Content:
     """The force of cogging over one turn, and the one that compensates it."""
     unit, factor = shown_unit("rad" if what.rotary else "m")
     y = what.turn * np.arange(TURN_POINTS) / TURN_POINTS
     force = summed(known_harmonics(what), y)
-    text = filled(
-        "cogging_turn.csv",
-        **_lead(what, ()),
-        rows=[[f"{v:.9g}" for v in row] for row in zip(factor * y, force, -force, strict=True)],
-        unit=unit,
-        force=what.force_unit,
-        turn=what.turn_words,
-    )
-    return TableFile(
-        f"{what.name}_cogging_turn.csv", text, "cogging-table", "",
-        f"{unit}, {what.force_unit} of the axis", "any program that reads CSV", TURN_POINTS, 0.0,
-        (), _unidentified(what),
-    )  # fmt: skip
+    rows = [[f"{v:.9g}" for v in row] for row in zip(factor * y, force, -force, strict=True)]
+    values = {"rows": rows, "unit": unit, "force": what.force_unit, "turn": what.turn_words}
+    units = f"{unit}, {what.force_unit} of the axis"
+    return Content(units, TURN_POINTS, values=values, remarks=_unidentified(what))
 
 
-def ax8000_cogging(what: Compensation) -> TableFile:
+def ax8000_cogging(what: Compensation) -> Content:
     """Objects 32CB of a drive AX8000: up to nine harmonics of a turn of the motor."""
     motor = what.at_motor
     if not motor.turns:
@@ -103,16 +81,17 @@ def ax8000_cogging(what: Compensation) -> TableFile:
     rows = [
         row for at, (order, one) in enumerate(fitting) for row in _objects(what, at, order, one)
     ]
-    text = filled("ax8000_cogging.csv", **_lead(what, costs), rows=rows, motor=motor.words)
-    return TableFile(
-        f"{what.name}_ax8000_cogging.csv", text, "cogging-table", "twincat",
-        "N m, deg", "TwinCAT drive AX8000: startup list or objects 0x32CB",
-        len(fitting), None, costs,
-        (what.at, UNSAID, *_unidentified(what)),
-    )  # fmt: skip
+    values = {"rows": rows, "motor": motor.words}
+    said = (what.at, UNSAID)
+    return Content("N m, deg", len(fitting), None, values, costs, _unidentified(what), said)
 
 
-COGGING: dict[str, tuple[Callable[[Compensation], TableFile], ...]] = {"twincat": (ax8000_cogging,)}
+COGGING = (
+    Format("cogging.csv", "cogging-table", "", "any program that reads CSV", cogging_csv),
+    Format("cogging_turn.csv", "cogging-table", "", "any program that reads CSV", turn_csv),
+    Format("ax8000_cogging.csv", "cogging-table", "twincat",
+           "TwinCAT drive AX8000: startup list or objects 0x32CB", ax8000_cogging),
+)  # fmt: skip
 
 
 def _objects(what: Compensation, at: int, order: int, one: Harmonic) -> list[tuple[str, ...]]:
@@ -139,11 +118,6 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
             " trace' searches for one"
         )
     return what.harmonics
-
-
-def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
-    costs_in_file = in_file(costs, what.force_unit)
-    return {"card": what.model.card, "costs": costs_in_file, "remarks": _unidentified(what)}
 
 
 def _unidentified(what: Compensation) -> tuple[str, ...]:

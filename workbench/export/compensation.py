@@ -1,9 +1,9 @@
 """What a control compensates by: a model's numbers for its tables, and what a table cannot hold."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from identification.model.estimates import Estimate
 from workbench.cards.readable import Unit, number, shown_unit, units_of
 from workbench.documents.model import Model
 from workbench.export.exported import identifier
+from workbench.export.filled import filled
 
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
@@ -241,6 +242,42 @@ class Compensation:
     def at_motor(self) -> "AtMotor":
         """How forces and speeds of the axis are at its motor."""
         return AtMotor(self.rotary, self.asked.per_turn)
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file of a control holds: values of its template, and of `TableFile` what hangs on the
+    model; said: remarks that stand beside the file alone."""
+
+    units: str
+    points: int = 1
+    error: float | None = 0.0
+    values: Mapping[str, Any] = field(default_factory=dict)
+    costs: tuple[Cost, ...] = ()
+    remarks: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file of a control ("" for any): its ending, which is its template, and what makes it."""
+
+    file: str
+    table: Table
+    control: Control | Literal[""]
+    where: str
+    content: Callable[[Compensation], Content]
+
+    def __call__(self, what: Compensation) -> TableFile:
+        """The file of a model; raises BadModel where a number that it needs is wanting."""
+        made = self.content(what)
+        costs = in_file(made.costs, what.force_unit)
+        lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}
+        return TableFile(
+            f"{what.name}_{self.file}", filled(self.file, **{**lead, **made.values}), self.table,
+            self.control, made.units, self.where, made.points, made.error, made.costs,
+            (*made.said, *made.remarks),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

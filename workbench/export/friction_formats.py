@@ -1,8 +1,5 @@
 """Friction against speed in the formats of controls, each by a template of its own."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from design.compensation_tables import Points, spread_points, table_points
@@ -12,12 +9,11 @@ from workbench.cards.readable import number
 from workbench.export.compensation import (
     IDENTIFIED_BY_SLIDING,
     Compensation,
+    Content,
     Cost,
-    TableFile,
+    Format,
     friction_costs,
-    in_file,
 )
-from workbench.export.filled import filled
 
 NEUTRAL_POINTS = 40
 CNC_POINTS = 20  # P-COMP-00062: the default upper limit, of which (0, 0) takes one
@@ -47,29 +43,21 @@ def both_ways(what: Compensation, most_each: int) -> tuple[Array, Array, float]:
     return v, F, max(up.error, down.error)
 
 
-def friction_csv(what: Compensation) -> TableFile:
+def friction_csv(what: Compensation) -> Content:
     """Speed, and the force that each direction needs, for any control."""
     curve, (unit, factor) = what.friction, what.speed_unit
     ways = (curve.positive, curve.negative)
     found = [table_points(one, curve.speeds, NEUTRAL_POINTS // 2) for one in ways]
     v = np.unique(np.concatenate([one.x for one in found]))
     rows = zip(factor * v, curve.positive(v), -curve.negative(v), strict=True)
-    costs = friction_costs(what, signed=True)
-    text = filled(
-        "friction.csv",
-        **_lead(what, costs),
-        speed=unit,
-        force=what.force_unit,
+    return _content(
+        what, f"{unit}, {what.force_unit} of the axis", len(v), max(one.error for one in found),
+        signed=True, speed=unit, force=what.force_unit,
         rows=[[f"{one:.9g}" for one in row] for row in rows],
-    )
-    return TableFile(
-        f"{what.name}_friction.csv", text, "friction-table", "",
-        f"{unit}, {what.force_unit} of the axis", "any program that reads CSV", len(v),
-        max(one.error for one in found), costs, _remarks(what),
     )  # fmt: skip
 
 
-def twincat_cnc(what: Compensation) -> TableFile:
+def twincat_cnc(what: Compensation) -> Content:
     """`frict_comp.*` of a compensation value list of TwinCAT CNC."""
     rated, motor = what.asked.rated, what.at_motor
     if rated is None:
@@ -84,25 +72,14 @@ def twincat_cnc(what: Compensation) -> TableFile:
     written, curve = np.array(pairs) / np.array([factor, share]), what.friction
     found = np.interp(curve.speeds, *written.T)
     error = float(np.max(np.abs(found / curve.mean(curve.speeds) - 1.0)))
-    costs = friction_costs(what, signed=False)
-    text = filled(
-        "twincat_cnc_friction.lis",
-        **_lead(what, costs),
-        pairs=[(0, 0), *pairs],
-        speed=unit,
-        rated=f"{number(rated, 6)} {motor.torque_unit}",
-        scaling=1000 // CNC_PARTS,
-        motor=motor.words,
-    )
-    return TableFile(
-        f"{what.name}_twincat_cnc_friction.lis", text, "friction-table", "twincat",
-        f"{unit}, 0.0001 % of {number(rated, 6)} {motor.torque_unit}",
-        "TwinCAT CNC: the axis's compensation value list", len(pairs) + 1, error, costs,
-        (what.at, *_remarks(what)),
+    torque = f"{number(rated, 6)} {motor.torque_unit}"
+    return _content(
+        what, f"{unit}, 0.0001 % of {torque}", len(pairs) + 1, error, pairs=[(0, 0), *pairs],
+        speed=unit, rated=torque, scaling=1000 // CNC_PARTS, motor=motor.words,
     )  # fmt: skip
 
 
-def ax8000(what: Compensation) -> TableFile:
+def ax8000(what: Compensation) -> Content:
     """Objects 3144 of a drive AX8000: one static and one dynamic friction."""
     motor, curve = what.at_motor, what.friction
     v = np.linspace(curve.low, curve.high, len(curve.speeds))
@@ -111,11 +88,7 @@ def ax8000(what: Compensation) -> TableFile:
     columns = np.column_stack([np.ones_like(v), v])
     (level, slope), *_ = np.linalg.lstsq(columns * weight[:, None], curve.mean(v) * weight)
     off = np.abs(columns @ np.array([level, slope]) - curve.mean(v))
-    costs = (
-        *((Cost("the curve is no straight line: static and dynamic friction are off by up to",
-                float(off.max())),) if off.max() > 1e-6 * curve.mean(v).max() else ()),
-        *friction_costs(what, signed=False),
-    )  # fmt: skip
+    bent = "the curve is no straight line: static and dynamic friction are off by up to"
     if min(level, slope) < 0:
         raise BadModel(
             f"{what.model.card}: its friction falls with speed over the whole table, which static"
@@ -123,25 +96,17 @@ def ax8000(what: Compensation) -> TableFile:
         )
     spring = what.model.effects.get("presliding", {}).get("sigma_0")
     known = None if spring is None else spring.value
-    text = filled(
-        "ax8000_friction.csv",
-        **_lead(what, costs),
-        static=f"{motor.travel * level:.9g}",
-        dynamic=f"{motor.travel**2 * slope:.9g}",
+    angle = "rad" if motor.turns else "m"
+    return _content(
+        what, f"{motor.torque_unit}, {motor.torque_unit} s/{angle}", 2, float(np.max(off * weight)),
+        (Cost(bent, float(off.max())),) if off.max() > 1e-6 * curve.mean(v).max() else (),
+        static=f"{motor.travel * level:.9g}", dynamic=f"{motor.travel**2 * slope:.9g}",
         spring=None if known is None else f"{motor.travel**2 * known:.9g}",
-        torque=motor.torque_unit,
-        angle="rad" if motor.turns else "m",
-        motor=motor.words,
-    )
-    return TableFile(
-        f"{what.name}_ax8000_friction.csv", text, "friction-table", "twincat",
-        f"{motor.torque_unit}, {motor.torque_unit} s/{'rad' if motor.turns else 'm'}",
-        "TwinCAT drive AX8000: startup list or objects 0x3144", 2,
-        float(np.max(off * weight)), costs, (what.at, *_remarks(what)),
+        torque=motor.torque_unit, angle=angle, motor=motor.words,
     )  # fmt: skip
 
 
-def sinamics(what: Compensation) -> TableFile:
+def sinamics(what: Compensation) -> Content:
     """The friction characteristic of a SINAMICS drive: ten speeds and torques."""
     motor, curve = what.at_motor, what.friction
     found = spread_points(unsigned(what, SINAMICS_POINTS), curve.mean, SINAMICS_POINTS)
@@ -150,61 +115,45 @@ def sinamics(what: Compensation) -> TableFile:
         (3820 + at, f"{factor * v:.9g}", 3830 + at, f"{motor.travel * F:.9g}")
         for at, (v, F) in enumerate(zip(found.x, found.y, strict=True))
     ]
-    costs = friction_costs(what, signed=False)
-    text = filled(
-        "sinamics_friction.txt",
-        **_lead(what, costs),
-        rows=rows,
-        speed=unit,
-        torque=motor.torque_unit,
-        motor=motor.words,
-    )
-    return TableFile(
-        f"{what.name}_sinamics_friction.txt", text, "friction-table", "sinumerik",
-        f"{unit}, {motor.torque_unit}",
-        "SINAMICS S120 of the axis: expert list, p3820 to p3839", len(rows), found.error, costs,
-        (what.at, *_remarks(what)),
+    return _content(
+        what, f"{unit}, {motor.torque_unit}", len(rows), found.error, rows=rows, speed=unit,
+        torque=motor.torque_unit, motor=motor.words,
     )  # fmt: skip
 
 
-def linuxcnc_hal(what: Compensation) -> TableFile:
+def linuxcnc_hal(what: Compensation) -> Content:
     """Both directions as a lincurve of LinuxCNC's HAL."""
     v, F, error = both_ways(what, CURVE_OF_HAL // 2)
     factor, unit = (180.0 / np.pi, "deg/s") if what.rotary else (1e3, "mm/s")
-    costs = friction_costs(what, signed=True)
-    text = filled(
-        "linuxcnc_friction.hal",
-        **_lead(what, costs),
-        name=what.name.lower(),
+    return _content(
+        what, f"{unit}, {what.force_unit} of the axis", len(v), error, signed=True,
+        name=what.name.lower(), speed=unit, force=what.force_unit,
         points=[(f"{factor * one:.9g}", f"{force:.9g}") for one, force in zip(v, F, strict=True)],
-        speed=unit,
-        force=what.force_unit,
-    )
-    return TableFile(
-        f"{what.name}_linuxcnc_friction.hal", text, "friction-table", "linuxcnc",
-        f"{unit}, {what.force_unit} of the axis", "LinuxCNC: a HAL file of the machine", len(v),
-        error, costs, _remarks(what),
     )  # fmt: skip
 
 
-FRICTION: dict[str, tuple[Callable[[Compensation], TableFile], ...]] = {
-    "twincat": (twincat_cnc, ax8000),
-    "sinumerik": (sinamics,),
-    "linuxcnc": (linuxcnc_hal,),
-}
+FRICTION = (
+    Format("friction.csv", "friction-table", "", "any program that reads CSV", friction_csv),
+    Format("twincat_cnc_friction.lis", "friction-table", "twincat",
+           "TwinCAT CNC: the axis's compensation value list", twincat_cnc),
+    Format("ax8000_friction.csv", "friction-table", "twincat",
+           "TwinCAT drive AX8000: startup list or objects 0x3144", ax8000),
+    Format("sinamics_friction.txt", "friction-table", "sinumerik",
+           "SINAMICS S120 of the axis: expert list, p3820 to p3839", sinamics),
+    Format("linuxcnc_friction.hal", "friction-table", "linuxcnc",
+           "LinuxCNC: a HAL file of the machine", linuxcnc_hal),
+)  # fmt: skip
 
 
-def _remarks(what: Compensation) -> tuple[str, ...]:
-    return (*what.small(IDENTIFIED_BY_SLIDING), *what.beyond)
-
-
-def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
-    """What stands at the head of every file."""
+def _content(
+    what: Compensation, units: str, points: int, error: float, own: tuple[Cost, ...] = (), /, *,
+    signed: bool = False, **values: object,
+) -> Content:  # fmt: skip
+    """A file of friction against speed; own: costs of this format; signed: it has both ways."""
     (unit, factor), curve = what.speed_unit, what.friction
-    return {
-        "card": what.model.card,
-        "low": f"{number(factor * curve.low)} {unit}",
-        "high": f"{number(factor * curve.high)} {unit}",
-        "costs": in_file(costs, what.force_unit),
-        "remarks": _remarks(what),
-    }
+    ends = {"low": f"{number(factor * curve.low)} {unit}",
+            "high": f"{number(factor * curve.high)} {unit}"}  # fmt: skip
+    costs = (*own, *friction_costs(what, signed=signed))
+    remarks = (*what.small(IDENTIFIED_BY_SLIDING), *what.beyond)
+    said = () if signed else (what.at,)
+    return Content(units, points, error, {**ends, **values}, costs, remarks, said)

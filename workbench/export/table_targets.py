@@ -4,19 +4,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from identification.errors import BadModel
-from workbench.export.backlash_formats import BACKLASH, backlash_csv
-from workbench.export.cogging_formats import COGGING, NO_COGGING_TABLE, cogging_csv, turn_csv
-from workbench.export.compensation import Compensation, TableFile
+from workbench.export.backlash_formats import BACKLASH
+from workbench.export.cogging_formats import COGGING, NO_COGGING_TABLE
+from workbench.export.compensation import Compensation, Format, TableFile
 from workbench.export.feed_forward import feed_forward_c, feed_forward_st
-from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE, friction_csv
+from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE
 
-Writer = Callable[[Compensation], TableFile]
-NEUTRAL: Mapping[str, tuple[Writer, ...]] = {
-    "friction-table": (friction_csv,),
-    "cogging-table": (cogging_csv, turn_csv),
-    "backlash": (backlash_csv,),
-}
-OF_CONTROLS: Mapping[str, Mapping[str, tuple[Writer, ...]]] = {
+FORMATS: Mapping[str, tuple[Format, ...]] = {
     "friction-table": FRICTION,
     "cogging-table": COGGING,
     "backlash": BACKLASH,
@@ -49,13 +43,14 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
     files, left = list[TableFile](), list[str]()
     for target in dict.fromkeys(targets):
         if target == "csv":
-            _tried(NEUTRAL, what, files, left)
+            for table in FORMATS:
+                _tried(_of(table, ""), what, files, left)
             if not files:
                 raise BadModel("; ".join(left))
         elif target in CODE:
             files += CODE[target](what)
         else:
-            files += [one(what) for one in NEUTRAL[target]]
+            files += [one(what) for one in _of(target, "")]
             _for_controls(target, what, controls, files, left)
     for control in controls:
         if left and not any(one.control == control for one in files):
@@ -64,16 +59,19 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
     return Tables(tuple(by_name.values()), tuple(dict.fromkeys(left)))
 
 
+def _of(table: str, control: str) -> list[Format]:
+    """The files of a table for a control, "" for any."""
+    return [one for one in FORMATS[table] if one.control == control]
+
+
 def _tried(
-    writers: Mapping[str, Iterable[Writer]], what: Compensation, files: list[TableFile],
-    left: list[str],
-) -> None:  # fmt: skip
-    """What can be written of each, and why the rest cannot."""
-    for each in writers.values():
-        try:
-            files += [one(what) for one in each]
-        except BadModel as error:
-            left.append(str(error))
+    formats: Iterable[Format], what: Compensation, files: list[TableFile], left: list[str]
+) -> None:
+    """All files of these formats, or why not."""
+    try:
+        files += [one(what) for one in formats]
+    except BadModel as error:
+        left.append(str(error))
 
 
 def _for_controls(
@@ -81,13 +79,14 @@ def _for_controls(
     left: list[str],
 ) -> None:  # fmt: skip
     """The files of each control; one that is not named is left out where a number is wanting."""
-    for control in controls or OF_CONTROLS[target]:
-        writers = OF_CONTROLS[target].get(control, ())
-        if not writers:
+    known = dict.fromkeys(one.control for one in FORMATS[target] if one.control)
+    for control in controls or known:
+        formats = _of(target, control)
+        if not formats:
             left.append(NOT_THERE[target][control])
         refused, before = list[str](), len(files)
-        for one in writers:
-            _tried({control: (one,)}, what, files, refused)
+        for one in formats:
+            _tried([one], what, files, refused)
         if controls and refused and len(files) == before:
             raise BadModel(refused[0])
         left += refused
