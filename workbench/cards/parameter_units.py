@@ -12,7 +12,10 @@ from workbench.cards.units import Motion, conversion
 
 
 class Shown(NamedTuple):
-    """Units of what tables and axes show."""
+    """Units of a machine's numbers, in which tables and axes show them and results hold them.
+
+    force_gain: of a force loop's k_i.
+    """
 
     position: str
     velocity: str
@@ -20,6 +23,21 @@ class Shown(NamedTuple):
     stiffness: str
     force_gain: str
     command: str
+
+    @property
+    def friction(self) -> Mapping[str, str]:
+        """Units of the nine, by name."""
+        return friction_units("rotary" if self.position == "rad" else "linear")
+
+    def by_name(self, quantities: Mapping[str, str]) -> dict[str, str]:
+        """The unit of each number, of a unit or of a quantity whose unit hangs on the machine."""
+        own = {
+            **self._asdict(),
+            "damping": f"{self.force} s/{self.position}",
+            "viscous": self.friction["F_vp"],
+            "mass": self.friction["m"],
+        }
+        return {name: own.get(one, one) for name, one in quantities.items()}
 
 
 def shown(rotary: bool, command: str = "V") -> Shown:

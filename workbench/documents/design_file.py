@@ -12,7 +12,7 @@ from design.pid import PIDGains
 from design.schedule import Over
 from design.series_filters import FilterKind, SeriesFilter
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import friction_units, shown
+from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.units import Motion
 from workbench.documents.design import (
     Controller,
@@ -27,7 +27,6 @@ from workbench.documents.design import (
 from workbench.documents.drive import (
     Command,
     CommandFile,
-    DriveUnits,
     FiltersFile,
     ForceLoopFile,
     LawFile,
@@ -44,12 +43,12 @@ from workbench.documents.plain import plain
 DESIGN_SCHEMA = "design/2"
 # A value's numbers by name, each with its unit; None: it has no such number.
 Numbers = Mapping[str, Estimate | None]
-# The unit of each, or the name of one that hangs on the machine, as `FileUnits` has it.
+# The unit of each, or the name of one that hangs on the machine, as `Shown.by_name` has it.
 FRICTION_AHEAD = {"F_cp": "force", "F_cn": "force", "F_vp": "viscous", "F_vn": "viscous"}
 UNITS_OF: Mapping[type, Mapping[str, str]] = {
     PIDGains: {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
     CascadeGains: {"k_v": "1/s", "k_p": "damping", "T_n": "s", "eps": "s", "v_ff": "1"},
-    FeedForward: {**FRICTION_AHEAD, "band": "speed", "m": "mass", "most": "force"},
+    FeedForward: {**FRICTION_AHEAD, "band": "velocity", "m": "mass", "most": "force"},
 }
 POLE_UNITS = {"w_n": "rad/s", "zeta": "1"}
 
@@ -153,36 +152,6 @@ class DesignFile:
     schema: Literal["design/2"] = "design/2"
 
 
-@dataclass(frozen=True)
-class FileUnits:
-    """Units of design.json's parameters on a machine of this motion and command."""
-
-    length: str
-    speed: str
-    stiffness: str
-    friction: Mapping[str, str]
-    drive: DriveUnits
-
-    def by_name(self, names: Mapping[str, str]) -> dict[str, str]:
-        """The unit of each number, where they are said as in `UNITS_OF`."""
-        own = {
-            "length": self.length,
-            "speed": self.speed,
-            "stiffness": self.stiffness,
-            "force": self.drive.force,
-            "damping": f"{self.drive.force} s/{self.length}",
-            "viscous": self.friction["F_vp"],
-            "mass": self.friction["m"],
-        }
-        return {name: own.get(unit, unit) for name, unit in names.items()}
-
-    @classmethod
-    def of(cls, motion: Motion, command: str | None) -> "FileUnits":
-        units = shown(motion == "rotary")
-        drive = DriveUnits(motion, command or "V")
-        return cls(units.position, units.velocity, units.stiffness, friction_units(motion), drive)
-
-
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
     document: dict[str, Any] = plain(as_file(found, units_of(found)))
@@ -195,12 +164,13 @@ def design_digest(found: Design) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def units_of(found: "Design | DesignFile") -> FileUnits:
-    return FileUnits.of(found.motion, found.command.unit if found.command else None)
+def units_of(found: Design | DesignFile) -> Shown:
+    """Units of a design's numbers."""
+    return shown(found.motion == "rotary", found.command.unit if found.command else "V")
 
 
-def as_file(found: Design, units: FileUnits) -> DesignFile:
-    p, c, drive = found.plant, found.compensator, units.drive
+def as_file(found: Design, units: Shown) -> DesignFile:
+    p, c = found.plant, found.compensator
     limit = found.command.limit if found.command else None
 
     def controller(one: Controller | None) -> ControllerFile | None:
@@ -210,7 +180,7 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
         card=found.card,
         motion=found.motion,
         plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v, p.resonance),
-        force=None if found.force is None else force_file(found.force, limit, drive),
+        force=None if found.force is None else force_file(found.force, limit, units),
         rst=controller(found.rst),
         pid=controller(found.pid),
         p_pi=controller(found.p_pi),
@@ -218,21 +188,21 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
         recommended=found.recommended,
         compensator=_CompensatorFile(
             Estimate(c.N_c, "1"),
-            Estimate(c.e_T, units.length),
+            Estimate(c.e_T, units.position),
             c.friction,
             None if c.filters is None or c.h is None else filters_file(c.filters, c.h),
             c.excess,
         ),
         remarks=found.remarks,
         versions=found.versions,
-        command=None if found.command is None else command_file(found.command, drive),
-        present=None if found.present is None else present_file(found.present, limit, drive),
+        command=None if found.command is None else command_file(found.command, units),
+        present=None if found.present is None else present_file(found.present, limit, units),
         recommendation=found.recommendation,
         schedule=None if found.schedule is None else _schedule_file(found, found.schedule, units),
     )
 
 
-def _schedule_file(found: Design, table: GainSchedule, units: FileUnits) -> ScheduleFile:
+def _schedule_file(found: Design, table: GainSchedule, units: Shown) -> ScheduleFile:
     names = schedule_units(table.over, units)
 
     def of(name: Structure) -> ScheduledFile | None:
@@ -249,9 +219,9 @@ def _schedule_file(found: Design, table: GainSchedule, units: FileUnits) -> Sche
     return ScheduleFile(table.over, points, of("pid"), of("p-pi"))
 
 
-def schedule_units(over: Over, units: FileUnits) -> dict[str, str]:
+def schedule_units(over: Over, units: Shown) -> dict[str, str]:
     """Units of a schedule's row by name."""
-    at = {"place": "length", "load": "force", "direction": "1"}[over]
+    at = {"place": "position", "load": "force", "direction": "1"}[over]
     return units.by_name({"at": at, **FRICTION_AHEAD})
 
 
@@ -259,7 +229,7 @@ def _with_units(values: Mapping[str, float], units: Mapping[str, str]) -> dict[s
     return {name: Estimate(values[name], unit) for name, unit in units.items()}
 
 
-def _numbers(value: object, units: FileUnits) -> dict[str, Estimate] | None:
+def _numbers(value: object, units: Shown) -> dict[str, Estimate] | None:
     """A value of `UNITS_OF` as it is written; None for None."""
     if value is None:
         return None
@@ -267,7 +237,7 @@ def _numbers(value: object, units: FileUnits) -> dict[str, Estimate] | None:
 
 
 def _controller_file(
-    one: Controller, command: Command | None, output: Output, units: FileUnits
+    one: Controller, command: Command | None, output: Output, units: Shown
 ) -> ControllerFile:
     reason = None if one.rate is not None else "no limit of force or command to keep"
     return ControllerFile(
@@ -277,29 +247,29 @@ def _controller_file(
         h=Estimate(one.h, "s"),
         dominant=_with_units(dict(zip(POLE_UNITS, one.dominant, strict=True)), POLE_UNITS),
         auxiliary=one.auxiliary,
-        reference_rate=Estimate(one.rate, units.speed, reason=reason),
+        reference_rate=Estimate(one.rate, units.velocity, reason=reason),
         reference_lag=Estimate(one.lag, "s"),
         margins=one.margins,
         overshoot=one.overshoot,
         missed=one.missed,
         gains=_numbers(one.gains, units),
         note=one.note,
-        law=law_file(one.law(command), output, command.limit, units.drive) if command else None,
+        law=law_file(one.law(command), output, command.limit, units) if command else None,
         cascade=None if one.cascade is None else _cascade_file(one.cascade, command, units),
         filter=None if one.series is None else _series_file(one.series),
         feed_forward=_numbers(one.feed_forward, units),
         reference_acceleration=None if one.acceleration is None else Estimate(
-            one.acceleration, f"{units.length}/s^2"
+            one.acceleration, f"{units.position}/s^2"
         ),
     )  # fmt: skip
 
 
-def _cascade_file(gains: CascadeGains, command: Command | None, units: FileUnits) -> Numbers:
+def _cascade_file(gains: CascadeGains, command: Command | None, units: Shown) -> Numbers:
     """Its gains, and k_p in the unit of the drive's command."""
     per = command.force_per_command if command else None
     own = None
-    if command and per and command.unit != units.drive.force:
-        unit = f"{command.unit} s/{units.length}"
+    if command and per and command.unit != units.force:
+        unit = f"{command.unit} s/{units.position}"
         own = Estimate(gains.k_p / per, unit)
     return {**(_numbers(gains, units) or {}), "k_p_command": own}
 

@@ -14,7 +14,7 @@ from design.series_filters import SeriesFilter
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import converted, in_unit
+from workbench.cards.parameter_units import Shown, converted, in_unit
 from workbench.documents.contradictions import refuse_apart, refuse_unequal
 from workbench.documents.design import (
     CompensatorValues,
@@ -31,7 +31,6 @@ from workbench.documents.design_file import (
     UNITS_OF,
     ControllerFile,
     DesignFile,
-    FileUnits,
     Numbers,
     ScheduleFile,
     SeriesFile,
@@ -107,7 +106,7 @@ def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], fou
         refuse_unequal("[plant.h]", other, same, used(ours), f"[{place}.h]")
 
 
-def _refuse_other_laws(written: DesignFile, found: Design, units: FileUnits) -> None:
+def _refuse_other_laws(written: DesignFile, found: Design, units: Shown) -> None:
     """Raises BadModel where a law is not the controller beside it."""
     every: tuple[tuple[Structure, ControllerFile | None], ...] = (
         ("rst", written.rst), ("pid", written.pid), ("p-pi", written.p_pi),
@@ -117,7 +116,7 @@ def _refuse_other_laws(written: DesignFile, found: Design, units: FileUnits) -> 
             continue
         if found.command is None:
             raise BadModel(f"[{name}.law] needs [command]; run 'workbench design' again")
-        law = law_of(one.law, units.drive, f"{name}.law")
+        law = law_of(one.law, units, f"{name}.law")
         ours = found.controllers[name].law(found.command)
         for key in "RST":
             mine, other = getattr(ours, key), getattr(law, key)
@@ -128,8 +127,8 @@ def _refuse_other_laws(written: DesignFile, found: Design, units: FileUnits) -> 
                 )
 
 
-def _from_file(found: DesignFile, units: FileUnits) -> Design:
-    p, c, drive = found.plant, found.compensator, units.drive
+def _from_file(found: DesignFile, units: Shown) -> Design:
+    p, c = found.plant, found.compensator
     mass, viscous = units.friction["m"], units.friction["F_vp"]
     return Design(
         card=found.card,
@@ -144,7 +143,7 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
             None if p.F_v is None else in_unit(p.F_v, viscous, "[plant.F_v]"),
             p.resonance,
         ),
-        force=None if found.force is None else force_of(found.force, drive, "force"),
+        force=None if found.force is None else force_of(found.force, units, "force"),
         rst=None if found.rst is None else _controller(found.rst, units, "rst"),
         pid=None if found.pid is None else _controller(found.pid, units, "pid"),
         p_pi=None if found.p_pi is None else _controller(found.p_pi, units, "p_pi"),
@@ -152,7 +151,7 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
         recommended=found.recommended,
         compensator=CompensatorValues(
             number(c.N_c, "1", "compensator.N_c"),
-            number(c.e_T, units.length, "compensator.e_T"),
+            number(c.e_T, units.position, "compensator.e_T"),
             {name: _nine(e, name, units) for name, e in c.friction.items()},
             None if c.filters is None else filters_of(c.filters),
             None if c.filters is None else positive(c.filters.h, "s", "compensator.filters.h"),
@@ -161,13 +160,13 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
         remarks=found.remarks,
         versions=found.versions,
         command=None if found.command is None else command_of(found.command, found.motion),
-        present=None if found.present is None else present_of(found.present, drive, "present"),
+        present=None if found.present is None else present_of(found.present, units, "present"),
         recommendation=found.recommendation,
         schedule=None if found.schedule is None else _schedule(found.schedule, units),
     )
 
 
-def _schedule(found: ScheduleFile, units: FileUnits) -> GainSchedule:
+def _schedule(found: ScheduleFile, units: Shown) -> GainSchedule:
     """The schedule; raises BadModel where a controller has not one at every point."""
     names = schedule_units(found.over, units)
     rows = [
@@ -192,7 +191,7 @@ def _schedule(found: ScheduleFile, units: FileUnits) -> GainSchedule:
     return GainSchedule(found.over, tuple(row[0] for row in rows), friction, controllers)
 
 
-def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller:
+def _controller(one: ControllerFile, units: Shown, where: str) -> Controller:
     rate, dominant = one.reference_rate, _numbers(one.dominant, POLE_UNITS, f"{where}.dominant")
     for name, value in dominant.items():
         positive(Estimate(value, POLE_UNITS[name]), POLE_UNITS[name], f"{where}.dominant.{name}")
@@ -207,7 +206,7 @@ def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller
         dominant=(dominant["w_n"], dominant["zeta"]),
         auxiliary=one.auxiliary,
         margins=one.margins,
-        rate=None if rate.value is None else positive(rate, units.speed, at),
+        rate=None if rate.value is None else positive(rate, units.velocity, at),
         lag=number(one.reference_lag, "s", f"{where}.reference_lag"),
         overshoot=one.overshoot,
         missed=one.missed,
@@ -218,12 +217,12 @@ def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller
         series=None if one.filter is None else _series(one.filter, one.h, f"{where}.filter"),
         feed_forward=_read(FeedForward, one.feed_forward, units, f"{where}.feed_forward"),
         acceleration=None if one.reference_acceleration is None else positive(
-            one.reference_acceleration, f"{units.length}/s^2", f"{where}.reference_acceleration"
+            one.reference_acceleration, f"{units.position}/s^2", f"{where}.reference_acceleration"
         ),
     )  # fmt: skip
 
 
-def _read(kind: type[Value], found: Numbers | None, units: FileUnits, where: str) -> Value | None:
+def _read(kind: type[Value], found: Numbers | None, units: Shown, where: str) -> Value | None:
     """A value of `UNITS_OF`, None for None; raises BadModel where a number is missing."""
     if found is None:
         return None
@@ -263,7 +262,7 @@ def _series(found: SeriesFile, h: Estimate, where: str) -> SeriesFilter:
     return one
 
 
-def _nine(found: Estimate, name: str, units: FileUnits) -> Estimate:
+def _nine(found: Estimate, name: str, units: Shown) -> Estimate:
     where = f"[compensator.friction.{name}]"
     if name not in units.friction:
         raise BadModel(f"{where} is none of the nine: {', '.join(units.friction)}")

@@ -17,7 +17,7 @@ from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.plant import over
 from identification.signals.filters import Filter, slope_filter
-from workbench.cards.parameter_units import in_unit, shown
+from workbench.cards.parameter_units import Shown, in_unit, shown
 from workbench.cards.units import Motion
 
 Output = Literal["command", "force"]
@@ -131,45 +131,13 @@ class FiltersFile:
     h: Estimate
 
 
-@dataclass(frozen=True)
-class DriveUnits:
-    """Units of a drive's numbers: motion of the machine, unit of its command."""
-
-    motion: Motion
-    command: str
-
-    @property
-    def length(self) -> str:
-        """m or rad."""
-        return shown(self.motion == "rotary").position
-
-    @property
-    def speed(self) -> str:
-        """m/s or rad/s."""
-        return shown(self.motion == "rotary").velocity
-
-    @property
-    def force(self) -> str:
-        """N or N m."""
-        return shown(self.motion == "rotary").force
-
-    @property
-    def force_gain(self) -> str:
-        """Of a force loop's k_i."""
-        return over(self.command, self.force)
-
-    def of(self, output: Output) -> str:
-        """Unit of a law's output."""
-        return self.command if output == "command" else self.force
-
-
-def law_file(law: DriveLaw, output: Output, limit: float | None, units: DriveUnits) -> LawFile:
+def law_file(law: DriveLaw, output: Output, limit: float | None, units: Shown) -> LawFile:
     """The law as a result writes it; limit: of the command."""
-    unit, bounded = units.of(output), output == "command" and limit is not None
+    unit, bounded = getattr(units, output), output == "command" and limit is not None
     return LawFile(
         output=output,
         unit=unit,
-        input=units.length,
+        input=units.position,
         h=Estimate(law.h, "s"),
         R=law.R,
         S=law.S,
@@ -180,11 +148,12 @@ def law_file(law: DriveLaw, output: Output, limit: float | None, units: DriveUni
     )
 
 
-def law_of(written: LawFile, units: DriveUnits, where: str) -> DriveLaw:
+def law_of(written: LawFile, units: Shown, where: str) -> DriveLaw:
     """The law of a file; raises BadModel where it is none, or in other units."""
     for key, unit, ours in (
-        ("unit", written.unit, units.of(written.output)), ("input", written.input, units.length)
-    ):  # fmt: skip
+        ("unit", written.unit, getattr(units, written.output)),
+        ("input", written.input, units.position),
+    ):
         if unit != ours:
             raise BadModel(f"[{where}] {key} = {unit!r}, {ours!r} needed; run the command again")
     h = positive(written.h, "s", f"{where}.h")
@@ -194,7 +163,7 @@ def law_of(written: LawFile, units: DriveUnits, where: str) -> DriveLaw:
         raise BadModel(f"[{where}] {error}") from None
 
 
-def force_file(force: ForceLoop, limit: float | None, units: DriveUnits) -> ForceLoopFile:
+def force_file(force: ForceLoop, limit: float | None, units: Shown) -> ForceLoopFile:
     """The force loop as a result writes it; limit: of the command."""
     return ForceLoopFile(
         Estimate(force.k_i, units.force_gain),
@@ -205,7 +174,7 @@ def force_file(force: ForceLoop, limit: float | None, units: DriveUnits) -> Forc
     )
 
 
-def force_of(found: ForceLoopFile, units: DriveUnits, where: str) -> ForceLoop:
+def force_of(found: ForceLoopFile, units: Shown, where: str) -> ForceLoop:
     """The force loop of a file; raises BadModel where it is none."""
     return ForceLoop(
         number(found.k_i, units.force_gain, f"{where}.k_i"),
@@ -214,7 +183,7 @@ def force_of(found: ForceLoopFile, units: DriveUnits, where: str) -> ForceLoop:
     )
 
 
-def command_file(found: Command, units: DriveUnits) -> CommandFile:
+def command_file(found: Command, units: Shown) -> CommandFile:
     """The command as a result writes it."""
     per, limit = found.force_per_command, found.limit
     return CommandFile(
@@ -227,7 +196,7 @@ def command_file(found: Command, units: DriveUnits) -> CommandFile:
 def command_of(written: CommandFile, motion: Motion) -> Command:
     """The command of a file; raises BadModel where a number is of another kind."""
     unit, limit, per = written.unit, written.limit, written.force_per_command
-    units = DriveUnits(motion, unit)
+    units = shown(motion == "rotary", unit)
     bounded = limit is not None and limit.value is not None
     return Command(
         unit,
@@ -236,18 +205,18 @@ def command_of(written: CommandFile, motion: Motion) -> Command:
     )
 
 
-def present_file(found: Present, limit: float | None, units: DriveUnits) -> PresentFile:
+def present_file(found: Present, limit: float | None, units: Shown) -> PresentFile:
     """The machine's own controller as a result writes it; limit: of the command."""
     return PresentFile(
         kind=found.kind,
         gains=found.gains,
         law=law_file(found.law, found.output, limit, units),
         force=None if found.force is None else force_file(found.force, limit, units),
-        reference_rate=None if found.rate is None else Estimate(found.rate, units.speed),
+        reference_rate=None if found.rate is None else Estimate(found.rate, units.velocity),
     )
 
 
-def present_of(written: PresentFile, units: DriveUnits, where: str) -> Present:
+def present_of(written: PresentFile, units: Shown, where: str) -> Present:
     """The machine's own controller of a file; raises BadModel where it is none."""
     rate = written.reference_rate
     return Present(
@@ -256,7 +225,7 @@ def present_of(written: PresentFile, units: DriveUnits, where: str) -> Present:
         output=written.law.output,
         law=law_of(written.law, units, f"{where}.law"),
         force=None if written.force is None else force_of(written.force, units, f"{where}.force"),
-        rate=None if rate is None else positive(rate, units.speed, f"{where}.reference_rate"),
+        rate=None if rate is None else positive(rate, units.velocity, f"{where}.reference_rate"),
     )
 
 
@@ -285,9 +254,7 @@ def filters_of(written: FiltersFile) -> CompensatorFilters:
     return found
 
 
-def equation_lines(
-    law: DriveLaw, output: Output, limit: float | None, units: DriveUnits
-) -> list[str]:
+def equation_lines(law: DriveLaw, output: Output, limit: float | None, units: Shown) -> list[str]:
     """The difference equation as it is programmed; k counts its samples.
 
     limit: of the command. F_comp, the compensator's force, is 0 without it.
@@ -298,9 +265,13 @@ def equation_lines(
         *_terms([0.0, *(w - s for w, s in zip(law.W[1:], law.S[1:], strict=True))], "c"),
         *_terms([0.0, *(-w for w in law.W[1:])], "c_free"),
     ]
-    unit, text = units.of(output), " ".join(terms).removeprefix("+ ") or "0"
+    unit, length = getattr(units, output), units.position
+    text = " ".join(terms).removeprefix("+ ") or "0"
     within = "" if limit is None else f", within +- {limit:.6g} {units.command}"
-    first = [f"every {law.h:.6g} s, r and y in {units.length}, c in {unit}:", f"c_free[k] = {text}"]
+    first = [
+        f"every {law.h:.6g} s, r and y in {length}, c in {unit}:",
+        f"c_free[k] = {text}",
+    ]
     if output == "command":
         part = "F_comp[k]" if unit == units.force else "F_comp[k]/k_a"
         return [*first, f"u[k] = c_free[k] + {part}{within}", f"c[k] = u[k] - {part}"]
@@ -311,7 +282,7 @@ def equation_lines(
     ]
 
 
-def force_lines(force: ForceLoop, limit: float | None, units: DriveUnits) -> list[str]:
+def force_lines(force: ForceLoop, limit: float | None, units: Shown) -> list[str]:
     """The force loop as it is programmed; j counts its samples, limit: of the command."""
     within = "" if limit is None else f", within +- {limit:.6g} {units.command}"
     return [

@@ -15,7 +15,8 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import known_effect
 from workbench.cards.nearest import nearest
-from workbench.documents.drive import DriveUnits, Present, PresentFile, present_of
+from workbench.cards.parameter_units import Shown, shown
+from workbench.documents.drive import Present, PresentFile, present_of
 
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 
@@ -288,9 +289,9 @@ class Model(ModelFile):
         return present_of(self.controller, self.drive_units, "controller")
 
     @property
-    def drive_units(self) -> DriveUnits:
+    def drive_units(self) -> Shown:
         """Units of what its drive runs."""
-        return DriveUnits(self.rig.motion, self.rig.command_unit)
+        return shown(self.rotary, self.rig.command_unit)
 
     @property
     def rotary(self) -> bool:

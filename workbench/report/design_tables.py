@@ -4,7 +4,8 @@ from design.drive_law import DriveLaw
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number
 from workbench.documents.design import Controller, Design
-from workbench.documents.drive import DriveUnits, Output, equation_lines, force_lines
+from workbench.documents.design_file import units_of
+from workbench.documents.drive import Output, equation_lines, force_lines
 from workbench.output import Row
 from workbench.report.notes import notes
 from workbench.report.view import OUT
@@ -253,7 +254,7 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
     """The difference equation of each controller, or of one, as its drive runs it."""
     if found.command is None:
         return []
-    units, limit = DriveUnits(found.motion, found.command.unit), found.command.limit
+    units, limit = units_of(found), found.command.limit
     out = []
     laws: dict[str, tuple[DriveLaw, Output]] = {
         name: (one.law(found.command), found.output) for name, one in found.controllers.items()

@@ -12,7 +12,8 @@ from identification.errors import BadCard, BadSpecification
 from identification.log import Rig
 from workbench.cards.card import Card, load_card
 from workbench.cards.controller import CardController
-from workbench.documents.drive import DriveUnits, ForceLoop, Present, PresentFile, present_file
+from workbench.cards.parameter_units import shown
+from workbench.documents.drive import ForceLoop, Present, PresentFile, present_file
 from workbench.documents.model import Model
 from workbench.logs.fetch import card_path
 
@@ -24,7 +25,7 @@ def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
     """
     if card.controller is None:
         return None
-    units = DriveUnits(rig.motion, rig.command_unit)
+    units = shown(rig.motion == "rotary", rig.command_unit)
     try:
         return present_file(present(card.controller, rig, h), rig.control_limit, units)
     except (BadCard, BadSpecification) as error:

@@ -10,8 +10,9 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.cards.controller import CardController
+from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Recommendation
-from workbench.documents.drive import DriveUnits, present_file
+from workbench.documents.drive import present_file
 from workbench.documents.model import Model
 from workbench.report.validation_tables import validation_table
 from workbench.steps import recommend
@@ -31,7 +32,7 @@ def now(model: Model, k_d: float, period: float | None = None) -> Model:
     gains = {"k_d": Estimate(k_d, "V/m"), "T_d": Estimate(0.03, "s"), "eps": Estimate(0.01, "s")}
     given = CardController("PD", gains, {}, period, "command", None, None, None)
     found = present(given, model.rig, model.period)
-    return replace(model, controller=present_file(found, None, DriveUnits("linear", "V")))
+    return replace(model, controller=present_file(found, None, shown(False, "V")))
 
 
 @cache
