@@ -28,7 +28,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.signals.clean import prepare
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.steps.simulate import record
 
 SPOILT_SECONDS = 12.0

@@ -23,8 +23,7 @@ from identification.errors import UserError
 from identification.log import Log, Rig
 from identification.tracing.result import Errors, FoundEffect, Trace
 from workbench.cards.card import load_card
-from workbench.logs.fetch import DATA_VARIABLE, card_path
-from workbench.logs.sources import Sources, read_sources
+from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
 from workbench.steps.trace import Traced, effect_estimates, trace_sources
 
 ROOT = Path(__file__).parents[1]

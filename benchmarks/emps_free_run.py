@@ -19,8 +19,8 @@ from identification.model.plant import Plant
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path, find_data
 from workbench.logs.runs import read_runs
+from workbench.logs.sources import card_path, find_data
 
 
 def main(seeds: int) -> None:

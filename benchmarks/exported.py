@@ -46,8 +46,7 @@ from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.export.c import c_files
 from workbench.export.exported import Exported, Precision, exported
-from workbench.logs.fetch import DATA_VARIABLE, card_path
-from workbench.logs.sources import Source, Sources, read_sources
+from workbench.logs.sources import DATA_VARIABLE, Source, Sources, card_path, read_sources
 from workbench.steps.closed_loop import run_driven
 from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources

@@ -28,10 +28,9 @@ from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.fleet.cluster import local_cluster
 from workbench.fleet.finding import find_logs
-from workbench.fleet.recording import InRegistry, NoRegistry
-from workbench.fleet.run import FleetRun, FleetSettings, Report
+from workbench.fleet.run import FleetRun, FleetSettings, InRegistry, NoRegistry, Report
 from workbench.fleet.store import ResultStore
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.registry.store import Registry
 from workbench.steps.simulate import as_columns, record
 

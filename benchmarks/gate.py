@@ -20,7 +20,7 @@ from identification.errors import UserError
 from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
-from workbench.steps.identifiability_of_runs import identifiability_of_runs
+from workbench.steps.identifiable_by_log import identifiability_of_runs
 
 RICH = 15.0  # s
 TWICE = 2.0

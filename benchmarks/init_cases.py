@@ -22,8 +22,8 @@ from benchmarks.outside_rig import (
 from identification.arrays import Array
 from identification.log import Log, Rig
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path, find_data
 from workbench.logs.runs import read_log
+from workbench.logs.sources import card_path, find_data
 from workbench.steps.simulate import record
 
 RECIPES = ("demo", "paper_table1_rich", "paper_table2", "paper_table3")

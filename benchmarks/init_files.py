@@ -29,7 +29,7 @@ from pathlib import Path
 from benchmarks.init_cases import Case, make_case
 from benchmarks.init_judge import wrong_lines
 from identification.errors import UserError
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 from workbench.steps.first_card.proposal import Proposal, proposed
 
 

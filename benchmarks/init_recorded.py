@@ -19,10 +19,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.errors import UserError
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.checked_proposal import checked_proposal
 from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.written import checked_proposal
 
 Signal = tuple[str | int, str]  # column, and unit ("": in no log)
 

@@ -24,7 +24,7 @@ from identification.model.plant import Actuator, Plant
 from identification.simulation.free_run import free_run
 from workbench.cards.card import load_card
 from workbench.cards.recipe import Recipe
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.steps.simulate import record
 
 CARDS = ("paper_table1", "paper_table1_rich", "paper_table2", "paper_table3")

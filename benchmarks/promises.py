@@ -27,7 +27,7 @@ from benchmarks.real import ROOT, answered, read
 from benchmarks.real_cases import Case, every_case
 from benchmarks.real_child import OF_TEST
 from identification.model.karnopp import NAMES
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 
 Answers = Mapping[str, Any]
 WIDTH = 100  # of a reason

@@ -25,7 +25,7 @@ from typing import Any
 
 from benchmarks.real_cases import Case, cases_folder, every_case
 from benchmarks.real_report import line, print_report
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 
 ROOT = Path(__file__).resolve().parent.parent
 PARTS_ASKED = {"look": (), "both": ("identify", "trace"), "promise": ("said_alone", "alone")}

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.yardstick import Terms
 from workbench.cards.card import Card, load_card
-from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data
+from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
 
 TABLE = Path(__file__).with_suffix(".toml").with_name("real.toml")
 Group = Literal["rig", "case"]

@@ -34,7 +34,7 @@ from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
 from workbench.steps.doctor import Examined, examine
 from workbench.steps.first_card.proposal import proposed
-from workbench.steps.identifiability_of_runs import identifiability_of_runs
+from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.trace import trace_sources
 

@@ -36,8 +36,7 @@ from workbench.steps.closed_loop import DrivenLoop, driven_loop, present_loop
 from workbench.steps.design import design
 from workbench.steps.drawn import in_loop
 from workbench.steps.loop_figures import PRESENT
-from workbench.steps.robust.machines import DrawnMachines
-from workbench.steps.robust.outcomes import Outcomes, limits_by_name, outcomes
+from workbench.steps.robust.outcomes import DrawnMachines, Outcomes, limits_by_name, outcomes
 from workbench.steps.robust.robust import (
     NOMINAL,
     ROBUST,

@@ -26,7 +26,7 @@ from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.jobs.judge import Chain
 from workbench.jobs.passes import Pass, PassSettings
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import LogOutcome

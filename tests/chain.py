@@ -15,8 +15,7 @@ from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
 from workbench.documents.design import Design
 from workbench.documents.model import FitSummary, LogEntry, Model
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Source, Sources, card_path
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.simulate import record

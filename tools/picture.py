@@ -12,7 +12,7 @@ from identification.model.plant import Plant
 from identification.signals.differentiate import differentiate
 from identification.simulation.free_run import free_run
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.report.chart_figure import BAND, MEASURED, MODEL, evenly_spread, figure, label, style
 from workbench.steps.simulate import record
 

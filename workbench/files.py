@@ -1,5 +1,6 @@
 """Files that a user names: what never ends, and what is too large, is refused before it is read."""
 
+import errno
 import hashlib
 import stat
 from pathlib import Path
@@ -70,3 +71,17 @@ def shipped_cards() -> dict[str, Path]:
         if found:
             return found
     return {}
+
+
+def broken_link(path: Path) -> str | None:
+    """What is wrong with a link and what to do, as the end of a message; None where it is none."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        if path.is_symlink():
+            target = str(path.readlink())
+            return f"is a link to {target!r}, which is missing; mend it, or name the file itself"
+    except (OSError, RuntimeError) as error:  # RuntimeError: older Pythons, of a circle
+        if isinstance(error, RuntimeError) or error.errno == errno.ELOOP:
+            return "its links lead in a circle; mend them, or name the file itself"
+    return None

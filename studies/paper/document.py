@@ -8,7 +8,7 @@ from studies.paper.claims import claims
 from studies.paper.measures import Case, Figures
 from studies.paper.settings import PRINTED_SUMS
 from studies.paper.study import Study
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.output import Row, written
 from workbench.screen import Screen, more, screen, tabled
 

@@ -23,7 +23,7 @@ from workbench.report.chart_figure import (
     line,
     style,
 )
-from workbench.report.page import Section, page, table
+from workbench.report.view import Section, page, table
 from workbench.screen import tabled
 
 if TYPE_CHECKING:

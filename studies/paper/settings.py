@@ -24,7 +24,7 @@ from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Plant
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 NOISE_Y, NOISE_F = 1e-5, 1e-2  # m, N: variances 1e-10 m^2 and 1e-4 N^2 (section 3.2)
 LIMIT = 5.0  # V, of the valve; not printed

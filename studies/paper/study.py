@@ -17,7 +17,7 @@ from studies.paper.rivals import RivalServo, rivals
 from studies.paper.sensitivity import Sensitivity, sensitivity
 from studies.paper.settings import DOMINANT, PRINTED_A, PRINTED_B, TABLE_1_ESTIMATED, friction_of
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.steps.simulate import record
 
 ZEROS = ((100.0, 0.1), (200.0, 0.05), (314.0, 0.05))  # (w [rad/s], zeta) of H_R, worked out

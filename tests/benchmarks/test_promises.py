@@ -9,7 +9,7 @@ from benchmarks.promises import print_table, promises
 from benchmarks.real import ROOT, answered
 from benchmarks.real_cases import every_case
 from identification.model.karnopp import NAMES
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 
 
 def answers(said: dict[str, Any], kept: dict[str, Any]) -> dict[str, Any]:

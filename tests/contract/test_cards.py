@@ -8,8 +8,8 @@ import pytest
 from identification.signals.differentiate import differentiate
 from workbench.cards.card import Card, load_card
 from workbench.files import shipped_cards
-from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data
 from workbench.logs.runs import read_runs
+from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
 from workbench.steps.simulate import record
 
 CARDS = {name: load_card(path) for name, path in shipped_cards().items()}

@@ -8,7 +8,7 @@ import pytest
 
 from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from workbench.cli import main
 from workbench.course import Course
 from workbench.documents.model_file import read_model
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 FILES = {"trace.json", "model.json", "report.html"}
 # Ctrl-C, once or twice, at the fiftieth ask: nothing here hangs on how fast the machine is, nor on

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 pytestmark = pytest.mark.slow
 

@@ -14,8 +14,7 @@ from identification.model.estimates import Estimate
 from identification.tracing.trace import trace
 from tests.told import broken
 from workbench.cards.card import load_card
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import read_sources
+from workbench.logs.sources import card_path, read_sources
 from workbench.steps.simulate import record
 
 LONG = pytest.mark.method

@@ -7,7 +7,7 @@ import pytest
 
 from workbench.cli import main
 from workbench.documents.model_file import read_model
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ from identification.arrays import Array
 from tests.verdicts.entries import Entry, Tables, merged
 from tests.verdicts.rough_machine import Rough, columns
 from workbench.cards.card import Card, card_from, load_card
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import Source, Sources, sources_of
+from workbench.logs.sources import Source, Sources, card_path, sources_of
 from workbench.steps.simulate import as_columns, record
 
 

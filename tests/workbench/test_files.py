@@ -15,8 +15,8 @@ from workbench.cards.card import load_card
 from workbench.cards.own_effects import load_effect
 from workbench.documents.model_file import read_model
 from workbench.logs import table, tables, text
-from workbench.logs.fetch import card_path
 from workbench.logs.runs import read_log
+from workbench.logs.sources import card_path
 from workbench.steps.drift import read_stream
 
 

@@ -9,9 +9,8 @@ from identification.errors import UserError
 from tests.workbench.log_files import CARD, card, signals, write_csv
 from workbench.cards.own_effects import library
 from workbench.documents.reading import read_document
-from workbench.links import broken_link
-from workbench.logs.fetch import card_path, find_data
-from workbench.logs.sources import read_sources
+from workbench.files import broken_link
+from workbench.logs.sources import card_path, find_data, read_sources
 from workbench.logs.tables import read_table
 from workbench.registry.store import Registry
 

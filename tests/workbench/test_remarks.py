@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from identification.remarks import MinorRemark
 from workbench.remarks import merged, printed_once
-from workbench.report.notes import notes, report_notes
+from workbench.report.view import notes, report_notes
 
 LOGS = tuple(f"run{n}.csv" for n in range(40))
 SAID = (

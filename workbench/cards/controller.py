@@ -14,8 +14,8 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import over
 from workbench.cards.parameter_units import shown
-from workbench.cards.quantities import in_unit_of
 from workbench.cards.table import CardTable, NotNegative, Positive
+from workbench.cards.units import in_unit_of
 
 Quantity = Positive | str
 QuantityOrNone = NotNegative | str

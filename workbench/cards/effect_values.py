@@ -10,8 +10,7 @@ from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit
-from workbench.cards.quantities import NUMBER_AND_UNIT
-from workbench.cards.units import Motion, conversion
+from workbench.cards.units import NUMBER_AND_UNIT, Motion, conversion
 
 _COMMAND = re.compile(r"\bV\b")
 _SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")

@@ -57,8 +57,7 @@ import numba
 from identification.effects._base import Effect
 from identification.effects._library import Library, built_in, declared, joined_library
 from identification.errors import BadModel, UserError
-from workbench.files import refuse_special
-from workbench.links import broken_link
+from workbench.files import broken_link, refuse_special
 
 GROUP = "workbench.effects"
 _LINE = re.compile(r'File "[^"]*", line (\d+)')

@@ -37,7 +37,7 @@ def command(
     the model found, and checks them in simulation.
     """
     from workbench.cards.card import load_card
-    from workbench.logs.fetch import card_path
+    from workbench.logs.sources import card_path
     from workbench.report.demo_tables import demo_view
     from workbench.report.next_steps import after_demo
     from workbench.report.reports import design_view, validation_view

@@ -227,7 +227,7 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import MOVES, Registry
-    from workbench.steps.robust.machines import drift_found
+    from workbench.steps.robust.outcomes import drift_found
 
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]

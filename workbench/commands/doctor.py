@@ -57,7 +57,7 @@ def command(
 
 def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | None) -> int:
     from workbench.cards.card import load_card
-    from workbench.logs.fetch import card_path, find_data
+    from workbench.logs.sources import card_path, find_data
     from workbench.report.doctor import doctor_picture, doctor_view
     from workbench.report.next_steps import after_doctor
     from workbench.steps.doctor import doctor_document, examine

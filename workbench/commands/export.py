@@ -111,9 +111,8 @@ def command(given: ExportOptions) -> int:
         return _tables(given)
     options.refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
     from workbench.documents.design_read import read_design
-    from workbench.export.exported import exported
+    from workbench.export.exported import exported, validation_line
     from workbench.export.targets import writers
-    from workbench.export.validated import validation_line
 
     targets, precision = dict.fromkeys(given.targets), given.precision
     wide = [target for target in targets if target not in SINGLE]
@@ -163,10 +162,8 @@ def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
 def _tables(given: ExportOptions) -> int:
     """The tables of a model."""
     from workbench.documents.model_file import read_model
-    from workbench.export.asked import tables_asked
     from workbench.export.compensation import Compensation
-    from workbench.export.table_targets import tables
-    from workbench.export.table_view import tables_document, tables_view
+    from workbench.export.table_targets import tables, tables_asked, tables_document, tables_view
 
     model = read_model(given.file)
     asked = tables_asked(

@@ -16,8 +16,7 @@ from workbench.output import JSON_OPTION, dumps, emit, progress
 from workbench.signature import argument, by_fields, option
 
 if TYPE_CHECKING:
-    from workbench.fleet.recording import Recorder
-    from workbench.fleet.run import Report
+    from workbench.fleet.run import Recorder, Report
     from workbench.screen import Screen
 
 MOST_BAD = 20  # results to look at on one screen; --verbose and --json have the first 1000
@@ -150,7 +149,7 @@ def _bad(one: Any) -> dict[str, Any]:
 def _card_text(name: str) -> str:
     """The text of a card that is sound; raises BadCard."""
     from workbench.cards.card import load_card
-    from workbench.logs.fetch import card_path
+    from workbench.logs.sources import card_path
 
     path = card_path(name)
     load_card(path, with_recipe=False)
@@ -160,7 +159,7 @@ def _card_text(name: str) -> str:
 @contextmanager
 def _recorder(where: str | None) -> "Iterator[Recorder]":
     """The registry at `where`, "": the default one, None: none."""
-    from workbench.fleet.recording import InRegistry, NoRegistry
+    from workbench.fleet.run import InRegistry, NoRegistry
     from workbench.jobs.lease import Patience
     from workbench.registry.database import location
     from workbench.registry.store import Registry

@@ -43,9 +43,8 @@ def command(
     there is replaced only with --force or your yes.
     """
     from workbench.report.first_card import proposal_view
-    from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
-    from workbench.steps.first_card.written import written
+    from workbench.steps.first_card.written import checked_proposal, written
 
     card = _place(out)
     asking = not (yes or as_json) and sys.stdin.isatty() and sys.stdout.isatty()

@@ -76,7 +76,7 @@ def command(given: ServeOptions) -> int:
     changing always needs one ('workbench token add NAME --role change'). Ends on Ctrl-C or SIGTERM;
     a server or worker that dies is started again. Needs the extra 'page'.
     """
-    from workbench.page.installed import refuse_missing
+    from workbench.page.settings import refuse_missing
 
     refuse_missing()
     from workbench.jobs.events import reporter

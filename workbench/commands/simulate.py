@@ -33,7 +33,7 @@ def command(
     from identification.errors import BadCard
     from workbench.cards.card import load_card
     from workbench.cards.own_effects import library
-    from workbench.logs.fetch import card_path
+    from workbench.logs.sources import card_path
     from workbench.steps.present import present_of_card
     from workbench.steps.simulate import as_columns, record, truth
 

@@ -38,7 +38,7 @@ from workbench.documents.drive import (
     law_file,
     present_file,
 )
-from workbench.documents.plain import plain
+from workbench.documents.reading import plain
 
 DESIGN_SCHEMA = "design/2"
 # A value's numbers by name, each with its unit; None: it has no such number.

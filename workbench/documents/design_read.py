@@ -15,7 +15,6 @@ from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import Shown, converted, in_unit
-from workbench.documents.contradictions import refuse_apart, refuse_unequal
 from workbench.documents.design import (
     CompensatorValues,
     Controller,
@@ -48,6 +47,7 @@ from workbench.documents.drive import (
     present_of,
 )
 from workbench.documents.model import used
+from workbench.documents.plausible import refuse_apart, refuse_unequal
 from workbench.documents.reading import Stored, read_result
 
 Value = TypeVar("Value")

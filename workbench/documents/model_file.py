@@ -12,10 +12,9 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import actuator_units
 from workbench.cards.effect_values import estimates_in_si
 from workbench.cards.parameter_units import all_converted, friction_units, in_unit
-from workbench.documents.contradictions import refuse_changed_units
 from workbench.documents.model import Model, ModelFile, fields_of
-from workbench.documents.plain import as_number, plain
-from workbench.documents.reading import Stored, read_result
+from workbench.documents.plausible import refuse_changed_units
+from workbench.documents.reading import Stored, as_number, plain, read_result
 
 MODEL_SCHEMA = "model/1"
 

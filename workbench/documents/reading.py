@@ -1,18 +1,20 @@
-"""Result files read back: strict JSON into frozen dataclasses, one line where it does not fit."""
+"""Results as plain tables, a parameter as value, unit and interval, with the versions that made
+them; and read back: strict JSON into frozen dataclasses, one line where it does not fit."""
 
 import json
 import math
 import types
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
+from identification.model.estimates import Estimate
 from workbench.cards.card import OFFERED_FOR_VELOCITY
 from workbench.cards.nearest import nearest
-from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
-from workbench.links import broken_link
+from workbench.files import ABSURD, RESULT_BYTES, broken_link, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
 UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
@@ -154,3 +156,39 @@ def _explained(first: Mapping[str, Any], kind: Any) -> str:
 
 def _shown(value: object) -> str:
     return " ".join(repr(value).split())[:60]
+
+
+def plain(value: object) -> Any:
+    """Dataclasses as dictionaries, parameters as results carry them."""
+    if isinstance(value, Estimate):
+        return as_number(value)
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    return value
+
+
+def as_number(estimate: Estimate) -> dict[str, Any]:
+    """One parameter as results carry it; beside value and interval only what says something."""
+    number = asdict(estimate)
+    return {
+        key: value
+        for key, value in number.items()
+        if value is not None or key not in ("reason", "assumed", "at_most")
+    }
+
+
+PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
+
+
+def versions() -> dict[str, str]:
+    """Versions of our package and of those that its numbers hang on."""
+    return {name: _version(name) for name in PACKAGES}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"

@@ -10,8 +10,7 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.velocity.model import NAMES_OF_VALVE, NUMBERS, Valve
 from workbench.cards.nearest import nearest
-from workbench.documents.plain import as_number, plain
-from workbench.documents.reading import read_document, read_result
+from workbench.documents.reading import as_number, plain, read_document, read_result
 
 VELOCITY_MODEL = "velocity-model/1"
 VELOCITY_DESIGN = "velocity-design/1"

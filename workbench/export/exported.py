@@ -1,9 +1,12 @@
-"""What is exported: a design's controller as a program, with the vector that tests it."""
+"""What is exported: a design's controller as a program, with the vector that tests it, and what
+`workbench validate` has said of the design."""
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +20,8 @@ from design.servo import Compensation
 from identification.errors import BadModel
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Structure
+from workbench.documents.design_file import design_digest
+from workbench.files import RESULT_BYTES
 from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop
 
@@ -177,3 +182,31 @@ def identifier(name: str) -> str:
     if not found:
         raise BadModel(f"the name {name!r} has no letter or digit; give one by --name")
     return found if found[0].isalpha() else BEFORE_DIGIT + found
+
+
+def validation_line(found: Design, design_file: Path) -> str:
+    """What the newest validation of this very design says that whoever puts it on a machine has to
+    know; "" where it passed. Looked for beside its file and in the folders beside that one's."""
+    folder = design_file.resolve().parent
+    near = {*folder.glob("validation.json"), *folder.parent.glob("*/validation.json")}
+    own = design_digest(found)
+    for path in sorted(near, key=lambda one: one.stat().st_mtime, reverse=True):
+        validation = _read(path)
+        if validation.get("design") != own:
+            continue
+        if validation.get("passed"):
+            return ""
+        where = f"{path.parent.name}/{path.name}"
+        return f"its validation did NOT pass ({where}): do not run it on the machine before it does"
+    return "no validation of this design lies near it: workbench validate MODEL DESIGN checks it"
+
+
+def _read(path: Path) -> dict[str, object]:
+    """A file that may be anything."""
+    try:
+        if path.stat().st_size > RESULT_BYTES:
+            return {}
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}

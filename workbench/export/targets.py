@@ -4,10 +4,9 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
-from workbench.export.c import c_files
+from workbench.export.c import c_files, fmu_file
 from workbench.export.data import json_file, mat_file
 from workbench.export.exported import Exported
-from workbench.export.fmu import fmu_file
 from workbench.export.structured_text import plcopen_file, st_file
 
 

@@ -1,13 +1,16 @@
-"""A Dask cluster: processes of this computer, or any by its address."""
+"""A Dask cluster: processes of this computer, each on a core of its own, or any by its address."""
 
 import math
+import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from distributed import Worker, WorkerPlugin
+
 from workbench.addresses import shown
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
 
@@ -100,8 +103,6 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
         import logging
 
         from distributed import Client, LocalCluster
-
-        from workbench.fleet.pinning import OneCore, cores
 
         try:
             made = LocalCluster(
@@ -196,3 +197,27 @@ def _dask() -> Any:
     except ImportError:
         raise BadCluster(NEEDED) from None
     return dask
+
+
+@dataclass(frozen=True)
+class OneCore(WorkerPlugin):
+    """Keeps a worker's tasks, and the threads that they start, on one of the cores.
+
+    name: by which a cluster knows the plugin. Without such a setting of the system, no effect.
+    """
+
+    cores: Sequence[int]
+    name: str = "one-core"
+
+    def setup(self, worker: Worker) -> None:
+        """Called in the thread that starts those of the tasks, which inherit the setting."""
+        if hasattr(os, "sched_setaffinity"):
+            number = int(worker.name) if str(worker.name).isdigit() else 0
+            os.sched_setaffinity(0, {self.cores[number % len(self.cores)]})
+
+
+def cores() -> tuple[int, ...]:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return tuple(sorted(os.sched_getaffinity(0)))
+    return tuple(range(os.cpu_count() or 1))

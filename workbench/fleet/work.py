@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
 from workbench.documents.model_file import model_document
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.files import CARD_FILE
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result

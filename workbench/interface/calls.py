@@ -53,7 +53,7 @@ from workbench.interface.logs import (
 )
 from workbench.interface.loops import DesignResult, ExperimentResult, RobustResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 from workbench.output import Bar, progress
 from workbench.steps.axis_test import axis_test as test_of_axis
 from workbench.steps.design import design as design_of_model

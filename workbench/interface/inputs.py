@@ -13,10 +13,8 @@ from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, card_from, load_card
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
-from workbench.cards.sensors import parse_gain
-from workbench.cards.units import conversion, si_unit
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import Recorded, Sources, sources_of
+from workbench.cards.units import conversion, parse_gain, si_unit
+from workbench.logs.sources import Recorded, Sources, card_path, sources_of
 from workbench.logs.table import RawColumn, Table
 from workbench.logs.tables import read_table
 

@@ -8,11 +8,9 @@ from identification.model.estimates import Estimate
 from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
 from workbench.documents.reading import Stored
-from workbench.jobs.drift_by_chart import drift_by_chart
-from workbench.jobs.drift_verdict import Reading
+from workbench.jobs.drift_by_chart import Reading, drift_by_chart
 from workbench.logs.sources import Sources
-from workbench.registry.axis_past import LAST_ON_PAGE, NAMED, history
-from workbench.registry.results import last_logs
+from workbench.registry.results import LAST_ON_PAGE, NAMED, history, last_logs
 from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier

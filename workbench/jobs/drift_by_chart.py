@@ -1,10 +1,11 @@
-"""The drift test over a machine's logs as the test of new logs takes it.
+"""The drift test over a machine's logs as the test of new logs takes it, and what it gives.
 
 Its state goes from log to log in the registry, with each log's result.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -14,11 +15,65 @@ from identification.drift.drift_result import Shift
 from identification.drift.mewma import DriftState
 from identification.errors import BadModel
 from workbench.documents.model import Model
-from workbench.jobs.drift_verdict import Drift, Moved, Reading
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
 from workbench.report.drift_tables import reason_sentence
 from workbench.steps.drift import Drifted, Stream, detectable_sizes, drift_of, model_key
+
+TestedDrift = Literal["none", "drift", "structure", "not_judged"]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter that has changed: its unit, active value and now, p-value of the change."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A parameter by one log, with its 95 % interval, beside its active value.
+
+    change: relative to that, with its standard deviation.
+    """
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    low: float
+    high: float
+    change: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Verdict of a test: which parameters moved, and why.
+
+    p_value: of the smallest kind, over all parameters. unsure: parameters of which some have
+    changed, and nobody can say which; could_have_seen: smallest relative change of each that would
+    have been found, None where none would. state: what the same test wants to be given with the
+    next log; plain JSON. parameters: what the log gave of each, moved or not.
+    """
+
+    verdict: TestedDrift
+    reason: str
+    moved: tuple[Moved, ...] = ()
+    p_value: float | None = None
+    state: Mapping[str, Any] = field(default_factory=dict)
+    unsure: tuple[str, ...] = ()
+    could_have_seen: Mapping[str, float | None] = field(default_factory=dict)
+    parameters: tuple[Reading, ...] = ()
+
+
+# A test of a new log against the active model; of the state of the log before under it, empty at
+# first.
+DriftJudge = Callable[[Model, Sources, np.random.Generator, Mapping[str, Any]], Drift]
 
 
 def drift_by_chart(

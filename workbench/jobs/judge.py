@@ -16,8 +16,7 @@ from workbench.documents.model import Model
 from workbench.documents.model_file import model_document, read_model
 from workbench.documents.reading import Stored
 from workbench.jobs.challenge import Contender, Terms, challenge, contest_document
-from workbench.jobs.drift_by_chart import drift_by_chart
-from workbench.jobs.drift_verdict import Drift, DriftJudge
+from workbench.jobs.drift_by_chart import Drift, DriftJudge, drift_by_chart
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Source, Sources, read_sources
 from workbench.registry.values import Candidate, Judgement

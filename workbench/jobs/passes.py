@@ -11,16 +11,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import SHARE, Clock, Patience, renewed
 from workbench.jobs.scan import MachineFolder, Scan, machine_folders, refuse_name, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
-from workbench.registry.order import Order
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
+from workbench.registry.values import Claim, Judgement, LogOutcome, Order, SeenLog, Version
 
 OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
@@ -43,16 +42,9 @@ class Task:
     previous: Mapping[str, Any] | None
 
 
-class Judge(Protocol):
-    """What a worker makes of a log.
-
-    Raises BadLog where the file cannot be tested: it is excluded. BadCard and BadModel say that
-    the machine has to be looked after: its logs wait.
-    """
-
-    def __call__(self, task: Task) -> Judgement:
-        """The judgement; nothing is written."""
-        ...
+# What a worker makes of a log; nothing is written. Raises BadLog where the file cannot be tested:
+# it is excluded. BadCard and BadModel say that the machine is to be looked after: its logs wait.
+Judge = Callable[[Task], Judgement]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from pathlib import Path
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.nearest import nearest
-from workbench.files import refuse_special
-from workbench.links import broken_link
+from workbench.files import broken_link, refuse_special
 
 HDF5_MAGIC = b"\x89HDF"
 """How HDF5 begins, from byte 512 on where MATLAB wrote it."""

@@ -15,14 +15,12 @@ from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger
-from workbench.logs.bags import read_bag
+from workbench.logs.channels import read_mdf, read_tdms, read_ulog
 from workbench.logs.excel import read_excel
 from workbench.logs.formats import HDF5_MAGIC, checked_format, head_of
-from workbench.logs.mat import tags_are_sound
 from workbench.logs.mcap import read_mcap
-from workbench.logs.mdf import read_mdf
-from workbench.logs.numpy_files import read_numpy
-from workbench.logs.structs import entry, plain_tree, records, vectors_of
+from workbench.logs.ros1 import read_bag
+from workbench.logs.structs import entry, plain_tree, records, tags_are_sound, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
     RawColumn,
@@ -32,9 +30,7 @@ from workbench.logs.table import (
     of_vectors,
     refuse_long,
 )
-from workbench.logs.tdms import read_tdms
 from workbench.logs.text import read_text_table
-from workbench.logs.ulog import read_ulog
 
 _OBJECT_MARK = "MATLAB_object_decode"  # attribute of an object in a MAT file of version 7.3
 JSON_BYTES = 100_000_000  # of text; as Python's values it takes ten times that
@@ -211,3 +207,52 @@ def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: F
         if not isinstance(row, list) or len(row) != len(rows[0]):
             raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")
     return of_matrix(path, np.asarray(rows), spec)
+
+
+def read_numpy(path: Path, spec: FileSpec) -> Table:
+    """The columns of an array, of its named fields, or of an archive's arrays.
+
+    `rows` of the spec names one array of an archive. Raises BadLog, one line, where an array holds
+    Python objects, or none holds rows and columns.
+    """
+    refuse_larger(path, BINARY_BYTES, "a NumPy file", BadLog)
+    try:
+        loaded = np.load(path, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return _table(path, loaded, spec)
+        with loaded as archive:
+            found = {name: archive[name] for name in archive.files}
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        raise BadLog(
+            f"{path}: holds Python objects (an array of dtype object), which are never unpickled;"
+            " save the numbers alone: np.save(file, np.asarray(rows, dtype=float))"
+        ) from None
+    return _of_archive(path, found, spec)
+
+
+def _of_archive(path: Path, found: dict[str, RawColumn], spec: FileSpec) -> Table:
+    if spec.rows:
+        if spec.rows not in found:
+            raise BadLog(f"{path}: no array {spec.rows!r}{nearest(spec.rows, found)}")
+        return _table(path, found[spec.rows], spec)
+    vectors = {name: np.atleast_1d(np.squeeze(x)) for name, x in found.items()}
+    flat = {name: x for name, x in vectors.items() if x.ndim == 1}
+    long = max((x.size for x in flat.values()), default=0)
+    matrices = [x for x in vectors.values() if x.ndim == 2]
+    if matrices and long < max(max(x.shape) for x in matrices):
+        return _table(path, max(matrices, key=lambda x: x.size), spec)
+    for name, x in vectors.items():
+        refuse_long(path, max(x.shape, default=0))
+        if x.ndim == 2 and long in x.shape:  # a row, or a column, an axis
+            each = x if x.shape[1] == long else x.T
+            flat |= {f"{name}_{k}": row for k, row in enumerate(each)}
+    return of_vectors(flat, spec)
+
+
+def _table(path: Path, values: RawColumn, spec: FileSpec) -> Table:
+    refuse_long(path, max(values.shape, default=0))
+    if values.dtype.names:
+        return of_vectors({name: values[name] for name in values.dtype.names}, spec)
+    return of_matrix(path, np.squeeze(values), spec)

@@ -15,12 +15,11 @@ from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
 from workbench.page import actions, drops, fleet, health, machine, sign_in, work
-from workbench.page.answer_cache import Moment
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
 from workbench.page.pages import show
 from workbench.page.settings import PageSettings, handed_over
-from workbench.page.visitors import Doorkeeper, Visitor
+from workbench.page.visitors import Doorkeeper, Moment, Visitor
 from workbench.registry.access import Access
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.store import Registry

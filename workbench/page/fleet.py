@@ -8,9 +8,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from workbench.page.answer_cache import briefly
 from workbench.page.pages import STATE_WORDS, show
-from workbench.page.visitors import Visitor, reading
+from workbench.page.visitors import Visitor, briefly, reading
 from workbench.registry.overview import FLEET_ORDERS, FleetAsked, fleet_page
 
 LONGEST_FILTER = 100

@@ -46,8 +46,8 @@ def warm() -> None:
 
     import workbench.export.targets
     import workbench.report.chart
-    import workbench.report.controllers
     import workbench.report.doctor
+    import workbench.report.reports
     import workbench.steps.doctor
     import workbench.steps.first_card.proposal  # noqa: F401
 
@@ -83,8 +83,8 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 def proposal(path: Path) -> "Proposal":
     """The card that `init` proposes, and what is hardly identifiable from the log; raises
     BadView."""
-    from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
+    from workbench.steps.first_card.written import checked_proposal
 
     with _without(path):
         return checked_proposal(proposed(path))
@@ -107,7 +107,7 @@ def doctor_chart(path: Path, card: Path) -> str:
     """The doctor's picture, as HTML; raises BadView."""
     from workbench.cards.card import load_card
     from workbench.report.chart import chart_html
-    from workbench.report.doctor_chart import doctor_charts
+    from workbench.report.doctor import doctor_charts
     from workbench.steps.doctor import checked_log
 
     with _without(path, card):

@@ -3,8 +3,11 @@
 import json
 import os
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+from identification.errors import UserError
 
 SETTINGS_VARIABLE = "WORKBENCH_PAGE"
 LOOPBACK = ("localhost", "127.0.0.1", "[::1]", "::1")
@@ -54,3 +57,20 @@ def handed_over() -> PageSettings:
     """The settings that the process which started this one has left."""
     found: dict[str, Any] = json.loads(os.environ[SETTINGS_VARIABLE])
     return PageSettings(**{**found, "names": tuple(found["names"])})
+
+
+NEEDED_LIBRARIES = ("starlette", "uvicorn", "python_multipart")
+
+
+class MissingPage(UserError):
+    """A library of the page is not installed."""
+
+
+def refuse_missing() -> None:
+    """Raises MissingPage with the extra to install."""
+    lost = [name for name in NEEDED_LIBRARIES if find_spec(name) is None]
+    if lost:
+        raise MissingPage(
+            f"the page needs the library {lost[0]!r}, which is not installed; run"
+            " pip install 'servo-workbench[page]'"
+        )

@@ -33,14 +33,13 @@ from workbench.report.model_tables import (
     plant_lines,
     summary,
 )
-from workbench.report.notes import report_notes
-from workbench.report.page import Section
 from workbench.report.reports import identified_view
 from workbench.report.residual import residual
 from workbench.report.trace import traced_view
 from workbench.report.trace_pictures import against_signal, pictures
 from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence
+from workbench.report.view import Section, report_notes
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.missing_force import missing_force

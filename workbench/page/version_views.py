@@ -57,8 +57,8 @@ def design_page(design: str) -> str:
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     """Designs of versions by their numbers, each as text, side by side."""
     from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
-    from workbench.report.controllers import linear_step
     from workbench.report.design_tables import DESIGN_HEAD, margins_table
+    from workbench.report.reports import linear_step
 
     rows: list[Sequence[str]] = []
     lines: list[Line] = []

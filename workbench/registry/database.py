@@ -25,7 +25,7 @@ from sqlalchemy.exc import (
 )
 from sqlalchemy.orm import Session
 
-from workbench.links import broken_link
+from workbench.files import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import upgrade
 

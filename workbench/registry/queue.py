@@ -19,8 +19,7 @@ from sqlalchemy.orm import Session
 from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.machine_summary import summary_heard, summary_tested
-from workbench.registry.order import Order, newest_of_later
+from workbench.registry.overview import summary_heard, summary_tested
 from workbench.registry.rows import (
     active_version,
     add_version,
@@ -47,8 +46,10 @@ from workbench.registry.values import (
     DecisionKind,
     Judgement,
     LogOutcome,
+    Order,
     SeenLog,
     Version,
+    newest_of_later,
 )
 
 OFTEN = 5

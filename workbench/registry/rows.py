@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, aliased
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.errors import BadRegistry
-from workbench.registry.machine_summary import begin_summary, summary_moved
+from workbench.registry.overview import begin_summary, summary_moved
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,

@@ -8,9 +8,8 @@ from identification.arrays import Array
 from workbench.cards.readable import in_digits, number, shown_unit, units_of
 from workbench.output import Row
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
-from workbench.report.page import Section
 from workbench.report.templating import render
-from workbench.report.view import View
+from workbench.report.view import Section, View
 from workbench.screen import listed, tabled
 from workbench.steps.axis_test import AxisTest, Earlier, Quantity, axis_document
 

@@ -11,7 +11,6 @@ from workbench.documents.design import Design
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import not_identified
-from workbench.report.notes import notes
 from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation_tables import (
@@ -19,6 +18,7 @@ from workbench.report.validation_tables import (
     validation_sentence,
     validation_table,
 )
+from workbench.report.view import notes
 from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures

@@ -7,8 +7,7 @@ from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import units_of
 from workbench.documents.drive import Output, equation_lines, force_lines
 from workbench.output import Row
-from workbench.report.notes import notes
-from workbench.report.view import OUT
+from workbench.report.view import OUT, notes
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import takes_compensator

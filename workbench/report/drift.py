@@ -16,9 +16,7 @@ from workbench.report.drift_tables import (
     then_of_drift,
     what_the_columns_say,
 )
-from workbench.report.notes import report_notes
-from workbench.report.page import Section, lines_section, table_section
-from workbench.report.view import View
+from workbench.report.view import Section, View, lines_section, report_notes, table_section
 from workbench.steps.drift import Drifted, Tested, drift_document
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]

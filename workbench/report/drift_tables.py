@@ -8,7 +8,7 @@ from workbench.cards.readable import number, shown_unit
 from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.model_tables import reasons_once
-from workbench.report.notes import notes
+from workbench.report.view import notes
 from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested
 

@@ -5,9 +5,7 @@ import numpy as np
 from workbench.cards.parameter_units import shown
 from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
-from workbench.report.notes import notes
-from workbench.report.page import Section, table, table_section
-from workbench.report.view import View
+from workbench.report.view import Section, View, notes, table, table_section
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.experiment.planned import Experiment, Promised, experiment_document
 

@@ -13,7 +13,7 @@ from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Chart, Line, Mark, Panel, Part, chart_html
 from workbench.report.model_tables import run_coupling
-from workbench.report.page import Section
+from workbench.report.view import Section
 from workbench.steps.predicted_force import force_by_model
 
 

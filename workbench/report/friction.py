@@ -18,7 +18,7 @@ from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.chart_figure import evenly_spread
-from workbench.report.page import Section
+from workbench.report.view import Section
 
 CURVES = 200
 POINTS = 80  # of a branch of the curve

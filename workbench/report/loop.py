@@ -9,8 +9,8 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.readable import number, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
-from workbench.report.page import Section, table_section
 from workbench.report.validation_tables import validation_lines, validation_table
+from workbench.report.view import Section, table_section
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, Traces
 from workbench.steps.validate import Validation
 

@@ -10,8 +10,8 @@ from identification.tracing.result import MissingForce, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, Part, chart_html
 from workbench.report.chart_figure import SHOWN_SHARE
-from workbench.report.page import Section
 from workbench.report.trace_words import share_of_friction
+from workbench.report.view import Section
 
 POINTS_OVER_TIME = 4000  # of each line
 WIDE_95 = 1.96  # deviations on either side, of a 95 % band

@@ -12,7 +12,7 @@ from workbench.documents.model import Model, used
 from workbench.documents.velocity import VelocityModel
 from workbench.output import Row
 from workbench.remarks import printed_once
-from workbench.report.notes import notes
+from workbench.report.view import notes
 from workbench.screen import Part, instead, more, tabled
 
 MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")

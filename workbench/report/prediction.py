@@ -6,9 +6,7 @@ import numpy as np
 
 from workbench.cards.readable import force, length, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel, chart_html
-from workbench.report.notes import notes
-from workbench.report.page import Section, lines_section
-from workbench.report.view import View
+from workbench.report.view import Section, View, lines_section, notes
 from workbench.steps.predict import Predicted, prediction_csv
 
 Columns = tuple[tuple[str, Colour, str], ...]

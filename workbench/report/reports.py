@@ -1,27 +1,36 @@
 """What `identify`, `design` and `validate` show: which tables and pictures, under which words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 
+import numpy as np
+from scipy.signal import lfilter
+
+from design.loop_frequencies import open_loop_response
+from design.margins import sensitivities
+from design.rst import RST, closed_loop
+from identification.arrays import Array
 from identification.estimation.estimates import AT_ZERO
 from identification.simulation.free_run import FreeRun
-from workbench.documents.design import Design
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import design_document
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.report.controllers import (
-    bode_section,
-    coefficients,
-    controllers,
-    drive_section,
-    sensitivity_section,
-    step_chart,
-    step_response,
+from workbench.report.chart import Chart, Colour, Line, Mark, Panel, chart_html
+from workbench.report.design_tables import (
+    design_lines,
+    design_parts,
+    design_sentence,
+    drive_lines,
+    drive_table,
+    margins_table,
+    polynomial_lines,
+    then_of_design,
 )
-from workbench.report.design_tables import design_parts, design_sentence, then_of_design
 from workbench.report.fit import fit, fit_chart
 from workbench.report.friction import friction_curve
-from workbench.report.loop import judged, loop
+from workbench.report.loop import LOOP_COLOURS, judged, loop
 from workbench.report.loop import step_chart as loop_chart
 from workbench.report.model_tables import (
     fit_lines,
@@ -32,8 +41,6 @@ from workbench.report.model_tables import (
     plant_lines,
     summary,
 )
-from workbench.report.notes import report_notes
-from workbench.report.page import Section, lines_section
 from workbench.report.residual import residual
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
@@ -43,7 +50,8 @@ from workbench.report.validation_tables import (
     validation_parts,
     validation_sentence,
 )
-from workbench.report.view import View
+from workbench.report.view import Section, View, lines_section, report_notes, table
+from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
 from workbench.steps.missing_force import missing_force, share_of_coulomb
@@ -147,3 +155,132 @@ def parameters_section(model: Model) -> Section:
 def _shown(value: float) -> str:
     """A value that simulations use; what a plant keeps of 0 is 0."""
     return "0" if abs(value) <= AT_ZERO else f"{value:.3g}"
+
+
+MOST_DB = float(20 * np.log10(2.0))  # of |S_yp| at a modulus margin of 0.5
+
+
+def controllers(found: Design, rotary: bool = False) -> Section:
+    """Margins of both loops and what they rest on."""
+    margins = table(margins_table(found), design_lines(found, rotary))
+    return Section("Controllers", margins + table(drive_table(found)))
+
+
+def coefficients(found: Design) -> Section:
+    """The polynomials, for whoever programs the controller."""
+    text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
+    return lines_section("Coefficients", text)
+
+
+def drive_section(found: Design) -> Section:
+    """The same as difference equations, in the unit that the drive takes."""
+    return lines_section("As the drive runs it", drive_lines(found))
+
+
+def sensitivity_section(found: Design, rotary: bool = False) -> Section:
+    """|S_yp| with its limit, and |S_up|."""
+    A, B = np.array(found.plant.A), np.array(found.plant.B)
+    w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h
+    noise: list[Line] = []
+    disturbance = [Line("modulus margin 0.5", w, np.full(len(w), MOST_DB), "other", "dotted")]
+    for name, one in found.controllers.items():
+        s, colour = sensitivities(A, B, one.rst, w), LOOP_COLOURS[name]
+        disturbance.append(Line(name.upper(), w, _db(s.S_yp), colour))
+        noise.append(Line(name.upper(), w, _db(s.S_up), colour))
+    top = max(float(line.y.max()) for line in noise) + 5.0 if noise else 0.0
+    unit, frequency = shown(rotary).stiffness, "frequency [rad/s]"
+    panels = (
+        Panel(frequency, "|S_yp| [dB]", disturbance, "disturbance to position", log_x=True),
+        Panel(
+            frequency, f"|S_up| [dB, {unit}]", noise, "measurement noise to force",
+            log_x=True, y_range=(top - 80.0, top),
+        ),
+    )  # fmt: skip
+    caption = "Below 0 dB the loop suppresses disturbances; the peak of |S_yp| is 1/modulus margin."
+    chart = Chart("sensitivity", "sensitivity functions against frequency", panels, columns=2)
+    return Section("Sensitivity", chart_html(chart, caption))
+
+
+def step_response(found: Design) -> Section:
+    """Linear step response of both loops, without Coulomb friction."""
+    caption = (
+        "Response of the linear loop. The machine has Coulomb friction too: `workbench validate`"
+        " shows the loop with it."
+    )
+    return Section("Step response", chart_html(step_chart(found), caption))
+
+
+def step_chart(found: Design) -> Chart:
+    """The chart of `step_response`."""
+    lines = []
+    for name, one in found.controllers.items():
+        t, y = linear_step(found, one)
+        # Held from sample to sample.
+        staircase = np.repeat(t, 2)[1:], np.repeat(y, 2)[:-1]
+        lines.append(Line(name.upper(), *staircase, LOOP_COLOURS[name]))
+    panel = Panel("time [s]", "position / step [-]", lines, marks=[Mark(1.0)])
+    return Chart("step", "linear step response of the closed loop", [panel])
+
+
+def linear_step(found: Design, one: Controller) -> tuple[Array, Array]:
+    """Time [s] and position of a unit step through B T/P, (n,)."""
+    n = int(np.clip(15.0 / (one.dominant[0] * one.h), 40, 4000))
+    forward = np.convolve(np.array(found.plant.B), np.array(one.T))
+    P = closed_loop(np.array(found.plant.A), np.array(found.plant.B), one.rst)
+    t = one.h * np.arange(n, dtype=np.float64)
+    return t, np.asarray(lfilter(forward, P, np.ones(n)), dtype=np.float64)
+
+
+def _db(values: object) -> Array:
+    return np.asarray(20 * np.log10(np.maximum(np.abs(np.asarray(values)), 1e-12)))
+
+
+LOWEST_DRAWN = 1e-3  # of half the sampling rate
+POINTS_OF_BODE = 1200
+HERTZ = "frequency [Hz]"
+
+
+def bode_section(found: Design) -> Iterator[Section]:
+    """Magnitude, phase and |S_yp| of the cascade's loop with its filter and with the same gains
+    without it; nothing where there is no filter."""
+    one = found.p_pi
+    if one is None or one.cascade is None or one.series is None:
+        return
+    caption = (
+        f"Open loop on two masses with the {filter_words(one.series)}, and with the same gains"
+        " without it: the peak of the resonance comes down, and |S_yp| with it. What is above 6 dB"
+        " there has a modulus margin below 0.5."
+    )
+    yield Section("Bode plot, before and after the filter", chart_html(bode_chart(found), caption))
+
+
+def bode_chart(found: Design) -> Chart:
+    """The chart of `bode_section`; raises ValueError where the design has no filter."""
+    one = found.p_pi
+    if one is None or one.cascade is None or one.series is None:
+        raise ValueError("a design without a filter has no Bode plot before and after it")
+    A, B = np.array(found.plant.A), np.array(found.plant.B)
+    f = 0.5 / one.h * np.geomspace(LOWEST_DRAWN, 1.0, POINTS_OF_BODE)
+    before, after = one.cascade.rst(one.h), one.rst
+    pairs: tuple[tuple[str, RST, Colour], ...] = (
+        ("without the filter", before, "before"), (f"with the {one.series.kind}", after, "model"),
+    )  # fmt: skip
+    size, phase, sensitivity = list[Line](), list[Line](), list[Line]()
+    for name, rst, colour in pairs:
+        L = open_loop_response(A, B, rst, f)
+        size.append(Line(name, f, _decibels(np.abs(L)), colour))
+        turned = np.degrees(np.unwrap(np.angle(L)))
+        phase.append(Line(name, f, turned - 360.0 * np.ceil(turned[0] / 360.0), colour))
+        S = np.abs(sensitivities(A, B, rst, 2.0 * np.pi * f).S_yp)
+        sensitivity.append(Line(name, f, _decibels(S), colour))
+    panels = (
+        Panel(HERTZ, "|L| [dB]", size, "open loop, magnitude", log_x=True, marks=[Mark(0.0)]),
+        Panel(HERTZ, "phase [deg]", phase, "open loop, phase", log_x=True, marks=[Mark(-180.0)]),
+        Panel(HERTZ, "|S_yp| [dB]", sensitivity, "disturbance to position", log_x=True,
+              marks=[Mark(6.0)]),
+    )  # fmt: skip
+    return Chart("bode", "open loop and sensitivity before and after the filter", panels, columns=1)
+
+
+def _decibels(size: Array) -> Array:
+    return np.asarray(20.0 * np.log10(np.maximum(size, 1e-9)))

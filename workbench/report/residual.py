@@ -13,7 +13,7 @@ from workbench.report.chart import Band, Chart, Line, Panel, chart_html
 from workbench.report.fit import InARow, in_a_row
 from workbench.report.missing_force import force_lines, range_of
 from workbench.report.model_tables import left_of
-from workbench.report.page import Section
+from workbench.report.view import Section
 
 NOISE_BAND = "±2σ of the sensor's noise"
 

@@ -17,9 +17,7 @@ from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Chart, Line, Mark, Panel, chart_html
-from workbench.report.notes import notes, report_notes
-from workbench.report.page import Section, lines_section, table
-from workbench.report.view import View
+from workbench.report.view import Section, View, lines_section, notes, report_notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.response import (
     Responded,

@@ -9,16 +9,13 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
-from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
-from workbench.report.notes import notes
-from workbench.report.page import Section, lines_section, table, table_section
-from workbench.report.view import View
+from workbench.report.reports import coefficients, controllers, drive_section
+from workbench.report.view import Section, View, lines_section, notes, table, table_section
 from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
-from workbench.steps.robust.document import robust_document
 from workbench.steps.robust.outcomes import MEASURES, Measure
-from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
+from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")

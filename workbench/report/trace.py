@@ -3,8 +3,6 @@
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
 from workbench.report.missing_force import missing_chart, missing_over_time
-from workbench.report.notes import report_notes
-from workbench.report.page import Section, lines_section, table_section
 from workbench.report.response import over_frequency
 from workbench.report.trace_friction import friction_before_after, friction_chart
 from workbench.report.trace_pictures import (
@@ -27,7 +25,7 @@ from workbench.report.trace_tables import (
     trace_parts,
 )
 from workbench.report.trace_words import then_of, trace_sentence, words
-from workbench.report.view import View
+from workbench.report.view import Section, View, lines_section, report_notes, table_section
 from workbench.steps.trace import Traced, trace_document
 
 EVERY_EQUATION = ("mechanical", "actuator")

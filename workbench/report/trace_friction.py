@@ -19,8 +19,8 @@ from workbench.report.friction import (
     low_speeds,
     with_bar,
 )
-from workbench.report.page import Section
 from workbench.report.trace_words import words
+from workbench.report.view import Section
 from workbench.steps.trace import Traced
 
 Curve = tuple[Karnopp, list[Acting], Colour, str]  # a model, its effects of speed, colour and name

@@ -14,8 +14,8 @@ from identification.tracing.result import FreeCurve, Residual, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
 from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
-from workbench.report.page import Section
 from workbench.report.trace_words import words
+from workbench.report.view import Section
 
 Equation = Literal["mechanical", "actuator"]
 LEVELS = 30  # of a signal, over which the running median is taken

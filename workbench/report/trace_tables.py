@@ -24,8 +24,8 @@ from workbench.cards.readable import (
 )
 from workbench.output import Row
 from workbench.report.model_tables import is_left_out, reasons_once
-from workbench.report.notes import notes
 from workbench.report.trace_words import percent, words
+from workbench.report.view import notes
 from workbench.screen import Part, more, tabled
 from workbench.steps.trace import Traced, effect_estimates
 

@@ -3,7 +3,7 @@
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length
 from workbench.output import Row
-from workbench.report.notes import notes
+from workbench.report.view import notes
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures
 from workbench.steps.recommend import (

@@ -11,9 +11,7 @@ from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity
 from workbench.ending import Step, step
 from workbench.output import Row
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
-from workbench.report.notes import notes
-from workbench.report.page import lines_section, table_section
-from workbench.report.view import View
+from workbench.report.view import View, lines_section, notes, table_section
 from workbench.screen import Part, screen, tabled
 from workbench.steps.velocity import (
     VelocityPrediction,

@@ -1,21 +1,92 @@
-"""A result as everyone is shown it, made once: a terminal, a page, a notebook and a picture."""
+"""A result as everyone is shown it, made once: a terminal, a page of one HTML file without network,
+a notebook and a picture. Remarks are printed once for all logs that they hold for."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from identification.remarks import MinorRemark
 from workbench.ending import Step
 from workbench.files import REPORT_FILE
 from workbench.output import OutputFolder, dumps, emit, next_step, written
-from workbench.report.chart import Chart
-from workbench.report.page import Section, page, table
-from workbench.report.templating import render
-from workbench.screen import Part, Screen, screen
+from workbench.remarks import Merged, merged, printed_once
+from workbench.report.chart import Chart, chart_assets
+from workbench.report.templating import render, safe, used_symbols
+from workbench.screen import Part, Screen, instead, screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report: its heading and its HTML."""
+
+    title: str
+    html: str
+
+
+def table(part: Part, lines: Sequence[Any] = ()) -> Any:
+    """The HTML of a whole table, and of lines below it; "" where it has no rows and none are."""
+    if not part.whole:
+        return safe(render("lines", lines=lines) if lines else "")
+    return safe(render("table", head=part.full_head, rows=part.whole, lines=lines))
+
+
+def table_section(title: str, part: Part, lines: Sequence[Any] = ()) -> Section:
+    """A section that is a table."""
+    return Section(title, table(part, lines))
+
+
+def lines_section(title: str, lines: Sequence[Any]) -> Section:
+    """A section of lines; merged remarks open up."""
+    return Section(title, render("lines", lines=lines))
+
+
+def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str] = ()) -> str:
+    """The HTML of a whole report: `lead` says what was found, `then` what to do next, a line each.
+
+    The first section is on the first screen. Scripts are in it only where a chart is.
+    """
+    body = "".join(section.html for section in sections)
+    # The chart's style holds the colours of both schemes, which every report uses.
+    needed = chart_assets() if '<figure class="chart"' in body else {"chart.css": ""}
+    styles = [
+        text for name, text in chart_assets().items() if name.endswith(".css") and name in needed
+    ]
+    styles.append((files("workbench") / "assets/report.css").read_text("utf-8"))
+    scripts = [text for name, text in needed.items() if name.endswith(".js")]
+    return render(
+        "page", title=title, lead=lead, then=then, sections=sections, styles=styles,
+        scripts=scripts, symbols=used_symbols(lead + body + "".join(then)),
+    )  # fmt: skip
+
+
+MOST_NOTES = 6
+
+
+def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_NOTES) -> Part:
+    """The remarks for a terminal: merged and without asides; with --verbose each as it is.
+
+    logs: names with which a remark on one log begins.
+    """
+    every = tuple(remarks)
+    main = printed_once((one for one in every if not isinstance(one, MinorRemark)), logs)
+    shown = [one._replace(text=f"note: {one.text}") for one in report_notes(every, logs)]
+    return replace(instead(_noted(main), _noted(every), most, yields=True), merged=shown)
+
+
+def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:
+    """All remarks for a report, asides after the others; those merged with what each said."""
+    return merged(sorted(remarks, key=lambda one: isinstance(one, MinorRemark)), logs)
+
+
+def _noted(lines: Iterable[str]) -> list[str]:
+    return [f"note: {line}" for line in lines]
+
 
 OUT = "\0"  # in what to do next: the folder of the files, where they are written
 

@@ -20,7 +20,7 @@ from identification.model.estimates import Estimate
 from identification.model.surroundings import Surroundings
 from identification.signals.check import check_driven
 from identification.thresholds import HALF_LEFT
-from workbench.cards.limits import limit_units
+from workbench.cards.card_tables import limit_units
 from workbench.cards.readable import number, shown_unit
 from workbench.logs.sources import Source, Sources
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of

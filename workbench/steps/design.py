@@ -32,7 +32,7 @@ from workbench.documents.design import (
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, tuned_cascade
 from workbench.steps.identify import check_period
 from workbench.steps.linear_loop import (

@@ -36,8 +36,7 @@ from workbench.documents.model import Identifiable
 from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import read_signals, with_force
 from workbench.steps.hardly_identifiable import hardly_identifiable
-from workbench.steps.identifiability_of_runs import RunsIdentifiability, identifiability_of_runs
-from workbench.steps.identifiable_by_log import Ways
+from workbench.steps.identifiable_by_log import RunsIdentifiability, Ways, identifiability_of_runs
 
 DOCTOR_SCHEMA = "doctor/1"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end

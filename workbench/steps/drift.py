@@ -21,9 +21,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.documents.plain import as_number
-from workbench.documents.reading import read_result
-from workbench.documents.versions import versions
+from workbench.documents.reading import as_number, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
 

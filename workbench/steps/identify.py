@@ -40,7 +40,7 @@ from workbench.documents.model import (
     Model,
     ParameterCorrelation,
 )
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.logs.sources import Source
 from workbench.steps.drift import active_model
 

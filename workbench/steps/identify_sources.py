@@ -11,10 +11,10 @@ from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, without_end
 from workbench.documents.model import Model
-from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
+from workbench.documents.reading import as_number
 from workbench.logs.sources import Source, Sources
-from workbench.steps.identifiability_of_runs import identifiability_of_runs
+from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, Progress, identify
 from workbench.steps.other_kind import looks_like_velocity
 from workbench.steps.present import present_of_card

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from workbench.cards.card import load_card
 from workbench.files import shipped_cards
-from workbench.logs.fetch import DATA_VARIABLE
+from workbench.logs.sources import DATA_VARIABLE
 
 SHOWN_VERSIONS = (
     "servo-workbench", "numpy", "scipy", "numba", "pandas", "pyarrow", "pint", "matplotlib",

@@ -15,7 +15,7 @@ from workbench.cards.controller import CardController
 from workbench.cards.parameter_units import shown
 from workbench.documents.drive import ForceLoop, Present, PresentFile, present_file
 from workbench.documents.model import Model
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 
 def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:

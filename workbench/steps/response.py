@@ -25,7 +25,7 @@ from identification.model.size import Size
 from identification.progress import KeepGoing, without_end
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
-from workbench.documents.plain import as_number
+from workbench.documents.reading import as_number
 from workbench.logs.sources import Source, Sources, fingerprints
 from workbench.steps.identify import Progress
 from workbench.steps.identify_sources import identify_sources

@@ -28,7 +28,7 @@ from workbench.cards.effect_values import exact
 from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
 from workbench.documents.drive import PresentFile
-from workbench.documents.plain import as_number, plain
+from workbench.documents.reading import as_number, plain
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop, servo_run
 from workbench.steps.present import present

@@ -20,11 +20,9 @@ from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
 from workbench.documents.model import FitSummary, LogEntry, Model
-from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
-from workbench.documents.versions import versions
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
+from workbench.documents.reading import as_number, versions
+from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
 from workbench.steps.identify import (
     arx_or_reason,
     log_entry,

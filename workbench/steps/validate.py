@@ -12,7 +12,7 @@ from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
-from workbench.documents.versions import versions
+from workbench.documents.reading import versions
 from workbench.steps.closed_loop import DrivenLoop, driven_loop, effects_left_out, scheduled_loop
 from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (

@@ -21,9 +21,8 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
-from workbench.documents.plain import as_number
+from workbench.documents.reading import as_number, versions
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
-from workbench.documents.versions import versions
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
 from workbench.steps.other_kind import looks_like_friction
 

@@ -21,8 +21,8 @@ from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.velocity.model import Valve
+from workbench.documents.reading import versions
 from workbench.documents.velocity import VelocityDesign, VelocityModel
-from workbench.documents.versions import versions
 from workbench.steps.loop_figures import Limits
 
 SMOOTHED = 3.0  # deviations of the position's noise, within which no offset is given in full

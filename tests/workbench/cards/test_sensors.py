@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from identification.errors import BadCard
 from tests.workbench.log_files import CARD, card, signals, write_csv
-from workbench.cards.sensors import Gain, column_scale, parse_gain
-from workbench.cards.units import Motion
+from workbench.cards.units import Gain, Motion, column_scale, parse_gain
 from workbench.logs.runs import read_log
 from workbench.steps.simulate import as_columns
 

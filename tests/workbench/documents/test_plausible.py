@@ -23,8 +23,7 @@ from workbench.documents.plausible import (
     model_remarks,
     stored_remarks,
 )
-from workbench.logs.fetch import card_path
-from workbench.logs.sources import read_sources
+from workbench.logs.sources import card_path, read_sources
 from workbench.output import dumps
 from workbench.steps.design import design
 

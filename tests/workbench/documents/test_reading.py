@@ -10,7 +10,7 @@ from identification.errors import BadCard, BadModel
 from tests.workbench.log_files import CARD
 from workbench.cards.card import load_card
 from workbench.documents.reading import read_document
-from workbench.logs.fetch import card_path
+from workbench.logs.sources import card_path
 
 DEEP = "lie deeper in each other than in any card"
 

@@ -12,8 +12,8 @@ from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
 from tests.workbench.export.designs import START, case, simulated
+from workbench.export.c import fmu_file
 from workbench.export.exported import exported
-from workbench.export.fmu import fmu_file
 
 N = 3000
 

@@ -18,9 +18,8 @@ from tests.workbench.export import table_readers as read
 from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear, lost, rotary
 from tests.workbench.export.structured_text_runner import Blocks
 from workbench.documents.model import Model
-from workbench.export.asked import tables_asked
 from workbench.export.compensation import Compensation, TableFile, TablesAsked
-from workbench.export.table_targets import Tables, tables
+from workbench.export.table_targets import Tables, tables, tables_asked
 
 ONE_PER_CENT = 0.01
 UNTOLD = Estimate(None, "N", reason="too weak; log longer", assumed=0.02)

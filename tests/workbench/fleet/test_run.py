@@ -23,8 +23,15 @@ from tests.workbench.fleet.values import (
     slow,
 )
 from workbench.fleet.cluster import Cluster, Work, cluster_at, local_cluster
-from workbench.fleet.recording import LEASE, InRegistry, NoRegistry, Recorder
-from workbench.fleet.run import FleetRun, FleetSettings, Report
+from workbench.fleet.run import (
+    LEASE,
+    FleetRun,
+    FleetSettings,
+    InRegistry,
+    NoRegistry,
+    Recorder,
+    Report,
+)
 from workbench.fleet.store import RESULTS_FOLDER, ResultStore
 from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
 from workbench.jobs.lease import Patience

@@ -31,7 +31,7 @@ def result(walk: Posterior | None = None) -> IdentifyResult:
 
 def _card() -> Any:
     from workbench.cards.card import load_card
-    from workbench.logs.fetch import card_path
+    from workbench.logs.sources import card_path
 
     return load_card(card_path("paper_table1_rich"))
 

@@ -9,7 +9,7 @@ import pytest
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, load_card
 from workbench.files import shipped_cards
-from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data
+from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
 
 BYTES = b"t,y,F\n0,0,0\n"
 

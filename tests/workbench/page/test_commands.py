@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
-from workbench.page import installed
+from workbench.page import settings
 from workbench.page.settings import PageSettings, hand_over, handed_over
 from workbench.registry.access import Access
 from workbench.registry.store import Registry
@@ -54,7 +54,7 @@ def test_what_is_wrong_with_a_registry_is_told_first(
 def test_without_the_extra_it_says_how_to_get_it(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(installed, "find_spec", lambda name: None)
+    monkeypatch.setattr(settings, "find_spec", lambda name: None)
     assert main(["serve"]) == 2
     assert "pip install 'servo-workbench[page]'" in capsys.readouterr().err
 

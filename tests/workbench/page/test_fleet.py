@@ -7,8 +7,14 @@ import pytest
 
 from tests.workbench.page.conftest import NOW, Page
 from workbench.page.fleet import asked_for
-from workbench.registry.machine_summary import TREND_LOGS, most_moved, state_of, with_log
-from workbench.registry.overview import FleetAsked, fleet_page
+from workbench.registry.overview import (
+    TREND_LOGS,
+    FleetAsked,
+    fleet_page,
+    most_moved,
+    state_of,
+    with_log,
+)
 from workbench.registry.queue import Queue
 from workbench.registry.results import condition, last_logs
 from workbench.registry.store import Registry

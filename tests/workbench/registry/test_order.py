@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workbench.registry.order import newest_of_later, older
-from workbench.registry.values import SeenLog
+from workbench.registry.values import SeenLog, newest_of_later, older
 
 
 def log(file: str, mtime: int = 100) -> SeenLog:

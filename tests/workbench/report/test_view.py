@@ -7,9 +7,7 @@ import numpy as np
 
 from workbench.output import OutputFolder
 from workbench.report.chart import Chart, Line, Panel
-from workbench.report.notes import notes
-from workbench.report.page import Section, table_section
-from workbench.report.view import OUT, View
+from workbench.report.view import OUT, Section, View, notes, table_section
 from workbench.screen import instead, more, tabled
 
 TABLE = tabled(("what", "size"), [("a", "1")], whole=[("a", "1"), ("b", "2")])

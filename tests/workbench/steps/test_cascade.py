@@ -19,8 +19,8 @@ from workbench.documents.model import Model
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps
-from workbench.report.controllers import bode_chart
 from workbench.report.design_tables import cascade_lines
+from workbench.report.reports import bode_chart
 from workbench.steps.cascade import unseen_lag
 from workbench.steps.closed_loop import driven_loop, load_of, run_driven
 from workbench.steps.design import design, usual_structures

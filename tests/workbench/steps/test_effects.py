@@ -26,8 +26,8 @@ from workbench.cards.recipe import (
     RecipePD,
 )
 from workbench.documents.model import Model
-from workbench.logs.fetch import card_path
 from workbench.logs.runs import read_log
+from workbench.logs.sources import card_path
 from workbench.steps.closed_loop import effects_left_out, in_the_loop, run_loop
 from workbench.steps.demo import recipe_of, simulated_log
 from workbench.steps.predict import Prediction, predict

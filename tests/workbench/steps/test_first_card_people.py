@@ -14,9 +14,8 @@ from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
 from workbench.page.card_form import OTHER_FIELD, form_of, stored_form
 from workbench.steps.first_card.answers import BadAnswer, with_rig
-from workbench.steps.first_card.checked_proposal import checked_proposal
 from workbench.steps.first_card.proposal import Proposal, proposed
-from workbench.steps.first_card.written import written
+from workbench.steps.first_card.written import checked_proposal, written
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 

@@ -8,7 +8,7 @@ from identification.errors import BadCard, UserError
 from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
-from workbench.cards.sensors import column_scale
+from workbench.cards.units import column_scale
 from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"

@@ -14,8 +14,7 @@ from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import Header, read_header
-from workbench.logs.raw_columns import RawColumn
-from workbench.logs.unknown import UnknownLog
+from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
 

@@ -1,13 +1,18 @@
-"""A proposal as the text of a card, each line with what is sure of it and why."""
+"""A proposal as the text of a card, each line with what is sure of it and why; and what reading its
+log by it shows."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from identification.errors import UserError
-from workbench.cards.card import load_card
+from identification.signals.renewal import RENEWED_AT
+from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
+from workbench.steps.hardly_identifiable import hardly_identifiable
 
 LEGEND = (
     '"sure" and "guess" say how well a line follows from the log; check each guess before you use',
@@ -72,3 +77,20 @@ def refusal(log: Path, card: Path) -> str:
     except UserError as error:
         return str(error)
     return ""
+
+
+CARD_NAME = Path("the card")
+
+
+def checked_proposal(of: Proposal) -> Proposal:
+    """The proposal with what doctor will say of it first: `refused`, and `hardly` identifiable."""
+    try:
+        card = card_from(tomllib.loads(written(of)), CARD_NAME)
+        found = read_runs(of.path, card)
+        rig = card.rig(of.path.name)
+        lines = hardly_identifiable(found.runs, rig)
+    except UserError as error:
+        return replace(of, refused=str(error))
+    before = f"{of.path.name}: "
+    renewed = [one.removeprefix(before) for one in found.remarks if RENEWED_AT in one]
+    return replace(of, hardly=tuple(dict.fromkeys([*lines, *renewed])))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -10,17 +11,20 @@ from identification.errors import BadModel, NotIdentifiable
 from identification.progress import Progress, quiet
 from workbench.documents.design import Design, From, Recommendation, Recommended
 from workbench.documents.model import Model
+from workbench.documents.reading import versions
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
 from workbench.steps.loop_figures import PRESENT, Limits, references
-from workbench.steps.robust.machines import DrawnMachines, drawn_machines, some_of
 from workbench.steps.robust.outcomes import (
     MEASURES,
+    DrawnMachines,
     Motion,
     Outcomes,
+    drawn_machines,
     limits_by_name,
     outcomes,
     slow_ramp,
+    some_of,
 )
 from workbench.steps.robust.search import Candidate, Placing, Searched, searched, spread_of
 
@@ -240,3 +244,48 @@ def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
     if not model.fit.adequate:
         out.append("the model leaves more than noise: the machine is not among those drawn")
     return out
+
+
+ROBUST_SCHEMA = "robust/1"
+
+
+def robust_document(found: Robust) -> dict[str, Any]:
+    """robust.json: what was asked, every loop's promise and the shares that keep each limit."""
+    asked = found.asked
+    return {
+        "schema": ROBUST_SCHEMA,
+        "card": found.design.card,
+        "passed": found.passed,
+        "recommended": found.design.recommended,
+        "compensator": bool(found.promises[ROBUST].compensator),
+        "draws": asked.draws,
+        "seed": asked.seed,
+        "probability": asked.probability,
+        "drift": dict(asked.drift or {}),
+        "tried": found.tried,
+        "slow_speed": found.speed,
+        "loops": {name: _promise_document(one) for name, one in found.promises.items()},
+        "missed": list(found.missed),
+        "remarks": list(found.remarks),
+        "versions": dict(versions()),
+    }
+
+
+def _promise_document(one: Promise) -> dict[str, Any]:
+    return {
+        "controller": one.controller,
+        "compensator": one.compensator,
+        "every_limit": one.every,
+        "measures": {
+            name: {
+                "low": _finite(m.low), "median": _finite(m.median), "high": _finite(m.high),
+                "limit": m.limit, "kept": m.share,
+            }
+            for name, m in one.measures.items()
+        },
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    """A number as JSON has it: null where a loop runs away, or no delay makes it unstable."""
+    return value if np.isfinite(value) else None

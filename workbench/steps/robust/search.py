@@ -19,8 +19,14 @@ from workbench.documents.design import CompensatorValues, Controller, Design, Fr
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
 from workbench.steps.design import POLES_PLACED, placed_design
-from workbench.steps.robust.machines import DrawnMachines, some_of
-from workbench.steps.robust.outcomes import MEASURES, Motion, Outcomes, outcomes
+from workbench.steps.robust.outcomes import (
+    MEASURES,
+    DrawnMachines,
+    Motion,
+    Outcomes,
+    outcomes,
+    some_of,
+)
 
 SPEEDS_TRIED = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
 # The whole compensator's e_T and its filters' time constants, in units of the usual ones.

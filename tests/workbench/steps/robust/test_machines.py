@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from identification.model.estimates import Estimate
 from tests.chain import TABLES, model_of
-from workbench.steps.robust.machines import drawn_machines, drift_found
+from workbench.steps.robust.outcomes import drawn_machines, drift_found
 
 MODEL = model_of(TABLES["paper_table2"], k_a=35.0, spread=0.02)
 

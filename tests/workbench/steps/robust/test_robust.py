@@ -18,9 +18,14 @@ from workbench.output import dumps
 from workbench.report.robust import robust_lines, robust_sentence, robust_view
 from workbench.steps.closed_loop import driven_loop
 from workbench.steps.loop_figures import Limits
-from workbench.steps.robust.document import robust_document
-from workbench.steps.robust.machines import DrawnMachines, drawn_machines
-from workbench.steps.robust.outcomes import Motion, limits_by_name, outcomes, slow_ramp
+from workbench.steps.robust.outcomes import (
+    DrawnMachines,
+    Motion,
+    drawn_machines,
+    limits_by_name,
+    outcomes,
+    slow_ramp,
+)
 from workbench.steps.robust.robust import (
     NOMINAL,
     ROBUST,
@@ -28,6 +33,7 @@ from workbench.steps.robust.robust import (
     RobustAsked,
     one_motion,
     robust_design,
+    robust_document,
 )
 
 pytestmark = pytest.mark.slow

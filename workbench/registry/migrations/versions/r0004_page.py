@@ -5,10 +5,10 @@ import json
 import sqlalchemy as sa
 from alembic import op
 
-from workbench.registry.machine_summary import Trend, most_moved, state_of, with_log
+from workbench.registry.migrate import keep_append_only
+from workbench.registry.overview import Trend, most_moved, state_of, with_log
 from workbench.registry.page_tables import PAGE_APPEND_ONLY
 from workbench.registry.tables import Base, UtcTime
-from workbench.registry.triggers import keep_append_only
 
 revision = "0004"
 down_revision = "0003"
