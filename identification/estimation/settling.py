@@ -55,7 +55,6 @@ BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3)
 # the coverage on seeds 5000 to 5004 of benchmarks/nine_parameters.py.
 WALLS = 1.2
 
-
 RESIDUAL_DRIFT_SAID = (
     "the run drifts slowly from the log (by {:.3g} deviations in all), less than the noise at any"
     " sample: a sample of the command may be wrong, or the body was touched; intervals are widened"

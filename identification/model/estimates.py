@@ -65,7 +65,7 @@ class KarnoppFit:
     effects: that the plant has beside them. estimates: the nine ("k1", "k2" where the command is
     logged, effects' parameters as key.name) by name.
     free: names in the order of `covariance` (d, d) and of `samples` (k, d), equally likely sets.
-    noise_y [m], noise_F [N]: standard deviations found in the residual.
+    noise_y [m], noise_F [N]: of the sensors, one sigma.
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
     bad: samples of the logs that the run contradicts, which were excluded.
