@@ -73,7 +73,7 @@ def test_breakaways_that_a_force_only_just_reaches_are_followed(
     one = motion_log(pneumatic(seed), held=False, by_command=False)
     found = misfit(Plant(NINE), [one], "force", every=True)
     monkeypatch.setattr(
-        "identification.estimation.regression.equation_rows.kinks",
+        "identification.estimation.regression.motion_log.kinks",
         lambda F, _noise: np.zeros(len(F)),
     )
     bare = motion_log(pneumatic(seed), held=False, by_command=False)
