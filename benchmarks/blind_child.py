@@ -74,6 +74,8 @@ def summary(found: Trace) -> dict[str, Any]:
         "after": {k: errors(e) for k, e in found.after.items()},
         "noise_force": found.noise_force,
         "noise_actuator": found.noise_actuator,
+        "missing": found.missing,
+        "gained": None if found.missing_force is None else found.missing_force.gained,
         "parameters": {k: e.value for k, e in found.parameters_after.items()},
         "next_experiment": found.next_experiment,
         "remarks": list(found.remarks),

@@ -196,6 +196,21 @@ def held_out(lines: Sequence[Line]) -> None:
     table(["held-out force error / noise", "n", "before", "after", "true structure"], rows)
 
 
+def missing(lines: Sequence[Line]) -> None:
+    """Latent force on the held-out log as a share of the Coulomb level, before and after, and what
+    the effects gain of its likelihood: by what the tracer should have said and did say."""
+    rows = []
+    kinds = dict.fromkeys((line["mode"], judged(line)) for line in lines)
+    for mode, said in sorted(kinds):
+        own = [x for x in lines if (x["mode"], judged(x)) == (mode, said)]
+        known = [x["trace"] for x in own if x["trace"].get("missing") is not None]
+        before, after = (median([100 * one["missing"][i] for one in known]) for i in (0, 1))
+        gains = [one["gained"] for one in known if one["effects"]]
+        least = f"{min(gains):.0f} to {max(gains):.0f}" if gains else "-"
+        rows.append([mode, said, len(own), before, after, least])
+    table(["force missing", "said", "n", "before %", "after %", "gained [nats]"], rows)
+
+
 def ratio(line: Line, value: float | None) -> float | None:
     """A force error over what the sensors alone leave."""
     noise = line["trace"].get("noise_force")
@@ -290,6 +305,7 @@ def print_report(file: Path) -> None:
         ("Two effects", of_mode(lines, "two"), [by_pair, held_out]),
         ("Effect taken out of the library", of_mode(lines, "removed"), [removed]),
         ("Friction drifted between train and test", of_mode(lines, "drift"), [drift]),
+        ("Force that the model lacks", lines, [missing]),
         ("Other methods, same logs", [x for x in lines if x.get("baselines")], [baseline_tables]),
     ]
     for title, own, parts in sections:
