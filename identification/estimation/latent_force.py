@@ -15,6 +15,7 @@ friction, Marino, Cicirello, arXiv 2303.03858.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -134,7 +135,8 @@ def latent_forces(plant: Plant, logs: Sequence[MotionLog], slowest: float) -> La
         )
         return float(found.fun), float(np.exp(found.x))
 
-    (_, sigma), tau = min((best(tau), tau) for tau in memories)
+    with ThreadPoolExecutor(2) as pool:
+        (_, sigma), tau = min(zip(pool.map(best, memories), memories, strict=True))
     return LatentForces(sigma, tau, tuple(one.latent(sigma, tau) for one in known))
 
 
