@@ -26,14 +26,15 @@ from scipy.optimize import minimize_scalar
 from identification.arrays import Array, BoolArray
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import again
+from identification.log import Log
 from identification.model.plant import Plant
 from identification.signals.kalman import Chain, N, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 
 MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
 FEWEST_IN_MEMORY = 5  # samples of tau, below which d would pass for the sensor's noise
-LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # of the force's range, that sigma may be
-LEAST_NOISE_F = 1e-6  # of the force's range, to which any force is uncertain
+LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # of the largest force, that sigma may be
+LEAST_NOISE_F = 1e-6  # of the largest force, to which any force is uncertain
 SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
 CLOSE_ENOUGH = 0.02  # of log sigma
 FORCE, VELOCITY = 2, 1  # states beside the position
@@ -120,7 +121,7 @@ def latent_forces(plant: Plant, logs: Sequence[MotionLog], slowest: float) -> La
     slowest [m/s]: speed up to which friction is not that of sliding. Equation (1).
     """
     known = [_known(plant, one, slowest) for one in logs]
-    scale = max(float(np.max(np.abs(one.log["F"]))) for one in logs)
+    scale = max(_largest(plant, one.log) for one in logs)
     shortest = FEWEST_IN_MEMORY * max(one.log.h for one in logs)
     memories = [tau for tau in MEMORIES if tau > shortest] or [shortest]
 
@@ -149,7 +150,7 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     opposed, F, n = opposing_force(log, plant, y, v, d), np.asarray(log["F"]), len(log)
     slides = _slides(one, slowest)
     p, viscous = plant.friction, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
-    noise_F = max(one.noise.F, LEAST_NOISE_F * float(np.max(np.abs(F))))
+    noise_F = max(one.noise.F, LEAST_NOISE_F * _largest(plant, log))
     if one.imposed:
         left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
         known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N))
@@ -159,8 +160,7 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     push, A = _pushed(p.m, viscous, log.h)
     c = np.where(free, 0.0, force)[:, np.newaxis] * push
     # Where its direction is open the body may go as any force of the log could send it.
-    any_force = float(np.max(np.abs(F))) + max(p.F_sp, -p.F_sn)
-    sent = np.array([0.5 * log.h, 1.0, 0.0]) * any_force * log.h / p.m
+    sent = np.array([0.5 * log.h, 1.0, 0.0]) * _largest(plant, log) * log.h / p.m
     A_free = np.array([[1.0, log.h, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     by_noise, by_any = (np.outer(x, x) for x in (noise_F * push, sent))
     R = one.position_sd**2
@@ -168,6 +168,12 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     known = Chain(A, by_noise, A_free, by_any, c, at_first)
     y_seen = np.ones_like(slides)
     return _Known(one, FORCE, np.asarray(log["y"]), R, y_seen, slides, free, known)
+
+
+def _largest(plant: Plant, log: Log) -> float:
+    """Largest force that may act on the body [N]: the log's beside friction's."""
+    p = plant.friction
+    return float(np.max(np.abs(log["F"]))) + max(p.F_cp, p.F_cn, p.F_sp, -p.F_sn, 1e-12)
 
 
 def _slides(one: MotionLog, slowest: float) -> BoolArray:

@@ -111,7 +111,7 @@ def _identified(sources: Sources, course: Course) -> Made:
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
     missing = missing_force(model, [one.log for one in found.sources])
-    drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs, missing))
+    drawn = (fit(model, found.sources, runs), *residual(model, found.sources, runs, missing))
     return model, {"model": model_document(model)}, result, drawn
 
 

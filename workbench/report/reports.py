@@ -70,7 +70,7 @@ def identified_view(found: Identified) -> View:
     def sections() -> Sequence[Section]:
         said = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
         return (
-            residual(model, sources, runs(), missing),
+            *residual(model, sources, runs(), missing),
             parameters_section(model),
             friction_curve(model, found.fit, sources),
             fit(model, sources, runs()),

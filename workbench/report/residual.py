@@ -21,10 +21,12 @@ NOISE_BAND = "±2σ of the sensor's noise"
 def residual(
     model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None],
     missing: LatentForces | None,
-) -> Section:  # fmt: skip
-    """Position's and force's residual over time, with the noise that a perfect model leaves."""
+) -> list[Section]:  # fmt: skip
+    """Position's and force's residual over time, with the noise that a perfect model leaves; none
+    where neither is known."""
     chart = residual_chart(model, sources, runs, missing)
-    return Section("What the model leaves", chart_html(chart, _caption(model)))
+    drawn = chart_html(chart, _caption(model))
+    return [Section("What the model leaves", drawn)] if chart.panels else []
 
 
 def residual_chart(

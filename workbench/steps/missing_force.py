@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from identification.estimation.latent_force import LatentForces, latent_forces
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.structure_fit import ABOVE_BAND
@@ -12,8 +14,8 @@ from workbench.steps.predicted_force import seen_moving, with_applied_force
 
 
 def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
-    """The latent force of a model on logs of its machine; None where two masses swing behind each
-    other, of which the one body of a latent force is none."""
+    """The latent force of a model on logs of its machine; None where no body slides, and where two
+    masses swing behind each other, of which the one body of a latent force is none."""
     if model.resonance is not None:
         return None
     held = model.rig.kind == "motor"
@@ -26,12 +28,11 @@ def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
     ]
     plants = [seen_moving(model, log) for log in given]
     bands = [max(plant.friction.dv_p, -plant.friction.dv_n) for plant in plants]
-    return latent_forces(plants[0], moved, ABOVE_BAND * max(bands))
+    found = latent_forces(plants[0], moved, ABOVE_BAND * max(bands))
+    return found if any(np.any(one.slides) for one in found.logs) else None
 
 
 def share_of_coulomb(model: Model, found: LatentForces | None) -> float | None:
     """Root mean square of the latent force as a share of the Coulomb level; None without either."""
     level = max(model.karnopp.F_cp, model.karnopp.F_cn)
-    if found is None or not any(one.slides.any() for one in found.logs) or not level > 0.0:
-        return None
-    return found.rms / level
+    return found.rms / level if found is not None and level > 0.0 else None

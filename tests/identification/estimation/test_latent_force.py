@@ -81,3 +81,20 @@ def test_of_prescribed_motion_the_force_alone_is_told() -> None:
     of = found.logs[0]
     assert np.std((of.force - missing)[of.slides]) < 0.05
     assert found.rms == pytest.approx(float(np.std(missing)), rel=0.1)
+
+
+def test_a_body_that_rests_or_is_driven_by_nothing_has_a_latent_force_all_the_same() -> None:
+    t = 2e-3 * np.arange(2000, dtype=np.float64)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(2000)
+    for y in (noise, 0.05 * np.sin(3.0 * t)):
+        log = Log("free", {"t": t, "y": y, "F": np.zeros(2000)})
+        one = motion_log(log, held=False, by_command=False)
+        found = latent_forces(Plant(NINE), [one], SLOWEST)
+        assert np.all(np.isfinite(found.logs[0].force)) and np.isfinite(found.rms)
+        assert (found.rms > 0.0) == bool(np.any(found.logs[0].slides))
+
+
+@pytest.mark.parametrize("change", [{"m": 1e-9, "F_vp": 0.0, "F_vn": 0.0}, {"F_vp": 1e6}])
+def test_a_wrong_plant_is_no_fault(change: dict[str, float]) -> None:
+    found = of_motor(made(1), replace(plant(), friction=replace(NINE, **change)))
+    assert np.isfinite(found.rms) and np.isfinite(found.log_likelihood)
