@@ -30,6 +30,7 @@ from identification.log import Log
 from identification.model.plant import Plant
 from identification.signals.kalman import Chain, N, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
+from identification.thresholds import NOTHING_OF
 
 MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
 FEWEST_IN_MEMORY = 5  # samples of tau, below which d would pass for the sensor's noise
@@ -44,11 +45,12 @@ FORCE, VELOCITY = 2, 1  # states beside the position
 class LatentForce:
     """The force on a log's body that a model lacks, towards +y.
 
-    t [s], force, sd [N], slides (where the log tells of it), each (n,); log_density (n,): of each
-    measured sample given those before it, 0 where it is not judged.
+    t [s], y [m], force, sd [N], slides (where the log tells of it), each (n,); log_density (n,): of
+    each measured sample given those before it, 0 where it is not judged.
     """
 
     t: Array
+    y: Array
     force: Array
     sd: Array
     slides: BoolArray
@@ -70,10 +72,20 @@ class LatentForces:
         every = np.concatenate(square) if square else np.zeros(0)
         return float(np.sqrt(np.mean(every))) if len(every) else 0.0
 
+    def share(self, level: float) -> float | None:
+        """`rms` as a share of a Coulomb level [N]; None where no body slides, or nothing rubs."""
+        slides = any(np.any(one.slides) for one in self.logs)
+        return self.rms / level if slides and rubs(level, self.rms) else None
+
     @property
     def log_likelihood(self) -> float:
         """Of all samples measured while the bodies slide [nats]."""
         return float(sum(np.sum(one.log_density) for one in self.logs))
+
+
+def rubs(level: float, left: float) -> bool:
+    """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
+    return level > NOTHING_OF * left
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +112,7 @@ class _Known:
         A[at, at] = A_free[at, at] = kept
         Q[at, at] = Q_free[at, at] = sigma**2 * (1.0 - kept**2)
         P0[at] = sigma**2
-        return Chain(A, Q, A_free, Q_free, of.c, P0)
+        return Chain(A, Q, A_free, Q_free, of.c, of.x0, P0)
 
     def log_density(self, sigma: float, tau: float) -> Array:
         """Of each sample measured while the body slides, given those before it, (n,)."""
@@ -111,8 +123,8 @@ class _Known:
         """d of this log."""
         chain = self.chain(sigma, tau)
         force, sd = smoothed(self.z, self.R, self.seen, self.free, chain, self.at)
-        t = np.asarray(self.one.log["t"])
-        return LatentForce(t, force, sd, self.slides, self.log_density(sigma, tau))
+        t, y = (np.asarray(self.one.log[name]) for name in ("t", "y"))
+        return LatentForce(t, y, force, sd, self.slides, self.log_density(sigma, tau))
 
 
 def latent_forces(plant: Plant, logs: Sequence[MotionLog], slowest: float) -> LatentForces:
@@ -153,7 +165,7 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     noise_F = max(one.noise.F, LEAST_NOISE_F * _largest(plant, log))
     if one.imposed:
         left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
-        known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N))
+        known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N), np.zeros(N))
         return _Known(one, 0, left, np.full(n, noise_F**2), slides, slides, ~slides, known)
     free = ~(slides & np.append(slides[1:], False))
     force = (F if one.held else _over_sample(F)) - _over_sample(opposed)
@@ -165,7 +177,8 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     by_noise, by_any = (np.outer(x, x) for x in (noise_F * push, sent))
     R = one.position_sd**2
     at_first = np.array([R[0], n * by_any[VELOCITY, VELOCITY], 0.0])
-    known = Chain(A, by_noise, A_free, by_any, c, at_first)
+    x0 = np.array([float(log["y"][0]), 0.0, 0.0])
+    known = Chain(A, by_noise, A_free, by_any, c, x0, at_first)
     y_seen = np.ones_like(slides)
     return _Known(one, FORCE, np.asarray(log["y"]), R, y_seen, slides, free, known)
 

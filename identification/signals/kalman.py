@@ -19,13 +19,14 @@ N = 3  # states
 @dataclass(frozen=True, eq=False)
 class Chain:
     """What is known of the states: A, Q (3, 3) of a step, and in free stretches; input c (n, 3);
-    variance P0 (3,) at first, about a mean of 0 but for z[0]."""
+    mean x0 and variance P0 at first, (3,) each."""
 
     A: Array
     Q: Array
     A_free: Array
     Q_free: Array
     c: Array
+    x0: Array
     P0: Array
 
 
@@ -65,15 +66,15 @@ def _less_measured(P: Array, gain: Array, R: float, S: float) -> None:
 @compiled
 def filter_kernel(
     z: Array, R: Array, seen: BoolArray, free: BoolArray, A: Array, Q: Array, A_free: Array,
-    Q_free: Array, c: Array, P0: Array, x_out: Array, P_out: Array, e: Array, S: Array,
+    Q_free: Array, c: Array, x0: Array, P0: Array, x_out: Array, P_out: Array, e: Array, S: Array,
 ) -> None:  # fmt: skip
     """Predicted states (n, 3) and their covariances (n, 3, 3), where there is room for them, and
     innovations and their variances (n,), this 0 where nothing is measured."""
     keep = len(x_out) == len(z)
     x, P, gain = np.zeros(N), np.zeros((N, N)), np.zeros(N)
     half, room = np.zeros((N, N)), np.zeros(N)
-    x[0] = z[0]
     for i in range(N):
+        x[i] = x0[i]
         P[i, i] = P0[i]
     for k in range(len(z)):
         for i in range(N if keep else 0):
@@ -136,7 +137,7 @@ def log_densities(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chai
     """
     e, S = np.zeros(len(z)), np.zeros(len(z))
     none, nothing = np.zeros((0, N)), np.zeros((0, N, N))
-    filter_kernel(z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.P0,
+    filter_kernel(z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.x0, of.P0,
                   none, nothing, e, S)  # fmt: skip
     out = np.zeros(len(z))
     out[seen] = -0.5 * (np.log(2.0 * np.pi * S[seen]) + e[seen] ** 2 / S[seen])
@@ -152,7 +153,9 @@ def smoothed(
     """
     n = len(z)
     e, S, x, P = np.zeros(n), np.zeros(n), np.zeros((n, N)), np.zeros((n, N, N))
-    filter_kernel(z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.P0, x, P, e, S)
+    filter_kernel(
+        z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.x0, of.P0, x, P, e, S
+    )
     mean, variance = np.zeros(n), np.zeros(n)
     back, back_free = np.ascontiguousarray(of.A.T), np.ascontiguousarray(of.A_free.T)
     smoother_kernel(R, free, back, back_free, e, S, x, P, which, mean, variance)

@@ -10,7 +10,6 @@ from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
-from identification.thresholds import NOTHING_OF
 
 TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
 
@@ -85,7 +84,8 @@ class Change:
 @dataclass(frozen=True, eq=False)
 class Residual:
     """Rows of an equation for the pictures, all (r,): time [s] over all logs in a row, `log` index,
-    residual before and after [N, N/s or m], noise (one sigma), and signals by name at the rows."""
+    residual before and after [N, N/s or m], noise (one sigma; of a smoothed force, its own
+    deviation), and signals by name at the rows."""
 
     equation: str
     t: Array
@@ -105,6 +105,11 @@ class MissingForce:
     before: LatentForces
     after: LatentForces
     sliding: Residual
+
+    @property
+    def lessened(self) -> bool:
+        """Whether effects made a difference to it, so that there is a before and an after."""
+        return self.before is not self.after
 
     @property
     def gained(self) -> float:
@@ -181,10 +186,6 @@ class Trace:
         level = max(self.plant.friction.F_cp, self.plant.friction.F_cn)
         if self.missing_force is None:
             return None
-        before, after = self.missing_force.before.rms, self.missing_force.after.rms
-        return (before / level, after / level) if rubs(level, after) else None
-
-
-def rubs(level: float, left: float) -> bool:
-    """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
-    return level > NOTHING_OF * left
+        shares = [one.share(level) for one in (self.missing_force.before, self.missing_force.after)]
+        before, after = shares
+        return None if before is None or after is None else (before, after)

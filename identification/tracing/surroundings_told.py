@@ -8,6 +8,7 @@ import numpy as np
 from identification.effects._base import Acting
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
+from identification.estimation.latent_force import LatentForce
 from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.surroundings import explains as explains_much
 from identification.estimation.surroundings import (
@@ -68,8 +69,17 @@ def _with_orders(of: Trace, around: Surroundings) -> Trace:
     residuals = tuple(_less_orders(one, around) for one in of.residuals)
     missing = of.missing_force
     if missing is not None:
-        missing = replace(missing, sliding=_less_orders(missing.sliding, around))
+        before = replace(
+            missing.before, logs=tuple(_by_orders(one, around) for one in missing.before.logs)
+        )
+        sliding = _less_orders(missing.sliding, around)
+        missing = replace(missing, before=before, sliding=sliding)
     return replace(of, residuals=residuals, missing_force=missing)
+
+
+def _by_orders(one: LatentForce, around: Surroundings) -> LatentForce:
+    """The latent force of a plain model that lacks the orders too."""
+    return replace(one, force=one.force + sum(order.force(one.y) for order in around.orders))
 
 
 def _less_orders(one: Residual, around: Surroundings) -> Residual:

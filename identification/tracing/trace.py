@@ -110,7 +110,8 @@ def trace(
     resonance = two_masses(train, rig)
     if resonance is None:
         return told
-    return replace(told, surroundings=replace(beside, resonance=resonance))
+    around = replace(beside, resonance=resonance)
+    return replace(told, surroundings=around, missing_force=None)  # which is of one body
 
 
 def _traced(

@@ -217,14 +217,15 @@ def missing_force(
     """The force that either model lacks on these logs, above a speed [m/s]; None where no body
     slides."""
     was = latent_forces(before.plant, logs, slowest)
-    if not any(np.any(one.slides) for one in was.logs):
-        return None
     now = latent_forces(after.plant, logs, slowest) if after is not before else was
+    both = [old.slides & new.slides for old, new in zip(was.logs, now.logs, strict=True)]
+    if not any(np.any(one) for one in both):
+        return None
     every: dict[str, list[Array]] = {}
     t, number, offset = [], [], 0.0
     left: list[tuple[Array, Array, Array]] = []
     for i, (one, old, new) in enumerate(zip(logs, was.logs, now.logs, strict=True)):
-        at = np.flatnonzero(old.slides & new.slides)
+        at = np.flatnonzero(both[i])
         t.append(offset + one.log["t"][at] - one.log["t"][0])
         number.append(np.full(len(at), float(i)))
         offset += one.log.duration

@@ -35,6 +35,7 @@ from identification.estimation.fit import (
 )
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.imposed_motion import is_unexplained
+from identification.estimation.latent_force import rubs
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
@@ -112,7 +113,7 @@ from identification.tracing.regression.stepwise import (
     merit,
 )
 from identification.tracing.remaining_structure import in_pieces, is_slight, too_much
-from identification.tracing.result import Dependence, Errors, rubs
+from identification.tracing.result import Dependence, Errors
 from identification.tracing.structure_search import useless
 from identification.tracing.verdict import is_headline, other_law
 from tests.identification.motor_logs import K_A, NOISE, H, made, plant, seen

@@ -83,11 +83,11 @@ def missing_force(keys: Sequence[str]) -> MissingForce:
     sliding = residual("mechanical", keys)
 
     def of(left: Array, sigma: float) -> LatentForces:
-        parts = [
-            LatentForce(sliding.t[own] % 20.0, -left[own], 0.01 + 0.0 * left[own],
-                        np.ones(np.count_nonzero(own), dtype=np.bool_), 0.0 * left[own])
-            for own in (sliding.log == 0.0, sliding.log == 1.0)
-        ]  # fmt: skip
+        parts = []
+        for own in (sliding.log == 0.0, sliding.log == 1.0):
+            t, y, force = sliding.t[own] % 20.0, sliding.signals["y"][own], -left[own]
+            slides = np.ones(len(t), dtype=np.bool_)
+            parts.append(LatentForce(t, y, force, np.full(len(t), 0.01), slides, 0.0 * t))
         return LatentForces(sigma, 0.06, tuple(parts))
 
     before, after = of(sliding.before, 1.5), of(0.01 * sliding.after, 1e-3)

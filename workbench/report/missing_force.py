@@ -1,6 +1,7 @@
 """Section of a trace: the force that the model lacks, with its band, over time before and after."""
 
 from collections.abc import Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -13,13 +14,19 @@ from workbench.report.chart_figure import SHOWN_SHARE
 from workbench.report.trace_words import share_of_friction
 from workbench.report.view import Section
 
+Which = Literal["training", "test"]
 POINTS_OVER_TIME = 4000  # of each line
 WIDE_95 = 1.96  # deviations on either side, of a 95 % band
 LEAST_RANGE = 0.02  # of the Coulomb level, that the axis holds on either side
 
 
-def missing_over_time(found: Trace, rotary: bool, logs: Sequence[str]) -> list[Section]:
-    """The force that the model lacks over time; none where no body slides. logs: their names."""
+def missing_over_time(
+    found: Trace, rotary: bool, logs: Sequence[str], which: Which = "training"
+) -> list[Section]:
+    """The force that the model lacks over time; none where no body slides.
+
+    logs: names of those that it is of, `which` they are.
+    """
     if found.missing_force is None:
         return []
     caption = (
@@ -29,31 +36,37 @@ def missing_over_time(found: Trace, rotary: bool, logs: Sequence[str]) -> list[S
     )
     if found.missing is not None:
         before, after = (share_of_friction(part) for part in found.missing)
-        named = f"{before} of friction before, {after} after" if found.effects else after
+        of_both = f"{before} of friction before, {after} after"
+        named = of_both if found.missing_force.lessened else f"{after} of friction"
         caption += f" Root mean square while it slides: {named}."
-    chart = missing_chart(found, found.missing_force, rotary, logs)
+    chart = missing_chart(found, found.missing_force, rotary, logs, which)
     return [Section("Force that the model lacks", chart_html(chart, caption))]
 
 
-def missing_chart(found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str]) -> Chart:
+def missing_chart(
+    found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str], which: Which = "training"
+) -> Chart:
     """The chart of `missing_over_time`."""
     unit = units_of(rotary).force
     drawn: list[tuple[LatentForces, str, Colour]] = [(force.after, "model", "model")]
-    if found.effects:
+    if force.lessened:
         drawn = [(force.before, "before", "before"), (force.after, "after", "model")]
     parts = [force_lines(of, name, colour, unit.factor) for of, name, colour in drawn]
     lines, areas = ([each for part in own for each in part] for own in zip(*parts, strict=True))
     level = max(found.plant.friction.F_cp, found.plant.friction.F_cn)
-    ends = np.cumsum([one.t[-1] - one.t[0] for one in force.after.logs])
-    starts = [0.0, *ends[:-1].tolist()]
+    starts = _begins(force.after)
+    ends = [
+        begin + float(one.t[-1] - one.t[0])
+        for begin, one in zip(starts, force.after.logs, strict=True)
+    ]
     names = logs if len(logs) == len(starts) > 1 else ()
     panel = Panel(
-        "time, logs in a row [s]" if len(starts) > 1 else "time [s]",
+        f"time, {which} logs in a row [s]" if len(starts) > 1 else f"time of the {which} log [s]",
         f"force that is missing [{unit.name}]", lines, areas=areas,
         marks=[Mark(at, "x") for at in starts[1:]],
         y_range=range_of(force.before, level, unit.factor),
     )  # fmt: skip
-    named = [Part(*one) for one in zip(names, starts, ends.tolist(), strict=False)]
+    named = [Part(*one) for one in zip(names, starts, ends, strict=False)]
     what = "force that the model lacks against time, with its 95 % band"
     return Chart("trace-missing-force", what, [panel], parts=named)
 
@@ -70,11 +83,18 @@ def force_lines(
 
 def _in_a_row(of: LatentForces) -> Iterator[tuple[Array, Array, Array]]:
     """Time [s], force and half its band [N] of each log, thinned; applied less modelled."""
-    begin, step = 0.0, max(1, sum(len(one.t) for one in of.logs) // POINTS_OVER_TIME)
-    for one in of.logs:
-        t = begin + one.t - one.t[0]
-        yield t[::step], -one.force[::step], WIDE_95 * one.sd[::step]
-        begin = float(t[-1])
+    step = max(1, sum(len(one.t) for one in of.logs) // POINTS_OVER_TIME)
+    for begin, one in zip(_begins(of), of.logs, strict=True):
+        parts = begin + one.t - one.t[0], -one.force, WIDE_95 * one.sd
+        t, force, wide = (part[::step] for part in parts)
+        # A NaN parts what belongs to two logs.
+        yield np.append(t, parts[0][-1]), np.append(force, np.nan), np.append(wide, np.nan)
+
+
+def _begins(of: LatentForces) -> list[float]:
+    """Where each log begins in a row of them [s], two samples apart as in `in_a_row`."""
+    lengths = [float(one.t[-1] - one.t[0] + 2.0 * (one.t[1] - one.t[0])) for one in of.logs]
+    return [0.0, *np.cumsum(lengths[:-1]).tolist()]
 
 
 def range_of(of: LatentForces, level: float, factor: float = 1.0) -> tuple[float, float]:

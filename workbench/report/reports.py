@@ -54,7 +54,7 @@ from workbench.report.view import Section, View, lines_section, report_notes, ta
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
-from workbench.steps.missing_force import missing_force, share_of_coulomb
+from workbench.steps.missing_force import missing_force
 from workbench.steps.predict import fitted_run
 from workbench.steps.validate import Validation, validation_document
 
@@ -79,7 +79,8 @@ def identified_view(found: Identified) -> View:
         )
 
     missing = missing_force(model, [one.log for one in sources])
-    share = share_of_coulomb(model, missing)
+    level = max(model.karnopp.F_cp, model.karnopp.F_cn)
+    share = None if missing is None else missing.share(level)
     lacks = "" if share is None else f" Force missing: {share_of_friction(share)} of friction."
     return View(
         f"Identification of {model.card}",

@@ -78,10 +78,13 @@ def _force_panel(
 
 def _caption(model: Model) -> str:
     if model.by_equation:
-        return "No free run follows these logs: this is what the equation of motion leaves."
+        return (
+            "No free run follows these logs: this is the force that the model lacks, smoothed, with"
+            " its 95 % band, which is wide where the body rests."
+        )
     if model.fit.adequate:
         how = times(float(np.sqrt(model.fit.chi_square)))
-        return f"What is left is {how} the sensors' noise: nothing is missing."
+        return f"What is left of the run is {how} the sensors' noise."
     return (
         f"What is left is {left_of(model)}: the machine has an effect that the model has not, or"
         " another structure. The command `workbench trace` finds which."

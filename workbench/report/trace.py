@@ -2,7 +2,7 @@
 
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
-from workbench.report.missing_force import missing_chart, missing_over_time
+from workbench.report.missing_force import Which, missing_chart, missing_over_time
 from workbench.report.response import over_frequency
 from workbench.report.trace_friction import friction_before_after, friction_chart
 from workbench.report.trace_pictures import (
@@ -60,7 +60,7 @@ def _main_chart(traced: Traced) -> Chart:
         return signal_chart(drawn[0], traced.model.rotary, rig.command_unit)
     if traced.trace.missing_force is not None:
         return missing_chart(
-            traced.trace, traced.trace.missing_force, traced.model.rotary, _unseen(traced)
+            traced.trace, traced.trace.missing_force, traced.model.rotary, *_unseen(traced)
         )
     return friction_chart(traced)
 
@@ -69,7 +69,7 @@ def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
     drawn = pictures(found)
     logs = [source.file for source in traced.train]
-    sections = missing_over_time(found, model.rotary, _unseen(traced))
+    sections = missing_over_time(found, model.rotary, *_unseen(traced))
     sections += [*_drawn(traced, drawn), *_hidden(traced, drawn)]
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
@@ -104,9 +104,10 @@ def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
     return [*out, *(over_time(residual, model.rotary, logs) for residual in of.values())]
 
 
-def _unseen(traced: Traced) -> list[str]:
+def _unseen(traced: Traced) -> tuple[list[str], Which]:
     """Names of the logs that the model has not seen, or of the others where there are none."""
-    return [source.file for source in traced.test or traced.train]
+    names = [source.file for source in traced.test or traced.train]
+    return names, "test" if traced.test else "training"
 
 
 def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:

@@ -37,7 +37,6 @@ SIGNALS = {
     "du": ("rate of the command", "{command}/s"),
 }
 PASCALS = 1e-5  # bar
-# Sign with which an effect enters the residual; 0: that of the motion.
 GAP = 0.2  # of a signal's range, over which a running median is not drawn
 EQUATION_TITLES = {
     "mechanical": "equation of motion",
@@ -181,7 +180,7 @@ def folded_at(residual: Residual, rate: float) -> Residual:
 
 
 def _in_noise(residual: Residual) -> float:
-    """What is left, in units of the sensors' noise."""
+    """What is left, in units of its noise (of a smoothed force: of its own deviation)."""
     return float(np.median(np.abs(residual.after) / np.maximum(residual.noise, 1e-300)))
 
 
@@ -299,15 +298,21 @@ def _fitted(picture: Picture, x: Array, factor: float) -> list[Line]:
 
 
 def _caption(picture: Picture) -> str:
+    equation = EQUATION_TITLES[picture.residual.equation]
     text = (
-        f"Residual of the {EQUATION_TITLES[picture.residual.equation]}; lines are running medians,"
-        " by direction of motion. Flat at 0 is a complete model."
+        f"Residual of the {equation}{_smoothed(picture.residual)};"
+        " lines are running medians, by direction of motion. Flat at 0 is a complete model."
     )
     if picture.how != "before":
         text += " Left: the other effects are in the model, this one is not."
     if picture.curve is not None:
         text += " Dashed: what the fitted effect takes away."
     return text
+
+
+def _smoothed(residual: Residual) -> str:
+    """How the force that is missing is shown beside rows of an equation."""
+    return ", smoothed, while the body slides" if residual.equation == "mechanical" else ""
 
 
 def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, Colour]]:

@@ -44,7 +44,7 @@ def _of_friction(found: Trace) -> str:
     if found.missing is None:
         return ""
     before, after = found.missing
-    if not found.effects:
+    if found.missing_force is None or not found.missing_force.lessened:
         return f" Force missing: {share_of_friction(after)} of friction."
     was, now = share_of_friction(before), share_of_friction(after)
     return f" Force missing: {was} of friction before, {now} after."

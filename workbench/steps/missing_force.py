@@ -1,6 +1,7 @@
 """Model + its logs -> the force that the model lacks on them, over time."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,7 +9,8 @@ from identification.estimation.latent_force import LatentForces, latent_forces
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.structure_fit import ABOVE_BAND
 from identification.log import Log
-from workbench.documents.model import Model
+from identification.model.karnopp import VISCOUS_NAMES
+from workbench.documents.model import Model, used
 from workbench.steps.predict import of_one_instant
 from workbench.steps.predicted_force import seen_moving, with_applied_force
 
@@ -27,12 +29,9 @@ def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
         for log in given
     ]
     plants = [seen_moving(model, log) for log in given]
-    bands = [max(plant.friction.dv_p, -plant.friction.dv_n) for plant in plants]
-    found = latent_forces(plants[0], moved, ABOVE_BAND * max(bands))
+    plant = max(plants, key=lambda one: one.friction.dv_p - one.friction.dv_n)
+    p = plant.friction
+    up, down = (used(model.falling[k]) if k in model.falling else 0.0 for k in VISCOUS_NAMES)
+    plant = replace(plant, friction=replace(p, F_vp=p.F_vp + up, F_vn=p.F_vn + down))
+    found = latent_forces(plant, moved, ABOVE_BAND * max(p.dv_p, -p.dv_n))
     return found if any(np.any(one.slides) for one in found.logs) else None
-
-
-def share_of_coulomb(model: Model, found: LatentForces | None) -> float | None:
-    """Root mean square of the latent force as a share of the Coulomb level; None without either."""
-    level = max(model.karnopp.F_cp, model.karnopp.F_cn)
-    return found.rms / level if found is not None and level > 0.0 else None

@@ -18,14 +18,15 @@ def chain(n: int, kept: float, rng: np.random.Generator) -> Chain:
     A_free = np.array([[1.0, H, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, kept]])
     Q, Q_free = np.diag([1e-9, 1e-7, 1.0]), np.diag([1e-9, 1e-3, 1.0])
     c = 1e-3 * rng.standard_normal((n, 3))
-    return Chain(A, Q, A_free, Q_free, c, np.array([1e-4, 1.0, 10.0]))
+    x0 = np.array([0.02, -0.1, 1.0])
+    return Chain(A, Q, A_free, Q_free, c, x0, np.array([1e-4, 1.0, 10.0]))
 
 
-def dense(of: Chain, free: BoolArray, start: float) -> tuple[Array, Array]:
+def dense(of: Chain, free: BoolArray) -> tuple[Array, Array]:
     """Means (n, 3) and covariances (n, n, 3, 3) of all states."""
     n = len(free)
     mean, cov = np.zeros((n, 3)), np.zeros((n, n, 3, 3))
-    mean[0, 0], cov[0, 0] = start, np.diag(of.P0)
+    mean[0], cov[0, 0] = of.x0, np.diag(of.P0)
     for k in range(n - 1):
         A, Q = (of.A_free, of.Q_free) if free[k] else (of.A, of.Q)
         mean[k + 1] = A @ mean[k] + of.c[k]
@@ -47,7 +48,7 @@ def test_likelihood_and_smoothed_state_are_those_of_the_dense_gaussian(
     seen[0] = True
     R = rng.uniform(1e-7, 1e-5, LENGTH)
     z = np.cumsum(1e-2 * rng.standard_normal(LENGTH))
-    mean, cov = dense(of, free, z[0])
+    mean, cov = dense(of, free)
     at = np.flatnonzero(seen)
     of_z = (cov[:, :, 0, 0] + np.diag(R))[np.ix_(at, at)]
     whole = multivariate_normal(mean[at, 0], of_z, allow_singular=True).logpdf(z[at])
