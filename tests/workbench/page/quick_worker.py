@@ -1,5 +1,6 @@
 """A worker of the page whose tasks take no fit, for tests that cancel and kill it."""
 
+import signal
 import time
 from datetime import timedelta
 from pathlib import Path
@@ -33,7 +34,8 @@ def quick(work: Work, course: Course) -> str:
 
 
 def work(where: str, root: str, *, once: bool = False) -> None:
-    """Run a worker with `quick` in place of the fits."""
+    """Run a worker with `quick` in place of the fits, which Ctrl-C ends however it was started."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     patched: Any = worker
     patched.done, patched.TASK_LEASE, patched.QUEUE_POLL = quick, LEASE, LOOKS_EVERY
     settings = PageSettings(where, root)
