@@ -121,12 +121,13 @@ def descended(fun: Callable[[Array], Array], x: Array) -> Minimum:
             size = np.diag(A)
             tried = [x - np.linalg.lstsq(A + np.diag(damping * one * size), g, rcond=1e-14)[0]
                      for one in powers]  # fmt: skip
-            costs = [float(after @ after) for after in pool.map(fun, tried)]
+            after = list(pool.map(fun, tried))
+            costs = [float(one @ one) for one in after]
             best = int(np.argmin(costs))
             gained = cost - costs[best]
             if not gained > 0.0:
                 break
-            x, r, cost = tried[best], fun(tried[best]), costs[best]
+            x, r, cost = tried[best], after[best], costs[best]
             damping = float(np.clip(damping * max(powers[best], 1e-3), 1e-9, 1e3))
             by = SPAN / np.sqrt(np.maximum(size, 1e-30))
             span = np.where(size > 0.0, np.clip(by, NARROWEST_SPAN, WIDEST_SPAN), span)

@@ -7,6 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.latent_force import LatentForces
+from identification.model.estimates import NORMAL_95
 from identification.tracing.result import MissingForce, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, Part, chart_html
@@ -16,7 +17,6 @@ from workbench.report.view import Section
 
 Which = Literal["training", "test"]
 POINTS_OVER_TIME = 4000  # of each line
-WIDE_95 = 1.96  # deviations on either side, of a 95 % band
 LEAST_RANGE = 0.02  # of the Coulomb level, that the axis holds on either side
 
 
@@ -47,12 +47,10 @@ def missing_chart(
     found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str], which: Which = "training"
 ) -> Chart:
     """The chart of `missing_over_time`."""
-    unit = units_of(rotary).force
     drawn: list[tuple[LatentForces, str, Colour]] = [(force.after, "model", "model")]
     if force.lessened:
         drawn = [(force.before, "before", "before"), (force.after, "after", "model")]
-    parts = [force_lines(of, name, colour, unit.factor) for of, name, colour in drawn]
-    lines, areas = ([each for part in own for each in part] for own in zip(*parts, strict=True))
+    lines, areas = zip(*(force_line(*one) for one in drawn), strict=True)
     level = max(found.plant.friction.F_cp, found.plant.friction.F_cn)
     starts = _begins(force.after)
     ends = [
@@ -62,30 +60,27 @@ def missing_chart(
     names = logs if len(logs) == len(starts) > 1 else ()
     panel = Panel(
         f"time, {which} logs in a row [s]" if len(starts) > 1 else f"time of the {which} log [s]",
-        f"force that is missing [{unit.name}]", lines, areas=areas,
+        f"force that is missing [{units_of(rotary).force.name}]", lines, areas=areas,
         marks=[Mark(at, "x") for at in starts[1:]],
-        y_range=range_of(force.before, level, unit.factor),
+        y_range=range_of(force.before, level),
     )  # fmt: skip
     named = [Part(*one) for one in zip(names, starts, ends, strict=False)]
     what = "force that the model lacks against time, with its 95 % band"
     return Chart("trace-missing-force", what, [panel], parts=named)
 
 
-def force_lines(
-    of: LatentForces, name: str, colour: Colour, factor: float = 1.0
-) -> tuple[list[Line], list[Area]]:
-    """The force of all logs in a row, applied less modelled, times `factor`, and its 95 % band."""
+def force_line(of: LatentForces, name: str, colour: Colour) -> tuple[Line, Area]:
+    """The force of all logs in a row, applied less modelled, and its 95 % band."""
     t, middle, wide = (np.concatenate(parts) for parts in zip(*_in_a_row(of), strict=True))
-    low, high = factor * (middle - wide), factor * (middle + wide)
-    line = Line(name, t, factor * middle, colour)
-    return [line], [Area(f"{name}, 95 % band", t, low, high, colour)]
+    band = Area(f"{name}, 95 % band", t, middle - wide, middle + wide, colour)
+    return Line(name, t, middle, colour), band
 
 
 def _in_a_row(of: LatentForces) -> Iterator[tuple[Array, Array, Array]]:
     """Time [s], force and half its band [N] of each log, thinned; applied less modelled."""
     step = max(1, sum(len(one.t) for one in of.logs) // POINTS_OVER_TIME)
     for begin, one in zip(_begins(of), of.logs, strict=True):
-        parts = begin + one.t - one.t[0], -one.force, WIDE_95 * one.sd
+        parts = begin + one.t - one.t[0], -one.force, NORMAL_95 * one.sd
         t, force, wide = (part[::step] for part in parts)
         # A NaN parts what belongs to two logs.
         yield np.append(t, parts[0][-1]), np.append(force, np.nan), np.append(wide, np.nan)
@@ -97,9 +92,9 @@ def _begins(of: LatentForces) -> list[float]:
     return [0.0, *np.cumsum(lengths[:-1]).tolist()]
 
 
-def range_of(of: LatentForces, level: float, factor: float = 1.0) -> tuple[float, float]:
+def range_of(of: LatentForces, level: float) -> tuple[float, float]:
     """Range that holds nearly all of the force while the body slides; level [N]: of Coulomb."""
     slid = np.concatenate([np.abs(one.force[one.slides]) for one in of.logs])
     largest = float(np.quantile(slid, SHOWN_SHARE)) if len(slid) else 0.0
-    top = 1.3 * factor * max(largest, LEAST_RANGE * level, 1e-300)
+    top = 1.3 * max(largest, LEAST_RANGE * level, 1e-300)
     return -top, top

@@ -11,7 +11,7 @@ from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Band, Chart, Line, Panel, chart_html
 from workbench.report.fit import InARow, in_a_row
-from workbench.report.missing_force import force_lines, range_of
+from workbench.report.missing_force import force_line, range_of
 from workbench.report.model_tables import left_of
 from workbench.report.view import Section
 
@@ -68,10 +68,10 @@ def _force_panel(
         return Panel(row.label, label, lines, bands=bands, marks=row.marks)
     if missing is None:
         return None
-    lines, areas = force_lines(missing, "applied less modelled", "model", 1.0)
+    line, band = force_line(missing, "applied less modelled", "model")
     level = max(model.karnopp.F_cp, model.karnopp.F_cn)
     return Panel(
-        row.label, label, lines, areas=areas, marks=row.marks, y_range=range_of(missing, level),
+        row.label, label, [line], areas=[band], marks=row.marks, y_range=range_of(missing, level),
         x_range=(float(row.t[0]), float(row.t[-1])),
     )  # fmt: skip
 
