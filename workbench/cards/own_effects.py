@@ -47,9 +47,10 @@ import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numba
@@ -79,18 +80,31 @@ def library(folders: Iterable[Path] = ()) -> Library:
     return found
 
 
+class _FreshSource(SourceFileLoader):
+    """Compiles the source each time.
+
+    Python's cached bytecode is taken for current where the file's size and its second are the
+    same: a sign changed within a second would not count.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return compile(self.get_data(path), path, "exec", dont_inherit=True)
+
+
 def load_effect(path: Path) -> Effect:
     """The effect that the file declares, compiled; raises BadModel as `library`."""
     refuse_special(path, BadModel)
     name = f"workbench_effects_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    loader = _FreshSource(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    if spec is None:
         raise BadModel(f"{path}: is no Python file; give a folder of files that declare EFFECT")
     module = importlib.util.module_from_spec(spec)
     # Numba looks a cached kernel's module up by this name, in this process and in the next.
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise BadModel(f"{path}{_line_of(error, path)}: {_cause(error)}; correct it") from error

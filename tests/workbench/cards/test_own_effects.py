@@ -105,6 +105,21 @@ def test_a_changed_file_is_read_anew(tmp_path: Path) -> None:
     assert kernel(0, 0, 0, 0, 0, 1, 0, 0, 0, p, p) == -8.0
 
 
+def test_a_sign_changed_within_the_same_second_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    path = written(tmp_path)
+    at = path.stat().st_mtime_ns
+    load_effect(path)
+    text = MAGNET.replace("return p[0] *", "return -p[0]*")
+    assert len(text) == len(MAGNET)
+    assert text != MAGNET
+    written(tmp_path, text)
+    os.utime(path, ns=(at, at))
+    assert load_effect(path).value(0, 0, 0, 0, 0, 1, 0, 0, 0, (), (8.0, 0.02)) == -8.0
+
+
 def test_without_a_place_for_a_cache_it_works_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
