@@ -1,6 +1,6 @@
 """The asymmetric Karnopp friction model, paper eq. (1): nine parameters, units and bounds."""
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -66,7 +66,7 @@ class Karnopp:
     @property
     def array(self) -> Array:
         """The nine as an array, in the order of `NAMES`."""
-        return np.array(astuple(self), dtype=np.float64)
+        return np.array([getattr(self, name) for name in NAMES], dtype=np.float64)
 
     @classmethod
     def from_array(cls, values: Array) -> "Karnopp":

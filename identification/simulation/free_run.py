@@ -1,5 +1,6 @@
 """Free run of a plant along a log: positions and forces that the model would have shown."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from identification.compiled import compiled
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.effect_run import effect_run_kernel, effective_commands, shown_run
 from identification.simulation.effect_table import (
@@ -178,6 +180,41 @@ def free_run(
             )  # fmt: skip
     _refuse_lost(log, out[0])
     return FreeRun(out[0], out[1], out[2], modes, out[3])
+
+
+def released(
+    friction: Sequence[Karnopp], force: Array, h: float, *, hold: bool, level: float, at: IntArray
+) -> Array:
+    """Positions (k, n) [m] of bodies of such friction, which rest at `level` until a sample each,
+    `at` (k,), and from there on are free under the force (n,) [N], held between samples or linear.
+
+    Source: as `free_run`.
+    """
+    rows = np.array([kernel_parameters(one.array, 0.0, 0.0) for one in friction])
+    out = np.full((len(rows), len(force)), level)
+    slope = force_slope(force, h, hold)
+    released_kernel(rows, h, read_only(force), slope, at.astype(np.int64), out)
+    return out
+
+
+@compiled
+def released_kernel(
+    p: Array, h: float, force: Array, slope: Array, at: IntArray, out: Array
+) -> None:
+    """Plants p (k, 11), released at samples `at` (k,): out (k, n) holds the positions at rest and
+    takes those of the motion."""
+    first, rest = np.zeros(1, dtype=np.int64), np.zeros(1)
+    for i in range(len(p)):
+        begin = at[i]
+        if begin >= len(force):
+            continue
+        own, rate, seen = force[begin:], slope[begin:], out[i, begin:]
+        run, modes = np.zeros((4, len(own))), np.zeros(len(own), dtype=np.int64)
+        run_kernel(
+            p[i : i + 1], h, True, 0.0, own, own, rate, seen, first, seen[:1].copy(), rest,
+            own[:1].copy(), run, modes,
+        )  # fmt: skip
+        out[i, begin:] = run[0]
 
 
 def _force(plant: Plant, log: Log, drive: Drive, seen: bool) -> tuple[float, Array]:

@@ -19,17 +19,16 @@ from identification.estimation.regression.standstill import (
     rest_stretches,
 )
 from identification.log import Log
-from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
-from identification.model.plant import Motor, Plant
 from identification.signals.sampling import samples
-from identification.simulation.free_run import free_run
+from identification.simulation.free_run import released
 
 SAMPLES_BEFORE, SAMPLES_AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
 EXACT_POSITION = 1e-12  # m or rad: a position without noise
 GRID = 25  # limits tried between the smallest and the largest force around the breakaway
 NARROWED = 2  # times that the grid is drawn around its best
 MOVED = 20.0  # times the position's noise that a body goes on to move, or it was no breakaway
+LOST = 1e4  # square in noise units, beyond which one sample is as far off as another
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
@@ -72,7 +71,6 @@ def _event(
         return None
     driven = one.log if one.held else one.driving
     part = Log(one.log.name, {key: driven[key][first:last] for key in ("t", "y", "F")})
-    part = part.with_signals(u=part["F"])  # of a motor that gives 1 N/V
     pushed = way * driven["F"][first : high + mean // 2]
     lowest, highest = float(np.min(pushed)), float(np.max(pushed))
     if highest <= max(lowest, 0.0):
@@ -81,9 +79,9 @@ def _event(
     best, left, span = 0.0, np.inf, highest - lowest
     tried = np.linspace(lowest, highest, GRID)
     for _ in range(NARROWED + 1):
-        costs = [_cost(one, friction, falls, part, level, way, float(limit)) for limit in tried]
+        costs = _costs(one, friction, falls, part, level, way, tried)
         left = float(np.min(costs))
-        best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # it may jump
+        best = float(np.mean(tried[costs <= left * (1.0 + 1e-9)]))  # it may jump
         span = 2.0 * span / (GRID - 1)
         tried = np.linspace(max(best - span, 0.0), best + span, GRID)
     if left > UNDERSTOOD or best >= highest:
@@ -94,31 +92,20 @@ def _event(
     return float(at), way, (at - low + 1) * h, way * best, rate
 
 
-def _cost(
-    one: MotionLog,
-    friction: Karnopp,
-    falls: bool,
-    part: Log,
-    level: float,
-    way: float,
-    limit: float,
-) -> float:
-    """Mean square of the position's error in noise units from rest on with this stick limit [N]."""
-    side = {"F_sp": limit} if way > 0 else {"F_sn": -limit}
-    before, y_m = np.zeros(0), part["y"]
+def _costs(
+    one: MotionLog, friction: Karnopp, falls: bool, part: Log, level: float, way: float,
+    limits: Array,
+) -> Array:  # fmt: skip
+    """Mean square of the position's error in noise units from rest on with these stick limits [N],
+    (k,) each."""
+    name = "F_sp" if way > 0 else "F_sn"
+    least, begin = limits, np.zeros(len(limits), dtype=np.int64)
     if falls:
-        least = min(limit, friction.F_sp if way > 0 else -friction.F_sn)
-        side = {"F_sp": least} if way > 0 else {"F_sn": -least}
-        above = np.flatnonzero(way * part["F"] > limit)
-        begin = int(above[0]) if len(above) else len(part)
-        begin = begin if len(part) - begin > 1 else len(part)  # no motion in one sample
-        before = np.full(begin, level)
-        part = Log(part.name, {key: x[begin:] for key, x in part.signals.items()})
-    nine = replace(friction, **side)
-    drive: Drive = "command" if one.held else "force"
-    plant = Plant(nine, Motor(1.0) if one.held else None)
-    y = before
-    if len(part):
-        y = np.append(before, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
-    r: Array = (y - y_m) / max(one.noise.y, EXACT_POSITION)
-    return float(np.mean(np.minimum(r**2, 1e4)))
+        least = np.minimum(limits, way * getattr(friction, name))
+        beyond = way * part["F"] > limits[:, np.newaxis]
+        begin = np.where(np.any(beyond, axis=1), np.argmax(beyond, axis=1), len(part))
+        begin[begin >= len(part) - 1] = len(part)  # no motion in one sample
+    nine = [replace(friction, **{name: way * float(limit)}) for limit in least]
+    y = released(nine, part["F"], one.log.h, hold=one.held, level=level, at=begin)
+    r = (y - part["y"]) / max(one.noise.y, EXACT_POSITION)
+    return np.asarray(np.mean(np.minimum(np.nan_to_num(r**2, nan=LOST), LOST), axis=1))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.regression.breakaway import _cost, breakaway_limits
+from identification.estimation.regression.breakaway import _costs, breakaway_limits
 from identification.log import Log
 from tests.identification.motor_logs import NINE, made, seen
 
@@ -43,9 +43,8 @@ def test_a_limit_reached_with_the_last_sample_moves_nothing() -> None:
     one = replace(seen(made(1)), held=False)
     force = np.linspace(0.0, 20.0, 60)
     signals = {"t": 2e-3 * np.arange(60.0), "y": np.zeros(60), "F": force, "u": force}
-    for limit in (force[-2], force[-1]):  # one sample beyond it, and none
-        cost = _cost(one, NINE, True, Log("part", signals), 0.0, 1.0, float(limit))
-        assert cost == 0.0
+    limits = force[-2:]  # one sample beyond it, and none
+    assert np.all(_costs(one, NINE, True, Log("part", signals), 0.0, 1.0, limits) == 0.0)
 
 
 def test_a_body_that_never_moves_breaks_nowhere() -> None:
