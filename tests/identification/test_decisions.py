@@ -32,7 +32,7 @@ ENOUGH = {
 # Where a search begins, what it tries and when it ends.
 STEER = {
     "FAR_BEYOND", "HARDLY", "LAG", "LASTING_SHARE", "LASTING_STEP", "LEAD", "LONG_TIME",
-    "MAY_BE_UNEVEN", "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN", "WORTH",
+    "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN", "WORTH",
 }  # fmt: skip
 # What still decides outside of `thresholds`.
 ELSEWHERE = {

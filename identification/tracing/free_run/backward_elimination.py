@@ -8,30 +8,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.arrays import Array
 from identification.effects._library import Library
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
-from identification.estimation.windowed_run.parameters import even
-from identification.estimation.windowed_run.refinement import Refit, refit
-from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.estimates import Drive
-from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halt
 from identification.thresholds import (
     ADEQUATE,
     ALONE,
-    AS_WELL,
     ASTRAY,
     COMPLETE,
     EARNS,
     NEARLY_FOLLOWED,
-    PENALTY,
 )
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
@@ -170,40 +163,6 @@ def only(choice: Choice, stay: tuple[Step, ...]) -> Choice:
     return Choice(choice.start, choice.first, stay, end, base, choice.tried)
 
 
-def pruned(
-    choice: Choice, model: FittedStructure, setting: Setting
-) -> tuple[Choice, FittedStructure]:
-    """Without the effects that a run which is followed does as well without."""
-    for step in choice.steps:
-        if model.misfit > NEARLY_FOLLOWED:
-            break
-        stay = tuple(one for one in choice.steps if one is not step)
-        less = only(choice, stay)
-        base = keeping(model.plant, stay)
-        if not stay:
-            left = misfit(base, setting.logs, setting.drive)
-            needless = has_no_part(left, model.misfit, step, setting)
-            return (less, setting.plain) if needless else (choice, model)
-        base = replace(base, friction=levelled(base.friction, less.end.theta))
-        found = refined_near(base, setting)
-        if found.misfit <= COMPLETE or is_needless(found.misfit, model.misfit):
-            choice = less
-            model = FittedStructure(less.end, less.base, found.plant, found.sd, False, found.misfit)
-    return choice, model
-
-
-def is_needless(without: float, before: float) -> bool:
-    """Whether a plant fitted anew without an effect leaves about as small a misfit as before."""
-    return without <= AS_WELL * before
-
-
-def has_no_part(without: float, before: float, step: Step, setting: Setting) -> bool:
-    """Whether a plant, the effect of a step just taken out of it, loses no more of its likelihood
-    than the effect's parameters have to gain."""
-    samples = sum(len(one.log) for one in setting.logs)
-    return samples * (without - before) <= PENALTY * len(step.candidate.effect.params)
-
-
 def keeping(plant: Plant, stay: Sequence[Step]) -> Plant:
     """The plant with the effects of these steps only."""
     keys = {step.candidate.effect.key for step in stay}
@@ -216,20 +175,6 @@ def without(model: FittedStructure, stay: Sequence[Step], setting: Setting) -> P
     return kept if stay else replace(kept, friction=setting.plain.plant.friction)
 
 
-def levelled(friction: Karnopp, theta: Array) -> Karnopp:
-    """The friction with the sliding of a regression, (5,), and its stick limits as far above it.
-
-    What an effect of friction took of the levels is theirs again where it is taken out.
-    """
-    least = [LEAST_MASS * friction.m, *np.full(4, 1e-9)]
-    five = dict(zip(FIVE, np.maximum(theta, least).tolist(), strict=True))
-    up, down = five["F_cp"] - friction.F_cp, five["F_cn"] - friction.F_cn
-    return replace(
-        friction, **five,
-        F_sp=max(friction.F_sp + up, 1e-9), F_sn=min(friction.F_sn - down, -1e-9),
-    )  # fmt: skip
-
-
 def with_steps(
     steps: Sequence[Step], start: EffectRows, first: Mapping[str, RowFit]
 ) -> tuple[EffectRows, Mapping[str, RowFit]]:
@@ -238,8 +183,3 @@ def with_steps(
     for step in steps:
         stage, outcomes = settled_fits(replace(absorb(stage, step.candidate), scales={}))
     return stage, outcomes
-
-
-def refined_near(plant: Plant, setting: Setting) -> Refit:
-    """The plant refined on the whole logs from close by."""
-    return refit(plant, setting.logs, setting.drive, prior=even(plant), effort="near")

@@ -16,14 +16,10 @@ from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.thresholds import COMPLETE
-from identification.tracing.free_run.backward_elimination import (
-    Setting,
-    refined_near,
-)
+from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.free_run.trial_structures import Trial, seen_in_run
 from identification.tracing.regression.stepwise import Step
 
-MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 LARGER = 3  # starts of a play, from the best up
@@ -129,8 +125,9 @@ def near_start(plant: Plant, setting: Setting) -> Refit:
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    found = refined_near(one.plant, setting)
-    if COMPLETE < found.misfit < MAY_BE_UNEVEN and even(found.plant):
-        again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
+    logs, drive = setting.logs, setting.drive
+    found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
+    if found.misfit > COMPLETE and even(found.plant):
+        again = refit(found.plant, logs, drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
     return found

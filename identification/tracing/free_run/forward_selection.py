@@ -30,7 +30,6 @@ from identification.tracing.free_run.backward_elimination import (
     earned,
     enough,
     equations_explained,
-    pruned,
     seconds,
     with_steps,
 )
@@ -55,20 +54,16 @@ Report = Callable[[str, float], None]
 def judged_forward(
     choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure]:
-    """The choice and its model, with what the free run adds, exchanges or finds needless."""
+    """The choice and its model, with what the free run adds or exchanges."""
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
     if model.imposed or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
-    called_for = choice.steps
     if model.misfit > enough(setting, choice.steps) and hidden(choice):
         found = setting.halt.tried(
             RUN_ALONE, lambda: _contested(choice, model, setting, report), None
         )
         if found is not None:
-            choice, model = found
-    choice, model = _pruned(choice, model, setting)
-    if called_for and not choice.steps:  # the equations were wrong: what the run lacks is open
-        return judged_forward(choice, model, setting, report)
+            return found
     return choice, model
 
 
@@ -79,17 +74,6 @@ def _contested(
     logs, drive = setting.logs, setting.drive
     short = [most_left(model.plant, one, drive, SHORT_SECONDS) for one in logs]
     return contest(choice, model, replace(setting, short=short), report)
-
-
-def _pruned(
-    choice: Choice, model: FittedStructure, setting: Setting
-) -> tuple[Choice, FittedStructure]:
-    """The choice and its model without what the run does as well without, as far as is tried."""
-    if not choice.steps:
-        return choice, model
-    keys = ", ".join(step.candidate.effect.key for step in choice.steps)
-    what = f"whether the run does as well without {keys}"
-    return setting.halt.tried(what, lambda: pruned(choice, model, setting), (choice, model))
 
 
 def hidden(choice: Choice) -> bool:

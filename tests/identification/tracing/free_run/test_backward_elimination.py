@@ -20,8 +20,6 @@ from identification.tracing.free_run.backward_elimination import (
     first_steps,
     followed_up_to,
     keeping,
-    levelled,
-    pruned,
     suffices,
     without,
 )
@@ -69,18 +67,6 @@ def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, C
     assert not suffices(None, part, setting)
 
 
-@pytest.mark.method
-def test_an_effect_that_is_needed_stays(found: tuple[Setting, Choice]) -> None:
-    setting, choice = found
-    kept = first_steps(choice, 1)
-    model = fitted_structure(
-        kept.end, kept.base, kept.effects, setting.recorded, np.random.default_rng(1)
-    )
-    assert model.misfit <= COMPLETE
-    after, same = pruned(kept, model, setting)
-    assert after.steps == kept.steps and same is model
-
-
 def test_a_plant_keeps_the_effects_of_its_steps(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     both = plant({**SPRING, "backlash": {"width": 1e-4}})
@@ -88,27 +74,6 @@ def test_a_plant_keeps_the_effects_of_its_steps(found: tuple[Setting, Choice]) -
     assert keeping(both, choice.steps[:1]).friction == NINE
     assert not keeping(both, ()).effects
     assert without(setting.plain, (), setting).friction == setting.plain.plant.friction
-
-
-def test_levels_taken_by_an_effect_are_given_back() -> None:
-    friction = NINE
-    less = replace(friction, F_cp=friction.F_cp - 3.0, F_sp=friction.F_sp - 3.0)
-    theta = np.array([NINE.m, NINE.F_cp, NINE.F_cn, NINE.F_vp, NINE.F_vn])
-    assert levelled(less, theta).array == pytest.approx(NINE.array)
-
-
-@pytest.mark.parametrize(("bare", "count"), [(1.001, 0), (1.004, 1)])
-def test_a_single_effect_of_no_size_goes(
-    found: tuple[Setting, Choice], monkeypatch: pytest.MonkeyPatch, bare: float, count: int
-) -> None:
-    setting, choice = found
-    kept = first_steps(choice, 1)
-    model = replace(setting.plain, plant=plant(SPRING), misfit=1.0)
-    place = "identification.tracing.free_run.backward_elimination"
-    monkeypatch.setattr(f"{place}.misfit", lambda *_: bare)
-    less, left = pruned(kept, model, setting)
-    assert len(less.steps) == count
-    assert left is (model if count else setting.plain)
 
 
 def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting, Choice]) -> None:

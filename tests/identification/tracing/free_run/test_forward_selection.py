@@ -28,8 +28,8 @@ from identification.tracing.free_run.forward_selection import (
     screening,
 )
 from identification.tracing.free_run.trial_structures import Trial
-from identification.tracing.regression.candidates import EffectCandidate, best_of
-from identification.tracing.regression.stepwise import Choice, Step, choose
+from identification.tracing.regression.candidates import EffectCandidate
+from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
 
@@ -67,32 +67,18 @@ def test_play_shows_in_the_run_alone_and_is_named() -> None:
 
 
 @pytest.mark.method
-@pytest.mark.slow
-def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_contest_is_held_on_a_stretch_of_each_log(monkeypatch: pytest.MonkeyPatch) -> None:
     setting, plain = setting_of(4, 4e-4)
-    library = {"stribeck": built_in()["stribeck"]}
-    tried = choose(setting.start, setting.first, {}, setting.rng, lambda _s, _p: None)
-    beside = best_of(setting.start, library["stribeck"], setting.first)
-    assert beside is not None
-    step = Step(beside, 0.01, (), setting.start, setting.first)
+    none = choose(setting.start, setting.first, {}, setting.rng, lambda _s, _p: None)
     seen_short: list[list[MotionLog]] = []
 
-    def contest(choice: Choice, _model: FittedStructure, own: Setting, _report: object) -> None:
-        assert not choice.steps
+    def contest(_choice: Choice, _model: FittedStructure, own: Setting, _report: object) -> None:
         seen_short.append(list(own.short))
 
-    monkeypatch.setattr("identification.tracing.free_run.forward_selection.contest", contest)
-    monkeypatch.setattr(
-        "identification.tracing.free_run.forward_selection.most_left",
-        lambda _p, one, _d, size: shortened(one, size, 2000),
-    )
-    monkeypatch.setattr(
-        "identification.tracing.free_run.forward_selection.pruned", lambda *_: (tried, plain)
-    )
-    followed = replace(plain, misfit=1.2)
-    kept, model = judged_forward(
-        replace(tried, steps=(step,)), followed, setting, lambda _s, _p: None
-    )
+    place = "identification.tracing.free_run.forward_selection"
+    monkeypatch.setattr(f"{place}.contest", contest)
+    monkeypatch.setattr(f"{place}.most_left", lambda _p, one, _d, size: shortened(one, size, 2000))
+    kept, model = judged_forward(none, plain, setting, lambda _s, _p: None)
     assert not kept.steps and model is plain and len(seen_short) == 1
     assert seen_short[0][0].log["t"][0] == pytest.approx(4.0)
 
