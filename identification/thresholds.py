@@ -34,8 +34,6 @@ ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noi
 # How large, beside what matters to the machine (blind.py; chapters.py; real.py).
 MATERIAL = 0.01  # of the Coulomb level, a value, an equation's square: the least reported
 OF_ACCOUNT = 0.1  # of a square error, of the force: what explains, or hides, less is not reported
-STRUCTURED = 0.3  # square in noise units, from which what is left is structure
-MOST_PLACES = 3  # effects of place in one machine, which rather are pieces of another law
 
 # One error beside another, as a factor (blind.py: removed; real.py).
 AS_WELL = 1.02  # up to which one is as good as the other

@@ -9,14 +9,12 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.remarks import MinorRemark
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, OF_ACCOUNT
-from identification.tracing.free_run.backward_elimination import equations_explained
+from identification.thresholds import ASTRAY
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import (
-    carries,
     errors_of,
-    hardly_predicted,
+    lacks,
     noise_floor,
     on_test,
     predicted,
@@ -25,14 +23,8 @@ from identification.tracing.model_errors import (
 from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import (
-    at_breakaway,
-    in_pieces,
-    in_run,
-    places,
     remaining_structure,
     strongest,
-    too_much,
-    unsized,
 )
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
 from identification.tracing.structure_search import Refinement, Selection, without_effects
@@ -62,7 +54,6 @@ def judgement(
     rows, plain = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
     changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
-    left = _left(choice, after, chosen)
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(plain, slowest, (), logs, seen, rows.drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, rows.drive)
@@ -71,26 +62,20 @@ def judgement(
     was = on_test(plain, errors_before["test"], unseen, rows.drive)
     now = was if after is plain else on_test(after, errors_after["test"], unseen, rows.drive)
     share = share_left(was, now, noise)
-    loud = hardly_predicted(now, noise)
-    doubts = _doubts(found, errors_before, errors_after, share, chosen.pieces, bool(changed), loud)
+    lacking = lacks(after, errors_after["train"], noise)
+    left = _left(choice, after, chosen) if lacking else NOTHING
     of_other_law = other_law(choice, left, share)
-    headline = bool(choice.steps) and not doubts and not of_other_law and is_headline(share)
-    verdict = verdict_of(choice, left, changed, headline=headline)
-    if verdict != "unknown" and (doubts or (too_much(choice, after) and not headline)):
-        verdict = "unknown"
-        # A law of place is told from what the plain model leaves.
-        of_place = PIECES in doubts
-        left = NOTHING if of_place else strongest(choice, after, logs, rows.drive)
-        if choice.steps and not left.depends_on:  # of all that is missing
-            left = remaining_structure(without_effects(chosen.plain, choice), plain, any_size=True)
+    # A machine that changed beside leaves more on the test logs, but no more than before.
+    most = is_headline(share) or (bool(changed) and share < 1.0 and not lacking)
+    doubts: tuple[str, ...] = () if most or not choice.steps else (UNDER_HALF,)
+    known = most and not of_other_law if choice.steps else not lacking
+    verdict = verdict_of(choice, changed) if known else "unknown"
+    left = left if known or lacking else _left(choice, after, chosen)
     if verdict == "unknown" and seen and not choice.steps and not after.imposed:
         told = plain.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
         doubts = (*doubts, how) if levels else doubts
-    p = after.plant.friction
-    if verdict == "none" and hides_friction(errors_after["test"], max(p.F_cp, p.F_cn)):
-        verdict, doubts = "unknown", (*doubts, AS_LARGE_AS_FRICTION)
     said = (
         *_remarks(choice, after, left, logs, seen, rig),
         *doubts,
@@ -104,70 +89,21 @@ def judgement(
     )  # fmt: skip
 
 
-def hides_friction(left: Errors, coulomb: float) -> bool:
-    """Whether what is left of the force is larger than friction itself, so that an effect of its
-    size would not show."""
-    if left.force_rms is None or left.force_relative is None:
-        return False
-    return left.force_rms > coulomb and left.force_relative > OF_ACCOUNT
-
-
 def _not_its_law(key: str) -> str:
     """What to say of an effect whose own signals tell of what it leaves."""
     return f"like {key}, but not its law: what is left depends on the same signals"
 
 
 def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependence:
-    """On what the rest depends: in the equations, else in the run, else at the breakaways."""
-    # A refinement may end short of its minimum.
-    most = ADEQUATE if choice.steps else COMPLETE
-    left = NOTHING if after.misfit <= most else remaining_structure(choice, after)
-    if not (left.depends_on or choice.steps or after.imposed) and after.misfit > ADEQUATE:
-        rows = chosen.plain.rows
-        left = in_run(after, list(rows.logs), rows.drive)
-        left = left if left.depends_on else at_breakaway(choice)
+    """On what the rest depends, or all that was missing, where nothing tells of the rest."""
+    plain, rows = chosen.plain, chosen.plain.rows
+    left = strongest(choice, after, list(rows.logs), rows.drive)
+    if choice.steps and not left.depends_on:
+        left = remaining_structure(without_effects(plain, choice), plain.model)
     return left
 
 
-PIECES = (
-    "several effects of place together follow what is missing: rather pieces of one law of place"
-    " that the library does not have"
-)
-UNSURE = "the size of an effect found is not identifiable from the logs"
 UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
-AS_LARGE_AS_FRICTION = (
-    "what is left of the force is larger than friction itself: by these logs' noise, or by what it"
-    " hides"
-)
-STANDS_IN = (
-    "what explains the training logs does not explain the test logs: it is confounded with"
-    " another effect, or the machine differs in them"
-)
-
-
-def _doubts(
-    found: Refinement, before: Mapping[str, Errors], after: Mapping[str, Errors], share: float,
-    apart: bool, changed: bool, loud: bool,
-) -> tuple[str, ...]:  # fmt: skip
-    """Why the effects found may stand in for one that the library lacks.
-
-    share: of what was missing, that is left; apart: the search came on pieces of a law of place;
-    changed: by drift; loud: the test logs are left far more than noise.
-    """
-    choice, model = found.choice, found.model
-    carried = model.stage.imposed or not equations_explained(choice.base) or carries(before, after)
-    pieces = in_pieces(choice) or (apart and places(choice) > 1 and model.misfit > COMPLETE)
-    doubts = {
-        PIECES: pieces,
-        STANDS_IN: bool(choice.steps) and not changed and not carried,
-        # A machine that changed beside leaves more on the test logs, but no more than before.
-        UNDER_HALF: bool(choice.steps)
-        and carried
-        and not is_headline(share)
-        and not (changed and share < 1.0),
-        UNSURE: bool(choice.steps) and (loud or model.misfit > ASTRAY) and unsized(choice, model),
-    }
-    return tuple(said for said, holds in doubts.items() if holds)
 
 
 def _remarks(

@@ -14,10 +14,12 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, ASTRAY, CARRIED, ROUGH_LEFT
+from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
+
+OFF = 1e-3  # of the position's spread, an error of account
 
 
 def errors_of(
@@ -51,19 +53,6 @@ def errors_of(
             actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
         )
     return out
-
-
-def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
-    """Whether the test logs are left no more than the training logs, or little of what was missing.
-
-    Several effects together may be confounded with one that the library lacks, on the training
-    logs. Ours.
-    """
-    own, other, missing = (x.force_rms for x in (after["train"], after["test"], before["test"]))
-    if own is None or other is None or missing is None:
-        return True
-    little = ROUGH_LEFT * (missing**2 - own**2)
-    return other <= CARRIED * own or other**2 - own**2 <= little
 
 
 @dataclass(frozen=True)
@@ -132,10 +121,28 @@ def predicted(left: OnTest, noise: NoiseFloor) -> bool:
     return left.misfit is None or left.misfit <= ADEQUATE
 
 
-def hardly_predicted(left: OnTest, noise: NoiseFloor) -> bool:
-    """Whether a model leaves far more force on the test logs than the sensors do."""
-    force = left.errors.force_rms
-    return force is not None and force**2 > ASTRAY * noise.force_rms**2
+def lacks(model: FittedStructure, errors: Errors, noise: NoiseFloor) -> bool:
+    """Whether a model lacks something of account on the logs of its fit, with these errors there.
+
+    A free run that leaves more than noise, and more than a trifle of the motion; where there is
+    none, more force than noise leaves, and more than a trifle of the Coulomb level.
+    """
+    if not model.imposed:
+        return model.misfit > ADEQUATE and off(model) > OFF
+    force, p = errors.force_rms, model.plant.friction
+    if force is None or force**2 <= ADEQUATE * noise.force_rms**2:
+        return False
+    return force**2 - noise.force_rms**2 > (MATERIAL * max(p.F_cp, p.F_cn)) ** 2
+
+
+def off(model: FittedStructure) -> float:
+    """Position error of a model's free run on the logs of its fit, over the spread of the
+    position."""
+    drive: Drive = "force" if model.plant.actuator is None else "command"
+    logs = model.stage.logs
+    error = position_rms(model.plant, logs, drive)
+    spread = rms(np.concatenate([one.log["y"] - np.mean(one.log["y"]) for one in logs]))
+    return np.inf if error is None else error / max(spread, 1e-300)
 
 
 def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:

@@ -15,53 +15,33 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
-from identification.estimation.regression.row_fit import RowFit, mean_square, rms
+from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.windowed_run.run_errors import soft
-from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
+from identification.estimation.windowed_run.windows import freed, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
-from identification.thresholds import (
-    ASTRAY,
-    COMPLETE,
-    FAR_LESS,
-    HOPELESS,
-    MATERIAL,
-    MOST_PLACES,
-    ROUGH_LEFT,
-    SHARE_LEFT,
-    STRUCTURED,
-)
+from identification.thresholds import ASTRAY
 from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, SEPARATE, dependence
-from identification.tracing.free_run.backward_elimination import equations_explained, first_steps
-from identification.tracing.regression.stepwise import Choice, Step
+from identification.tracing.regression.stepwise import Choice
 from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
-OFF = 1e-3  # if its error is this share of the position's spread
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
 SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
-LEAST_AT_BREAKAWAY = 0.1  # of the Coulomb level, structure of account
 
 
-def remaining_structure(
-    choice: Choice, after: FittedStructure, *, any_size: bool = False
-) -> Dependence:
-    """The strongest structure that is left in any equation, if there is any.
-
-    any_size: however little of what was missing it is, as something surely is missing.
-    """
+def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
+    """The strongest structure that is left in any equation, if there is any."""
     best, most = Dependence((), 0.0), 0.0
-    # A body that creeps in short stops is no rest, and a run that is followed does it too.
-    calm = not after.imposed and after.misfit <= ASTRAY
     for equation, o in choice.base.items():
-        if o.robust and ((calm and not any_size) or mean_square(o) < ASTRAY):
+        if o.robust and mean_square(o) < ASTRAY:
             continue
         keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:
@@ -70,26 +50,9 @@ def remaining_structure(
         if found is None:
             continue
         named, left = found
-        if not named.depends_on:
-            continue
-        if not any_size:
-            size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
-            whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
-            rough = bool(choice.steps) and mean_square(o) > HOPELESS
-            least = {MECHANICAL: MATERIAL, BREAKAWAY: LEAST_AT_BREAKAWAY}.get(equation, 0.0)
-            if size < least * _level(choice) or is_slight(left, size**2, whole, rough):
-                continue
-        if (much := left * np.count_nonzero(keep)) > most:
+        if named.depends_on and (much := left * np.count_nonzero(keep)) > most:
             best, most = named, much
     return best
-
-
-def is_slight(left: float, square: float, missing: float, rough: bool) -> bool:
-    """Whether structure is of no account: `left` [noise units], `square` of the `missing` [N**2].
-
-    rough: on a machine that no model follows down to the noise.
-    """
-    return left < STRUCTURED or square < (ROUGH_LEFT if rough else SHARE_LEFT) * missing
 
 
 def at_breakaway(choice: Choice) -> Dependence:
@@ -161,13 +124,6 @@ def _with_command(names: tuple[str, ...], held: bool) -> tuple[str, ...]:
     return tuple(dict.fromkeys(every))[:MOST_SIGNALS]
 
 
-def _excess(o: RowFit) -> float:
-    """Square beyond the noise itself [N**2], as the noise of rows changes with the structure."""
-    return (
-        max(mean_square(o) - 1.0, 0.0) * float(np.median(o.rows.sd[o.rows.speed >= o.slowest])) ** 2
-    )
-
-
 def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
     """Rows of sliding above the band of a free run that is followed, or else the regression's."""
     followed = not after.imposed and after.misfit <= ASTRAY
@@ -175,87 +131,12 @@ def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
     return np.asarray(o.rows.speed >= slowest)
 
 
-def _level(choice: Choice) -> float:
-    """Coulomb level [N]."""
-    return 0.5 * float(np.sum(np.abs(choice.end.theta[1:3])))
-
-
-def too_much(choice: Choice, after: FittedStructure) -> bool:
-    """Whether far more than the sensors' noise is left, of whatever structure.
-
-    Beside effects that were found it is too much only where it is a good part of what was missing,
-    or where the equations are explained to the sensors' noise and the run is not.
-    """
-    if after.misfit <= COMPLETE:
-        return False
-    for equation in (MECHANICAL, ACTUATOR):
-        if equation not in choice.base:
-            continue
-        o = choice.base[equation]
-        keep = o.rows.speed >= o.slowest
-        if equation == MECHANICAL:
-            keep = keep & judged_rows(o, after)
-        r = o.fit.residual[keep]
-        left = float(np.mean(r**2)) if len(r) else 0.0
-        scale = float(np.median(o.rows.sd[keep])) if len(r) else 0.0
-        part = FAR_LESS if after.stage.imposed else ROUGH_LEFT
-        missing = part * _excess(choice.first[equation]) if choice.steps else 0.0
-        if left > ASTRAY and (left - 1.0) * scale**2 > missing:
-            return True
-    if after.imposed or after.misfit <= ASTRAY:
-        return False
-    if not choice.steps:
-        return _off(after) > OFF
-    return equations_explained(choice.base) or unsized(choice, after)
-
-
-def places(choice: Choice) -> int:
-    """Number of effects of place; many together are rather pieces of one than a machine's own."""
-    return sum(_of_place(step) for step in choice.steps)
-
-
-def in_pieces(choice: Choice) -> bool:
-    """Whether the effects of place are too many to be one machine's own."""
-    return places(choice) >= MOST_PLACES
-
-
-def before_pieces(choice: Choice) -> Choice:
-    """The choice up to the effect of place that is one too many."""
-    many = [i for i, step in enumerate(choice.steps) if _of_place(step)][MOST_PLACES - 1 :]
-    return first_steps(choice, many[0]) if many else choice
-
-
-def _of_place(step: Step) -> bool:
-    return step.candidate.effect.depends_on == ("y",)
-
-
-def unsized(choice: Choice, after: FittedStructure) -> bool:
-    """Whether the logs leave every size of an effect as unsure as it is large."""
-    for step in choice.steps:
-        effect = step.candidate.effect
-        values = next(a.values for a in after.plant.effects if a.key == effect.key)
-        sizes = [(values[name], after.sd.get(f"{effect.key}.{name}")) for name in effect.linear]
-        if sizes and all(sd is not None and sd >= abs(value) for value, sd in sizes):
-            return True
-    return False
-
-
-def _off(after: FittedStructure) -> float:
-    """Position error of the free run over the spread of the position."""
-    drive: Drive = "force" if after.plant.actuator is None else "command"
-    logs = after.stage.logs
-    rms_y = position_rms(after.plant, logs, drive)
-    positions = [np.asarray(one.log["y"]) for one in logs]
-    spread_y = rms(np.concatenate([y - np.mean(y) for y in positions]))
-    return np.inf if rms_y is None else rms_y / max(spread_y, 1e-300)
-
-
 def strongest(
     choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
 ) -> Dependence:
     """The strongest of the structures left in the equations, at breakaways and in the free run,
     however little it is, as something surely is missing."""
-    found = remaining_structure(choice, after, any_size=True)
+    found = remaining_structure(choice, after)
     if after.imposed:
         return found
 

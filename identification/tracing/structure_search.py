@@ -27,7 +27,6 @@ from identification.tracing.free_run.forward_selection import judged_forward
 from identification.tracing.free_run.rivals import discriminated
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
-from identification.tracing.remaining_structure import before_pieces, in_pieces
 
 INTERVALS = "the last step of the plain model's fit, with its intervals"
 
@@ -43,15 +42,11 @@ class FirstEffect:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The effects that the equations choose.
-
-    pieces: whether they are pieces of one law of place, all but the first dropped.
-    """
+    """The effects that the equations choose."""
 
     plain: PlainModel
     setting: Setting
     choice: Choice
-    pieces: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +76,7 @@ def selection(begin: FirstEffect, rng: np.random.Generator, report: Progress) ->
     alone = first_alone(begun, setting)
     if begun.steps and not suffices(alone, begun, setting):
         choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
-    pieces = not plain.model.imposed and in_pieces(choice)
-    choice = before_pieces(choice) if pieces else choice
-    return Selection(plain, setting, choice, pieces)
+    return Selection(plain, setting, choice)
 
 
 def share_beside(plain: PlainModel, choice: Choice) -> float:

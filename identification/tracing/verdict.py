@@ -56,15 +56,8 @@ POSITION = "position"  # the residual of the free run
 RIVALS_SHOWN = 6  # rivals of each effect
 
 
-def verdict_of(
-    choice: Choice, left: Dependence, drift: Sequence[Change], *, headline: bool = False
-) -> TraceVerdict:
-    """The verdict in one word: what is left comes first, then rivals, effects and drift.
-
-    headline: effects explain most of what was missing, so they are told before the rest.
-    """
-    if left.depends_on and not headline:
-        return "unknown"
+def verdict_of(choice: Choice, drift: Sequence[Change]) -> TraceVerdict:
+    """The verdict of what is explained, in one word: rivals come first, then effects and drift."""
     if any(equal_rivals(step) for step in choice.steps):
         return "inseparable"
     if choice.steps:

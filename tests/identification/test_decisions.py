@@ -20,7 +20,7 @@ ESTIMATION = (
 NO_NUMBERS = {
     "ABSORBED", "ACTUATOR", "AT_REST", "BREAKAWAY", "DELAY", "END_PLACES", "FIVE", "FORCES",
     "GRAVITY", "MECHANICAL", "NAMES", "NEGATIVE", "NO_INFORMATION", "NOT_SIGNALS", "OF_AN_ANGLE",
-    "OF_SPEED", "PIECES", "REST", "STUCK", "TURNS", "VISCOUS_NAMES",
+    "OF_SPEED", "REST", "STUCK", "TURNS", "VISCOUS_NAMES",
 }  # fmt: skip
 # How many rows, samples or windows a statistic needs to exist at all, and what rounding leaves.
 ENOUGH = {

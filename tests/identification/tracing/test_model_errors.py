@@ -1,36 +1,20 @@
-"""Whether what explains the training logs carries over to the test logs."""
+"""What a model leaves of the test logs."""
+
+from dataclasses import replace
 
 import pytest
 
+from identification.estimation.structure_fit import FittedStructure
 from identification.tracing.model_errors import (
     NoiseFloor,
     OnTest,
-    carries,
-    hardly_predicted,
+    lacks,
     predicted,
     share_left,
 )
 from identification.tracing.result import Errors
-
-
-def of(train: float | None, test: float | None) -> dict[str, Errors]:
-    """Errors of the force [N]; the others are not judged."""
-    return {name: Errors(x, None, None, None) for name, x in (("train", train), ("test", test))}
-
-
-@pytest.mark.parametrize(
-    ("before", "train", "test", "expected"),
-    [
-        (1.2, 0.1, 0.1, True),
-        (1.2, 0.1, 0.19, True),  # another reference leaves a little more
-        (1.2, 0.1, 0.42, False),
-        (5.0, 0.1, 0.42, True),  # next to all that was missing is explained
-    ],
-)
-def test_a_structure_carries_over_or_stands_in_for_another(
-    before: float, train: float, test: float, expected: bool
-) -> None:
-    assert carries(of(before, before), of(train, test)) is expected
+from tests.identification.motor_logs import plant
+from tests.identification.test_thresholds import stage
 
 
 def left_of(
@@ -41,7 +25,6 @@ def left_of(
 
 
 def test_without_a_force_error_nothing_is_held_against_it() -> None:
-    assert carries(of(None, None), of(None, None))
     assert share_left(left_of(None), left_of(None), NoiseFloor(0.1, None)) == 0.0
 
 
@@ -79,8 +62,23 @@ def test_a_model_is_complete_that_leaves_hardly_more_than_noise(
     assert predicted(left_of(force, None, misfit), NoiseFloor(1.0, None)) is expected
 
 
-@pytest.mark.parametrize(("force", "expected"), [(1.8, True), (1.6, False), (None, False)])
-def test_a_model_hardly_predicts_logs_that_are_left_far_more_than_noise(
+def test_a_run_that_leaves_more_than_noise_lacks_something_where_it_is_off_the_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    errors = Errors(9.0, None, None, None)  # of the equation alone
+    model = FittedStructure(stage(), {}, plant(), {}, False, 3.0)
+    for off, lacking in ((2e-3, True), (5e-4, False)):
+        monkeypatch.setattr("identification.tracing.model_errors.off", lambda _, off=off: off)
+        assert lacks(model, errors, NoiseFloor(1.0, None)) is lacking
+    assert not lacks(replace(model, misfit=1.2), errors, NoiseFloor(1.0, None))
+
+
+@pytest.mark.parametrize(("force", "expected"), [(1.1, False), (2.0, True), (None, False)])
+def test_a_prescribed_motion_lacks_force_beyond_noise_that_friction_would_feel(
     force: float | None, expected: bool
 ) -> None:
-    assert hardly_predicted(left_of(force, None), NoiseFloor(1.0, None)) is expected
+    model = FittedStructure(stage(), {}, plant(), {}, True)
+    errors = Errors(force, None, None, None)
+    assert lacks(model, errors, NoiseFloor(1.0, None)) is expected
+    small = NoiseFloor(1e-3, None)  # far above the noise, but nothing beside friction
+    assert not lacks(model, Errors(2e-3, None, None, None), small)

@@ -11,20 +11,16 @@ from scipy.signal import butter, lfilter
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL, REST
-from identification.estimation.regression.row_fit import RowFit, first_stage
+from identification.estimation.regression.equation_rows import BREAKAWAY, REST
+from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.log import Rig
-from identification.tracing.regression.stepwise import Choice, Step, choose
+from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import (
     at_breakaway,
-    before_pieces,
     in_run,
-    places,
     remaining_structure,
     strongest,
-    too_much,
-    unsized,
     upward,
 )
 from tests.identification.motor_logs import K_A, H, made, plant, seen
@@ -43,84 +39,6 @@ def found() -> tuple[Choice, FittedStructure]:
     choice = choose(start, first, library, rng, lambda _stage, _share: None)
     assert [step.candidate.effect.key for step in choice.steps] == ["spring"]
     return choice, replace(plain, plant=plant(SPRING), misfit=40.0)
-
-
-def leaving(o: RowFit, share: float, noise: float = 1.0) -> RowFit:
-    """The outcome with this share of its residual [N], in rows of so much noise."""
-    rows = replace(o.rows, sd=noise * o.rows.sd)
-    return replace(o, rows=rows, fit=replace(o.fit, residual=share / noise * o.fit.residual))
-
-
-@pytest.mark.parametrize(("share", "much"), [(0.7, True), (0.4, False)])
-def test_beside_effects_an_imposed_motion_may_leave_less_than_a_third(
-    found: tuple[Choice, FittedStructure], share: float, much: bool
-) -> None:
-    choice, after = found
-    logs = tuple(replace(one, imposed=True) for one in after.stage.logs)
-    hidden = replace(after, imposed=True, misfit=np.inf)  # by what is missing: its body is free
-    imposed = replace(hidden, stage=replace(after.stage, logs=logs))
-    for noise in (1.0, 3.0):  # what is left in newtons counts, whatever noise its rows have
-        base = {MECHANICAL: leaving(choice.first[MECHANICAL], share, noise)}
-        assert too_much(replace(choice, base=base), imposed) is much
-        assert too_much(replace(choice, base=base), hidden)
-    base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.4)}
-    assert too_much(replace(choice, base=base), after)  # a free run has to leave less
-    assert not too_much(replace(choice, base=base), replace(after, misfit=1.0))
-
-
-def test_structure_counts_by_its_share_of_the_force_that_was_missing(
-    found: tuple[Choice, FittedStructure],
-) -> None:
-    choice, after = found
-    spring = choice.first[MECHANICAL]
-    for noise in (1.0, 3.0):
-        some = replace(choice, base={MECHANICAL: leaving(spring, 0.4, noise)})
-        assert remaining_structure(some, after).depends_on
-        least = replace(choice, base={MECHANICAL: leaving(spring, 0.05, noise)})
-        assert not remaining_structure(least, after).depends_on
-
-
-def test_an_effect_of_no_certain_size_explains_no_run(
-    found: tuple[Choice, FittedStructure],
-) -> None:
-    choice, after = found
-    base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.2)}
-    rough = replace(choice, base=base)  # more than noise, but little of what was missing
-    for sd, no_size in (({"spring.k": 50.0, "spring.k_3": 9e4}, True), ({"spring.k": 1.0}, False)):
-        told = replace(after, sd=sd)
-        assert unsized(choice, told) is no_size
-        assert too_much(rough, told) is no_size
-        assert not too_much(rough, replace(told, misfit=2.0))
-
-
-def test_three_effects_of_place_are_pieces_of_another(
-    found: tuple[Choice, FittedStructure],
-) -> None:
-    choice, _ = found
-    (spring,) = choice.steps
-
-    def step_of(key: str) -> Step:
-        effect = built_in()[key]
-        values = {p.name: p.typical for p in effect.params}
-        return replace(spring, candidate=replace(spring.candidate, effect=effect, values=values))
-
-    def of(*keys: str) -> Choice:
-        return replace(choice, steps=tuple(step_of(key) for key in keys))
-
-    two = of("spring", "stribeck", "cogging", "warmup")
-    assert places(two) == 2
-    assert before_pieces(two) is two
-    three = of("spring", "cogging", "warmup", "tight_spot", "stribeck")
-    assert places(three) == 3
-    assert before_pieces(three).steps == three.steps[:3]
-
-
-def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
-    found: tuple[Choice, FittedStructure],
-) -> None:
-    choice, after = found
-    assert too_much(choice, replace(after, sd={"spring.k": 1.0}))
-    assert not too_much(choice, replace(after, sd={"spring.k": 1.0}, misfit=2.0))
 
 
 @pytest.mark.parametrize(
@@ -189,7 +107,7 @@ def test_equations_tell_on_what_is_left_depends(
     missing: dict[str, dict[str, float]], signals: tuple[str, ...]
 ) -> None:
     choice, after = lacking(missing, fast="input_delay" in missing)
-    named = remaining_structure(choice, after, any_size=True).depends_on
+    named = remaining_structure(choice, after).depends_on
     assert set(signals) <= set(named), named
     assert named[0] == signals[0] or signals == ("reversal",)
 
@@ -197,7 +115,7 @@ def test_equations_tell_on_what_is_left_depends(
 @pytest.mark.slow
 def test_the_plain_machine_leaves_nothing_of_any_size() -> None:
     choice, after = lacking({})
-    assert remaining_structure(choice, after, any_size=True).depends_on == ()
+    assert remaining_structure(choice, after).depends_on == ()
 
 
 @pytest.mark.method
@@ -207,7 +125,10 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
     o = choice.base[BREAKAWAY]
     noise = np.random.default_rng(1).standard_normal(len(o.fit.residual))
     wild = replace(o, fit=replace(o.fit, residual=3.0 * noise))
-    found = remaining_structure(replace(choice, base={BREAKAWAY: wild}), after, any_size=True)
+    found = remaining_structure(
+        replace(choice, base={BREAKAWAY: wild}),
+        after,
+    )
     assert found.depends_on == ()
 
 

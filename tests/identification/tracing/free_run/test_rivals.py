@@ -53,7 +53,7 @@ def test_the_run_has_a_say(
     assert [one.effect.key for one in equal_rivals(choice.steps[0])] == ["twin"]
     monkeypatch.setattr(module, "fitted", leaving(misfit))
     told = discriminated(choice, after, setting)
-    assert verdict_of(told, NOTHING, ()) == verdict
+    assert verdict_of(told, ()) == verdict
     (rival,) = rivals_of(told, ())
     assert ("leaves more in the run" in rival.why_not) == (verdict == "effect")
 
