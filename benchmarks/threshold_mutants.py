@@ -2,8 +2,8 @@
 
     python benchmarks/threshold_mutants.py
 
-For every constant of `identification/thresholds.py`: its test in
-`tests/identification/test_thresholds.py` is run as it is, with half of it and with twice it. Exit
+For every constant of `identification/thresholds.py`: its tests in
+`tests/identification/test_thresholds.py` are run as it is, with half of it and with twice it. Exit
 status 1 where a mutant passes.
 """
 
@@ -39,7 +39,7 @@ def passes(name: str, factor: float, modules: list[ModuleType]) -> bool:
     for module in modules:
         if name in vars(module):
             setattr(module, name, type(value)(factor * value))
-    asked = ["-q", "-x", "-p", "no:cacheprovider", f"{FILE}::test_{name.lower()}"]
+    asked = ["-q", "-x", "-p", "no:cacheprovider", FILE, "-k", f"test_{name.lower()}"]
     with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
         status = int(pytest.main(asked))
     os._exit(status)

@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from identification.arrays import Array
 from identification.drift.practical_margin import Change
-from identification.thresholds import CHANCE_TO_SEE
+from identification.thresholds import NEARLY_ALL
 
 WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looked for
 
@@ -58,7 +58,7 @@ class LogChange:
 
     def detectable_alone(self, square: float) -> Array:
         """Smallest change (k,) of each parameter that its own test sees, with a power of
-        CHANCE_TO_SEE (Currie 1968).
+        NEARLY_ALL (Currie 1968).
 
         square: threshold of the largest of `alone`, squared. The power is over the errors of the
         log and the model: the parameter lies by so much from the model's on the day of the log.
@@ -76,15 +76,15 @@ class LogChange:
 
 
 def _surely() -> float:
-    """Deviations beyond its limit at which a test alarms with the chance CHANCE_TO_SEE."""
-    return float(norm.ppf(CHANCE_TO_SEE))
+    """Deviations beyond its limit at which a test alarms with the chance NEARLY_ALL."""
+    return float(norm.ppf(NEARLY_ALL))
 
 
 def detectable_together(found: Change, square: float) -> Array:
     """Smallest change (k,) of one parameter that the test of all together sees, or at most that.
 
     square: its threshold. By how far the change lies from the margin's box without errors: errors
-    bring it nearer by more than a normal deviation once in 1 / (1 - CHANCE_TO_SEE) at most.
+    bring it nearer by more than a normal deviation once in 1 / (1 - NEARLY_ALL) at most.
     """
     needed = (float(np.sqrt(square)) + _surely()) ** 2
 

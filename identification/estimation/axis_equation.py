@@ -22,7 +22,8 @@ from identification.estimation.regression.weighted_rows import (
     without_each_block,
 )
 from identification.log import Log
-from identification.thresholds import EVENTS_NEEDED, SLIDES_NEEDED, WIDEST_SD
+from identification.model.estimates import NORMAL_95
+from identification.thresholds import EVENTS_NEEDED, HALF, MANY_OF_A_KIND
 
 COULOMB_LEVELS = ("F_cp", "F_cn")
 COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
@@ -66,7 +67,7 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     if not slides_enough(up, down):
         raise NotIdentifiable(
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
-            f" least {SLIDES_NEEDED} of each needed; log strokes in both directions"
+            f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
     rows, theta = _converged(one)
     used, theta, each = _discriminated(rows)
@@ -91,7 +92,7 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
 
 def slides_enough(up: int, down: int) -> bool:
     """Whether so many windows of sliding in either direction identify its friction."""
-    return min(up, down) >= SLIDES_NEEDED
+    return min(up, down) >= MANY_OF_A_KIND
 
 
 def _converged(one: MotionLog) -> tuple[Rows, Array]:
@@ -113,7 +114,7 @@ def _discriminated(rows: Rows) -> tuple[list[int], Array, Array]:
         theta = solve_rows(some).theta
         each = without_each_block(some)
         further = [k for k, column in enumerate(used) if rows.names[column] not in COULOMB_LEVELS]
-        wide = spread_of_left_out(each)[further] > WIDEST_SD * theta[further]
+        wide = NORMAL_95 * spread_of_left_out(each)[further] > HALF * theta[further]
         if not np.any(wide):  # nor below 0
             break
     return used, theta, each

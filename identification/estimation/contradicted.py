@@ -39,12 +39,7 @@ from identification.signals.steps import (
     outstanding,
     steps_between,
 )
-from identification.thresholds import (
-    BEYOND_CHANCE,
-    HOPELESS,
-    NEARLY_FOLLOWED,
-    RUN_FAULT_FROM,
-)
+from identification.thresholds import BEYOND_CHANCE, FAULT_FROM, HOPELESS
 
 CORRECTION_ROUNDS = 3  # in which a fit searches for bad samples, again without those found
 RUN_SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
@@ -131,7 +126,7 @@ def _of_log(
     gains = BEYOND_CHANCE**2 * max(1.0, misfit) ** 2
     log, found = _without_drive_spikes(_Driven(plant, one, drive, weighted), gains)
     run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
-    if run is None or misfit > NEARLY_FOLLOWED:
+    if run is None or misfit > HOPELESS:
         return log, found
     r = states(window_errors(run, one, drive))
     noisier = one.position_sd / one.noise.y
@@ -174,7 +169,7 @@ def _without_spikes(r: Array, seen: Array, noisier: Array) -> tuple[Array, BoolA
         height = deviations(seen, length)[0]
         for i in range(length):
             shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
-    off = np.abs(r - level) > RUN_FAULT_FROM * _spread(r / noisier) * noisier
+    off = np.abs(r - level) > FAULT_FROM * _spread(r / noisier) * noisier
     off &= shown > SIGNAL_SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -191,7 +186,7 @@ def _jumps(r: Array, begun: Starts) -> IntArray:
     steps = steps_between(r, RUN_SIDES, CLEAR_OF_ERRORS)
     for k in begun.at.tolist():
         steps[max(k - RUN_SIDES[0], 0) : k + RUN_SIDES[0]] = 0.0
-    least = RUN_FAULT_FROM * _spread(r) * np.linalg.norm(line_weights(RUN_SIDES[-1])[0])
+    least = FAULT_FROM * _spread(r) * np.linalg.norm(line_weights(RUN_SIDES[-1])[0])
     return np.asarray(outstanding(steps, float(least)), dtype=np.int64)
 
 
@@ -240,7 +235,7 @@ class _Driven:
         if not isinstance(actuator, Actuator):
             return 0.0
         noise = one.noise.walk / (actuator.k1 * one.log.h)
-        return RUN_FAULT_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
+        return FAULT_FROM * noise * float(np.sqrt(max(1.0, DRIFTS_OVER / one.log.h)))
 
     def by(self, x: Array) -> Log:
         """The log with this drive (n,)."""
@@ -297,7 +292,7 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
     now, before, found = x, loss(r), list[BadSamples]()
     near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
     if driven.drive == "force":  # which has noise, so that every run by it drifts off
-        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_FAULT_FROM * driven.one.noise.F)
+        tried = _candidates(x, MEASURED_SEEN_FROM, FAULT_FROM * driven.one.noise.F)
     else:
         tried = [*_candidates(x, SEEN_FROM), *_kicks(r[0], x)]
     for first, length, rough in tried:

@@ -18,7 +18,7 @@ from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
 from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
-from identification.thresholds import EVENTS_NEEDED, NOTHING_OF, WIDEST_SD
+from identification.thresholds import AS_GOOD_AS_NONE, EVENTS_NEEDED
 
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
@@ -80,7 +80,7 @@ def reported_estimate(
     low, high = interval or (value - NORMAL_95 * sd, value + NORMAL_95 * sd)
     wrong = _beyond(value, bounds)
     where = _bound_of(value, bounds, at_bound)
-    wide = not high - low <= 2.0 * NORMAL_95 * WIDEST_SD * abs(value)
+    wide = not high - low <= abs(value)
     small = sd <= SMALL_TERM * beside and low <= 0.0 <= high
     if wrong is None and (where == 0.0 or wide) and small:
         most = max(abs(low), abs(high))
@@ -142,7 +142,7 @@ def estimates(
             beside = _beside(name, value_of, events)
             found[name] = reported_estimate(
                 value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside,
-                at_bound=max(AT_ZERO, NOTHING_OF * _scale(name, events)),
+                at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
             )  # fmt: skip
     return found
 

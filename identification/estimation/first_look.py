@@ -17,7 +17,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.progress import Halt
 from identification.signals.check import check_driven
-from identification.thresholds import NEARLY_FOLLOWED
+from identification.thresholds import HOPELESS
 
 SAMPLES_RUN = 1.5e7  # of simulated runs, for which a free run is refined: some two seconds
 RUNS_OF_LAG = 1500  # of each log, with which a lag is tried, of several: a second
@@ -46,7 +46,7 @@ def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> Fir
     beside = what_acts_beside(logs, rig, each=lambda: _ending(RUNS_OF_LAG * len(logs)))
     rng, halt = np.random.default_rng(FIRST_FIT_SEED), _ending(runs)
     fit = fit_beside(logs, beside, rng, rig, drive, None, halt, quick=True)
-    near = not (fit.imposed or fit.adequate) and fit.chi_square <= NEARLY_FOLLOWED
+    near = not (fit.imposed or fit.adequate) and fit.chi_square <= HOPELESS
     return FirstLook(fit, halt.reached() and near)
 
 

@@ -64,13 +64,11 @@ from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_driven
 from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
-    ACTUATOR_SHARE,
+    AS_GOOD_AS_NONE,
     COMPLETE,
     HOPELESS,
     MATERIAL,
-    NEARLY_FOLLOWED,
     PLACES_EXCLUDED,
-    SHARE_EXCLUDED,
     WORSE,
 )
 
@@ -275,7 +273,7 @@ def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
     lengths = {one.log.name: len(one.log) for one in logs}
     return all(
         len(found) <= PLACES_EXCLUDED
-        and sum(found) <= max(PLACES_EXCLUDED, SHARE_EXCLUDED * lengths.get(name, 0))
+        and sum(found) <= max(PLACES_EXCLUDED, AS_GOOD_AS_NONE * lengths.get(name, 0))
         for name, found in by_log.items()
     )
 
@@ -438,4 +436,4 @@ def leaves_much(of_force: float, of_noise: float) -> bool:
 
     of_force, of_noise: root mean square that it leaves, over the force's own and the sensors'.
     """
-    return of_force > ACTUATOR_SHARE and of_noise**2 > NEARLY_FOLLOWED
+    return of_force > MATERIAL and of_noise**2 > HOPELESS

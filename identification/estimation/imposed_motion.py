@@ -44,7 +44,7 @@ from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAM
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
-from identification.thresholds import HALF_LEFT
+from identification.thresholds import HALF
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
@@ -131,7 +131,7 @@ def _made(
 
 def is_unexplained(share: float) -> bool:
     """Whether a model leaves so much of the force that none of its numbers holds."""
-    return share > HALF_LEFT
+    return share > HALF
 
 
 def without_estimates(fit: KarnoppFit, share: float) -> KarnoppFit:

@@ -30,7 +30,7 @@ from identification.log import Log
 from identification.model.plant import Plant
 from identification.signals.kalman import Chain, N, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
-from identification.thresholds import NOTHING_OF
+from identification.thresholds import AS_GOOD_AS_NONE
 
 MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
 FEWEST_IN_MEMORY = 5  # samples of tau, below which d would pass for the sensor's noise
@@ -85,7 +85,7 @@ class LatentForces:
 
 def rubs(level: float, left: float) -> bool:
     """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
-    return level > NOTHING_OF * left
+    return level > AS_GOOD_AS_NONE * left
 
 
 @dataclass(frozen=True, eq=False)

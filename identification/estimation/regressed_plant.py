@@ -16,7 +16,7 @@ from identification.estimation.regression.standstill import borne
 from identification.estimation.regression.weighted_rows import OVERLAP
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.thresholds import INERT
+from identification.thresholds import TWICE
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
@@ -119,7 +119,7 @@ def inertia_is_lost(o: RowFit) -> bool:
     keep = o.rows.speed >= o.slowest
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
-    return inertia < INERT * left
+    return inertia < TWICE * left
 
 
 def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:

@@ -40,7 +40,7 @@ from identification.model.surroundings import (
     Order,
     Surroundings,
 )
-from identification.thresholds import BEYOND_CHANCE, BEYOND_FRICTION, EARNS, HALF_LEFT, LAG_FROM
+from identification.thresholds import BEYOND_CHANCE, EARNS, FAR_LESS, HALF, MATERIAL
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LEAD, LAG = -6.0, 12.0  # samples, between which they are
@@ -269,7 +269,7 @@ def explains(without: float, left: float) -> bool:
 def explains_most(without: float, left: float) -> bool:
     """Whether a lag that leaves this of a square, in place of that without it, is no noise of a
     loop, which explains less."""
-    return left <= HALF_LEFT * without
+    return left <= HALF * without
 
 
 def stands_out(size: float, sd: float) -> bool:
@@ -279,12 +279,12 @@ def stands_out(size: float, sd: float) -> bool:
 
 def larger_than_friction(up: float, down: float) -> bool:
     """Whether a constant force makes one of the Coulomb levels negative, which friction cannot."""
-    return min(up, down) < -BEYOND_FRICTION * max(abs(up), abs(down))
+    return min(up, down) < -MATERIAL * max(abs(up), abs(down))
 
 
 def apart(lag: float) -> bool:
     """Whether columns so many samples apart are of two instants."""
-    return abs(lag) >= LAG_FROM
+    return abs(lag) >= FAR_LESS
 
 
 def _lag(found: _Squares, used: Sequence[int]) -> Size:

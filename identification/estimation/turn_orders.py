@@ -28,7 +28,7 @@ from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Order, Surroundings
 from identification.signals.weak_form import WeakWindows, sliding_windows
-from identification.thresholds import BEYOND_CHANCE, EARNS, HALF_LEFT, ORDERS_FROM
+from identification.thresholds import BEYOND_CHANCE, EARNS, HALF
 
 HIGHEST = 100  # order that the windows are made short enough for
 MOST_ORDERS = 8
@@ -123,7 +123,7 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
 
 def are_most(without: float, left: float) -> bool:
     """Whether orders that leave this of a square are most of what is left without them."""
-    return left <= HALF_LEFT * without
+    return left <= HALF * without
 
 
 def is_significant(size: float, sd: float) -> bool:
@@ -133,7 +133,7 @@ def is_significant(size: float, sd: float) -> bool:
 
 def turns(angle: float) -> bool:
     """Whether motion over an angle [rad] separates neighbouring orders."""
-    return angle >= ORDERS_FROM * 2.0 * np.pi
+    return angle >= HALF * 2.0 * np.pi
 
 
 def _chosen(found: _Turning) -> tuple[int, ...]:

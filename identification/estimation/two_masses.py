@@ -30,7 +30,7 @@ from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
-from identification.thresholds import AS_WELL, BEYOND_CHANCE, FAR_LESS
+from identification.thresholds import BEYOND_CHANCE, FAR_LESS, WORSE
 
 RUN_SECONDS = 0.5  # s
 LEAST_CYCLES = 2.0  # of the resonance in a window
@@ -91,7 +91,7 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
 
 def shows_a_load(resonance: float, anti_resonance: float) -> bool:
     """Whether a resonance lies so far above its anti-resonance that a second mass shows."""
-    return resonance > AS_WELL * anti_resonance
+    return resonance > WORSE * anti_resonance
 
 
 def are_two(one_body: float, left: float) -> bool:

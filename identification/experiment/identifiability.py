@@ -24,7 +24,7 @@ from identification.experiment.structures import discriminated, sought
 from identification.model.estimates import NORMAL_95
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.thresholds import GATE_MARGIN, WIDEST_SD
+from identification.thresholds import GATE_MARGIN, HALF
 
 # Half intervals over the value, below which nothing is promised: what a fit gives that loses a
 # stop, where an actuator's command brings the run back to the log, and where nothing does
@@ -47,7 +47,7 @@ class Tellable:
     @property
     def can(self) -> bool:
         """Whether an estimate of it would be given."""
-        return self.within <= NORMAL_95 * WIDEST_SD
+        return self.within <= HALF
 
 
 def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:

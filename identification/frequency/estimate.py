@@ -28,13 +28,7 @@ from scipy.stats import t as student
 
 from identification.arrays import Array, BoolArray
 from identification.frequency.stretches import INDEPENDENT, REACHES, Band, ComplexArray
-from identification.thresholds import (
-    APART_SHARE,
-    CHANCE_LEVEL,
-    COHERENCE_SEEN,
-    COHERENCE_SURE,
-    EVENTS_NEEDED,
-)
+from identification.thresholds import CHANCE_LEVEL, COHERENCE_SURE, EVENTS_NEEDED, HALF, MATERIAL
 
 DEGREE = 2  # of a response over its neighbours
 RIDGE = 1e-12  # of the diagonal, that keeps what is all but singular from being so
@@ -83,7 +77,7 @@ class Response:
         free = np.maximum(self.averages - 1.0, 1e-9)
         luck = 1.0 - CHANCE_LEVEL ** (1.0 / free)
         enough = self.averages >= EVENTS_NEEDED
-        return np.asarray(enough & (self.coherence >= np.maximum(COHERENCE_SEEN, luck)))
+        return np.asarray(enough & (self.coherence >= np.maximum(HALF, luck)))
 
     @property
     def sure(self) -> BoolArray:
@@ -196,7 +190,7 @@ def responses_with_reach(
 
 def is_apart(alone: Array, power: Array) -> BoolArray:
     """Whether an input makes enough of its power by itself, (k,)."""
-    return np.asarray(alone > APART_SHARE * power)
+    return np.asarray(alone > MATERIAL * power)
 
 
 def joined(parts: Sequence[Response]) -> Response:

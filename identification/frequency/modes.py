@@ -22,7 +22,7 @@ from identification.frequency.estimate import Response
 from identification.frequency.stretches import ComplexArray
 from identification.model.estimates import NORMAL_95
 from identification.model.size import Size
-from identification.thresholds import EVENTS_NEEDED, PENALTY, STANDS_OUT
+from identification.thresholds import EVENTS_NEEDED, HALF, PENALTY
 
 MOST_MODES = 4
 HERTZ_BEGUN = 48  # frequencies with which a mode's search begins
@@ -188,12 +188,12 @@ def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
 
 def is_large(own: float, rest: float) -> bool:
     """Whether what a mode adds stands out of the rest of the response."""
-    return bool(own > STANDS_OUT * rest)
+    return bool(own > HALF * rest)
 
 
 def is_deep(left: float, rigid: float) -> bool:
     """Whether an anti-resonance leaves little of the rigid body's response."""
-    return bool(left < (1.0 - STANDS_OUT) * rigid)
+    return bool(left < HALF * rigid)
 
 
 def is_sharp(one: Peak) -> bool:

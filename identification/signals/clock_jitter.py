@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.differentiate import resolution
-from identification.thresholds import JITTER_FROM
+from identification.thresholds import HALF
 
 DIFFERENCES, OF_WHITE = (
     5,
@@ -59,4 +59,4 @@ def position_noise(y: Array, v: Array) -> PositionNoise | None:
 
 def jitters(ratio: float) -> bool:
     """Whether a clock's noise in fast motion, over that of the sensor, is to be reckoned with."""
-    return ratio > JITTER_FROM
+    return ratio > HALF

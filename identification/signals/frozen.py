@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from identification.arrays import Array
 from identification.signals.differentiate import resolution
 from identification.signals.steps import block_noise
-from identification.thresholds import FROZEN_RUN
+from identification.thresholds import MANY_OF_A_KIND
 
 REPEATS_ELSEWHERE = 1e-3  # share of repeats outside such stretches, below which they are a fault
 MOST_FROZEN = 0.05  # share of a log that may be frozen; more is the sensor's own way
@@ -50,7 +50,7 @@ def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
     same = np.concatenate([[False], np.diff(x) == 0.0, [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     low, high = edges[0::2], edges[1::2] + 1  # samples low to high - 1 are equal
-    long = high - low >= FROZEN_RUN
+    long = high - low >= MANY_OF_A_KIND
     if not np.any(long):
         return out
     repeats = int(np.sum((high - low - 1)[~long]))

@@ -21,7 +21,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
-from identification.thresholds import CARRIED, EARNS
+from identification.thresholds import EARNS, TWICE
 from identification.tracing.result import Change
 
 BEGIN = 0.25  # of a test log, on which the levels are fitted
@@ -64,7 +64,7 @@ def levels_refitted(
 
 def follows_worse(error: float, usual: float) -> bool:
     """Whether a run is off by more than it usually is."""
-    return error > CARRIED * usual
+    return error > TWICE * usual
 
 
 def explains_the_change(was: float, now: float, usual: float) -> bool:

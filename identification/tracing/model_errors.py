@@ -14,12 +14,10 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL
+from identification.thresholds import ADEQUATE, AS_GOOD_AS_NONE, ASTRAY, MATERIAL
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
-
-OFF = 1e-3  # of the position's spread, an error of account
 
 
 def errors_of(
@@ -128,7 +126,7 @@ def lacks(model: FittedStructure, errors: Errors, noise: NoiseFloor) -> bool:
     none, more force than noise leaves, and more than a trifle of the Coulomb level.
     """
     if not model.imposed:
-        return model.misfit > ADEQUATE and off(model) > OFF
+        return model.misfit > ADEQUATE and off(model) > AS_GOOD_AS_NONE
     force, p = errors.force_rms, model.plant.friction
     if force is None or force**2 <= ADEQUATE * noise.force_rms**2:
         return False

@@ -23,7 +23,7 @@ from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt
-from identification.thresholds import SPEEDS_APART, WORSE
+from identification.thresholds import FOURFOLD, WORSE
 from identification.tracing.regression.candidates import best_of
 from identification.tracing.remaining_structure import FEWEST_ROWS
 
@@ -139,11 +139,11 @@ def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library,
     of_speed = [
         k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= OF_SPEED
     ]
-    if ratio >= SPEEDS_APART or not of_speed:
+    if ratio >= FOURFOLD or not of_speed:
         return library, ()
     said = (
         f"the speeds of each direction are too similar (a factor of {ratio:.2g} at most,"
-        f" {SPEEDS_APART:g} needed) to identify friction that depends on speed alone:"
+        f" {FOURFOLD:g} needed) to identify friction that depends on speed alone:"
         f" {', '.join(of_speed)} not tried; add runs at other speeds"
     )
     return {key: effect for key, effect in library.items() if key not in of_speed}, (said,)

@@ -15,7 +15,7 @@ from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import ASTRAY, EARNS, SHARE_LEFT
+from identification.thresholds import ASTRAY, EARNS, MATERIAL
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     equations_explained,
@@ -137,7 +137,7 @@ def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> 
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
     lacked = any(mean_square(choice.first[e]) > ASTRAY for e in told)
     if lacked and all(
-        mean_square(choice.base[e]) <= max(ASTRAY, SHARE_LEFT * mean_square(choice.first[e]))
+        mean_square(choice.base[e]) <= max(ASTRAY, MATERIAL * mean_square(choice.first[e]))
         for e in told
     ):
         return False

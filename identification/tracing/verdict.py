@@ -17,7 +17,7 @@ from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
-from identification.thresholds import HALF_LEFT, ROUGH_LEFT
+from identification.thresholds import HALF, OF_ACCOUNT
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
@@ -67,13 +67,13 @@ def verdict_of(choice: Choice, drift: Sequence[Change]) -> TraceVerdict:
 
 def is_headline(share: float) -> bool:
     """Whether effects that leave this share of what was missing are told first."""
-    return share <= HALF_LEFT
+    return share <= HALF
 
 
 def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]:
     """Effects whose own signals tell of what is left (`share` of what was missing): their law is
     not the machine's."""
-    if share * left.explained <= ROUGH_LEFT:
+    if share * left.explained <= OF_ACCOUNT:
         return ()
     return tuple(
         step.candidate.effect.key

@@ -26,7 +26,7 @@ NO_NUMBERS = {
 ENOUGH = {
     "CURVE_ROWS", "FEWEST_COMPARED", "FEWEST_OF_DIRECTION", "FEWEST_ROWS", "FEWEST_RUNS",
     "FEWEST_SAMPLES", "FEWEST_WINDOWS", "FEWEST_WINDOWS_OF_A_TURN", "FEW_VALUES", "GRID_PLACES",
-    "LEAST_SD", "LEAST_SUMS", "LONGEST_SMALL", "MANY_ROWS", "NORMAL_95", "OF_EQUATION",
+    "LEAST_SD", "LEAST_SUMS", "LONGEST_SMALL", "MANY_ROWS", "OF_EQUATION",
     "OUTLYING_ROW", "ROWS_IN_PERIOD", "RUN_SIDES", "SLIDES", "SLIDING_SAMPLES", "SWINGS",
 }  # fmt: skip
 # Where a search begins, what it tries and when it ends.
@@ -37,7 +37,7 @@ STEER = {
 # What still decides outside of `thresholds`.
 ELSEWHERE = {
     "BENT", "BRAKES", "BY_CHANCE", "CLEARLY", "INERTIA_SHARE", "KICK_FROM", "KICK_GAINS",
-    "MOST_EXPLAINED", "MOST_SPIKES", "MOTION_SHARE", "OFF", "RIGID_CONTACT",
+    "MOST_EXPLAINED", "MOST_SPIKES", "MOTION_SHARE", "RIGID_CONTACT",
     "SECOND_SIGNAL", "SHIFT", "SIGNAL_SHOWN", "SMALL_TERM",
 }  # fmt: skip
 LITERALS = {0.5, 1e-300, 3, 4, 50}  # halves, rows of a statistic, and what is not to be divided by

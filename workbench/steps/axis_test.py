@@ -19,7 +19,7 @@ from identification.estimation.surroundings import surroundings
 from identification.model.estimates import Estimate
 from identification.model.surroundings import Surroundings
 from identification.signals.check import check_driven
-from identification.thresholds import HALF_LEFT
+from identification.thresholds import HALF
 from workbench.cards.card_tables import limit_units
 from workbench.cards.readable import number, shown_unit
 from workbench.logs.sources import Source, Sources
@@ -172,7 +172,7 @@ def estimates_of(
     for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
         if name not in found.values:
             out[name] = Estimate(None, units[name], reason=_why_not(name, found))
-        elif found.relative > HALF_LEFT:
+        elif found.relative > HALF:
             out[name] = Estimate(None, units[name], reason=unheld)
         else:
             out[name] = reported_estimate(
@@ -181,7 +181,7 @@ def estimates_of(
     value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
     half = float(norm.ppf(0.975)) * sd
     constant = Estimate(value, units["constant_force"], sd, value - half, value + half)
-    if found.relative > HALF_LEFT or not half < scale:
+    if found.relative > HALF or not half < scale:
         constant = Estimate(None, units["constant_force"], reason=unheld)
     out["constant_force"] = constant
     out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)

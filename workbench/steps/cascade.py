@@ -17,7 +17,7 @@ from design.tune import Goals
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.model.plant import Motor
-from identification.thresholds import LAG_FROM
+from identification.thresholds import FAR_LESS
 from workbench.cards.readable import number
 from workbench.documents.design import Controller, Design, Linear, Recommended, margin_values
 from workbench.documents.drive import ForceLoop
@@ -59,7 +59,7 @@ def unseen_lag(model: Model) -> float:
     log to show it [s]: a part of its samples, and of a force that is logged without the command
     behind it what a drive takes to make one."""
     delay_known = model.lag is not None or "input_delay" in model.effects
-    sampled = 0.0 if delay_known else LAG_FROM * model.period
+    sampled = 0.0 if delay_known else FAR_LESS * model.period
     return sampled + (FORCE_LAG if model.simulated.actuator is None else 0.0)
 
 

@@ -14,7 +14,7 @@ from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import Rows, left_unseen, stacked
 from identification.model.estimates import NORMAL_95
-from identification.thresholds import AS_WELL
+from identification.thresholds import WORSE
 
 # Columns of viscous friction that may stand beside the others
 SPEED_COLUMNS = ((), (3,), (4,), (3, 4))
@@ -63,7 +63,7 @@ def _may_be(fit: ForceFit) -> bool:
 
 def predicts_as_much(left: float, least: float) -> bool:
     """Whether fewer columns, which leave this of a force that they have not seen, will do."""
-    return left <= AS_WELL * least
+    return left <= WORSE * least
 
 
 def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:

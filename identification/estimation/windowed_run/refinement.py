@@ -51,7 +51,7 @@ from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halted
 from identification.simulation.effect_table import LONGEST_BRISTLE
-from identification.thresholds import ADEQUATE, COMPLETE, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, COMPLETE, HOPELESS
 
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
 # where a stop comes late, no more than its own window is lost, so the minimum is wide.
@@ -246,7 +246,7 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
     at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bias what the equations give.
-    hopeless = effort == "rough" and at.mean > NEARLY_FOLLOWED
+    hopeless = effort == "rough" and at.mean > HOPELESS
     rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
     longest = longest_window(plant)

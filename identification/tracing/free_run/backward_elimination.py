@@ -18,14 +18,7 @@ from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halt
-from identification.thresholds import (
-    ADEQUATE,
-    ALONE,
-    ASTRAY,
-    COMPLETE,
-    EARNS,
-    NEARLY_FOLLOWED,
-)
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, EARNS, HOPELESS, OF_ACCOUNT
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
@@ -66,7 +59,7 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
     if not steps:
         return ADEQUATE
     least = ADEQUATE if setting.drive == "command" else ASTRAY
-    return max(least, 1.0 + ALONE * (setting.plain.misfit - 1.0))
+    return max(least, 1.0 + OF_ACCOUNT * (setting.plain.misfit - 1.0))
 
 
 def seconds(setting: Setting) -> float:
@@ -140,7 +133,7 @@ def earned(before: float) -> float:
 def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
-        return min(enough(setting, choice.steps), NEARLY_FOLLOWED)
+        return min(enough(setting, choice.steps), HOPELESS)
     bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
     return ADEQUATE if bristle or setting.drive == "force" else COMPLETE
 

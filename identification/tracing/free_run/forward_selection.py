@@ -24,7 +24,7 @@ from identification.estimation.windowed_run.refinement import Refit
 from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, ALONE, ASTRAY, COMPLETE, HALF_LEFT, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HALF, HOPELESS, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     earned,
@@ -83,7 +83,7 @@ def hidden(choice: Choice) -> bool:
     """
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
     return equations_explained(choice.base) or any(
-        mean_square(one.outcomes[e]) < HALF_LEFT * mean_square(choice.base[e])
+        mean_square(one.outcomes[e]) < HALF * mean_square(choice.base[e])
         for one in choice.tried
         for e in told
         if e in one.outcomes
@@ -164,8 +164,8 @@ def decisive(before: float, others: Sequence[RunContender]) -> float:
     rival = min((one.misfit for one in others), default=before)
     least = min(before, rival)
     return max(
-        min(ADEQUATE, 1.0 + HALF_LEFT * (before - 1.0)),
-        min(NEARLY_FOLLOWED, 1.0 + ALONE * (least - 1.0)),
+        min(ADEQUATE, 1.0 + HALF * (before - 1.0)),
+        min(HOPELESS, 1.0 + OF_ACCOUNT * (least - 1.0)),
     )
 
 

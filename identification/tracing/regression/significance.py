@@ -7,7 +7,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit
-from identification.thresholds import CHANCE_LEVEL, SEARCHED
+from identification.thresholds import CHANCE_LEVEL, TWICE
 from identification.tracing.regression.candidates import EffectCandidate
 
 DRAWS = 200  # of the null hypothesis
@@ -56,7 +56,7 @@ def chance(
             P = np.linalg.qr(own)[0]
             gains = np.maximum(gains, np.sum((P.T @ noise) ** 2, axis=0))
         largest += gains / stage.scale(equation)
-    return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
+    return float((1 + np.sum(TWICE * largest >= best.gain)) / (DRAWS + 1))
 
 
 def by_luck(p_value: float) -> bool:

@@ -34,7 +34,7 @@ from identification.estimation.regression.signals_behind_effects import (
     shown_to_true,
 )
 from identification.progress import Halted, Progress
-from identification.thresholds import EARNS, FAR_LESS, HALF_LEFT, MATERIAL, PENALTY, WORSE
+from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
 from identification.tracing.regression.candidates import EffectCandidate, best_of
 from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import by_luck, chance
@@ -170,7 +170,7 @@ def trusted(
 def is_trusted(left: float, explained: float) -> bool:
     """Whether an effect carries over, or explains most; left: share of the error on logs left out,
     explained: of what is missing. Ours: `../README.md`, (5)."""
-    return left * WORSE < 1.0 or explained >= HALF_LEFT
+    return left * WORSE < 1.0 or explained >= HALF
 
 
 def _report(report: Progress, turn: int, part: float) -> None:

@@ -11,7 +11,7 @@ from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.windows import freed, starts
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.thresholds import RUN_FAULT_FROM
+from identification.thresholds import FAULT_FROM
 
 
 @pytest.mark.method
@@ -48,6 +48,6 @@ def test_what_an_actuators_noisy_command_adds_up_to_is_no_bad_sample() -> None:
         return _Driven(plant, one, "command", states).usual
 
     noise = 0.2 / (2000.0 * one.log.h)  # of one sample of the command [V]
-    expected = RUN_FAULT_FROM * noise * np.sqrt(DRIFTS_OVER / one.log.h)
+    expected = FAULT_FROM * noise * np.sqrt(DRIFTS_OVER / one.log.h)
     assert usual(Actuator(2000.0, 100.0)) == pytest.approx(expected)
     assert usual(Motor(30.0)) == 0.0

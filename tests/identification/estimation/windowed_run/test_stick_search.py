@@ -8,7 +8,7 @@ import pytest
 from identification.estimation.windowed_run.refinement import refit
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.stick_search import stick_search
-from identification.thresholds import COMPLETE, NEARLY_FOLLOWED
+from identification.thresholds import COMPLETE, HOPELESS
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 COGGING = {"cogging": {"a": 1.5, "b": 0.0, "period": 0.012}}
@@ -20,7 +20,7 @@ WRONG = replace(NINE, dv_p=0.0006, dv_n=-0.03, F_sp=2.3 * NINE.F_cp, F_sn=-1.02 
 def test_stops_are_found_from_anywhere(effects: dict[str, dict[str, float]] | None) -> None:
     true, one = plant(effects), seen(made(4, effects))
     wrong = replace(true, friction=WRONG)
-    assert misfit(wrong, [one], "command") > NEARLY_FOLLOWED
+    assert misfit(wrong, [one], "command") > HOPELESS
     found = stick_search(wrong, [one], "command", np.random.default_rng(0))
     p = found.friction
     assert (p.F_sp, p.F_sn) == pytest.approx((NINE.F_sp, NINE.F_sn), rel=0.02)

@@ -122,7 +122,7 @@ def test_what_is_decisive() -> None:
         effect = built_in()["spring"]
         return [RunContender((), effect, plant(), m) for m in misfits]
 
-    assert decisive(100.0, others(90.0)) == pytest.approx(8.0)  # far less than any other
+    assert decisive(100.0, others(90.0)) == pytest.approx(9.9)  # far less than any other
     assert decisive(20.0, others(3.0)) == pytest.approx(1.5)  # another does nearly as well
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
 
