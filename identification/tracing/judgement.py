@@ -13,6 +13,8 @@ from identification.thresholds import ASTRAY
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import (
+    NoiseFloor,
+    OnTest,
     errors_of,
     lacks,
     noise_floor,
@@ -28,7 +30,7 @@ from identification.tracing.remaining_structure import (
 )
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
 from identification.tracing.structure_search import Refinement, Selection, without_effects
-from identification.tracing.verdict import is_headline, other_law, verdict_of
+from identification.tracing.verdict import explains_most, other_law, verdict_of
 
 NOTHING = Dependence((), 0.0)
 
@@ -47,45 +49,77 @@ class Judgement:
     rest: Left
 
 
-def judgement(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
-) -> Judgement:
-    """What is to be said of a refined structure; seen: the test logs, recorded as the others."""
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """What the plain model and the refined one leave of the test logs, and of the training logs.
+
+    now: what the refined one leaves of the test logs; share: of what was missing there, that is
+    left; changed: parameters; lacking: whether something of account is missing on the training
+    logs.
+    """
+
+    before: Mapping[str, Errors]
+    after: Mapping[str, Errors]
+    now: OnTest
+    noise: NoiseFloor
+    share: float
+    changed: tuple[Change, ...]
+    lacking: bool
+
+    @property
+    def proved(self) -> bool:
+        """Whether what was found explains most of what was missing; a machine that changed beside
+        leaves more, but no more than before."""
+        beside = bool(self.changed) and self.share < 1.0 and not self.lacking
+        return explains_most(self.share) or beside
+
+
+def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig) -> HeldOut:
+    """What a refined structure leaves; seen: the test logs, recorded as the others."""
     rows, plain = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
-    changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
-    slowest = choice.base[MECHANICAL].slowest
+    slowest, unseen = choice.base[MECHANICAL].slowest, seen or logs
     errors_before = errors_of(plain, slowest, (), logs, seen, rows.drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, rows.drive)
     noise = noise_floor(choice.base)
-    unseen = seen or logs
     was = on_test(plain, errors_before["test"], unseen, rows.drive)
     now = was if after is plain else on_test(after, errors_after["test"], unseen, rows.drive)
-    share = share_left(was, now, noise)
-    lacking = lacks(after, errors_after["train"], noise)
-    left = _left(choice, after, chosen) if lacking else NOTHING
-    of_other_law = other_law(choice, left, share)
-    # A machine that changed beside leaves more on the test logs, but no more than before.
-    most = is_headline(share) or (bool(changed) and share < 1.0 and not lacking)
-    doubts: tuple[str, ...] = () if most or not choice.steps else (UNDER_HALF,)
-    known = most and not of_other_law if choice.steps else not lacking
+    changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
+    return HeldOut(
+        errors_before, errors_after, now, noise, share_left(was, now, noise), tuple(changed),
+        lacks(after, errors_after["train"], noise),
+    )  # fmt: skip
+
+
+def judgement(
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
+) -> Judgement:
+    """What is to be said of a refined structure whose effects, if any, are proved by the held-out
+    logs `seen`."""
+    rows, plain = chosen.plain.rows, chosen.plain.model
+    choice, after, logs = found.choice, found.model, list(rows.logs)
+    held = held_out(chosen, found, seen, rig)
+    changed = held.changed
+    left = _left(choice, after, chosen) if held.lacking else NOTHING
+    of_other_law = other_law(choice, left, held.share)
+    known = not of_other_law if choice.steps else not held.lacking
     verdict = verdict_of(choice, changed) if known else "unknown"
-    left = left if known or lacking else _left(choice, after, chosen)
+    doubts: tuple[str, ...] = ()
     if verdict == "unknown" and seen and not choice.steps and not after.imposed:
         told = plain.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
-        doubts = (*doubts, how) if levels else doubts
+        doubts = (how,) if levels else ()
     said = (
         *_remarks(choice, after, left, logs, seen, rig),
         *doubts,
         *map(_not_its_law, of_other_law),
     )
-    complete = verdict != "unknown" and predicted(now, noise)
+    complete = verdict != "unknown" and predicted(held.now, held.noise)
     return Judgement(
-        verdict, errors_before, errors_after,
-        left if verdict == "unknown" else NOTHING, tuple(changed), said,
-        complete=complete, rest=Left(0.0 if complete else share, left.depends_on),
+        verdict, held.before, held.after,
+        left if verdict == "unknown" else NOTHING, changed, said,
+        complete=complete, rest=Left(0.0 if complete else held.share, left.depends_on),
     )  # fmt: skip
 
 
@@ -101,9 +135,6 @@ def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependen
     if choice.steps and not left.depends_on:
         left = remaining_structure(without_effects(plain, choice), plain.model)
     return left
-
-
-UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
 
 
 def _remarks(

@@ -8,14 +8,13 @@ from identification.estimation.fit import by_equation_if_surer, finished
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
-from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import ASTRAY, EARNS, MATERIAL
+from identification.thresholds import ASTRAY
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     equations_explained,
@@ -102,8 +101,6 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
         choice, model = fewest(choice, setting)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    if not setting.halt.reached() and useless(choice, plain, model):
-        choice, model = without_effects(chosen.plain, choice), plain
     return Refinement(discriminated(choice, model, setting), by_equations(choice, model, setting))
 
 
@@ -123,25 +120,6 @@ def without_effects(plain: PlainModel, choice: Choice) -> Choice:
     """The choice of no effect; those tried are remembered."""
     start, first = plain.start, plain.first
     return Choice(start, first, (), start, first, choice.tried)
-
-
-def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> bool:
-    """Whether effects explain neither the run nor, to the sensors' noise, the equations.
-
-    Where no effect of the library is the right one, the nearest stands in for it: it lowers what
-    the equations leave (though not to a hundredth), bends the other parameters, and hides on what
-    the rest depends.
-    """
-    if after.imposed or not choice.steps:
-        return False
-    told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    lacked = any(mean_square(choice.first[e]) > ASTRAY for e in told)
-    if lacked and all(
-        mean_square(choice.base[e]) <= max(ASTRAY, MATERIAL * mean_square(choice.first[e]))
-        for e in told
-    ):
-        return False
-    return after.misfit - 1.0 > EARNS * max(before.misfit - 1.0, 0.0)
 
 
 def settled_plain(

@@ -26,8 +26,8 @@ from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
-from identification.tracing.judgement import Judgement, judgement
-from identification.tracing.model_errors import errors_of, row_noise
+from identification.tracing.judgement import Judgement, held_out, judgement
+from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
@@ -125,7 +125,7 @@ def _traced(
     found = refinement(chosen, report)
     with halt.closing():
         seen = [chosen.plain.rows.recorded.given(log) for log in test]
-        found, doubt = _proved(chosen, found, seen)
+        found, doubt = _proved(chosen, found, seen, rig)
     report("settling", 0.0)
     chosen, found = settled_plain(chosen, found, settle, report)
     report("telling", 0.0)
@@ -142,46 +142,34 @@ def _slides(log: Log, rig: Rig) -> bool:
 
 
 def _proved(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
 ) -> tuple[Refinement, str]:
-    """The refinement, or the plain model where that predicts the held-out position better; and
-    what to say of it."""
+    """The refinement, or the plain model where its effects do not explain most of what was missing
+    on the held-out logs, or predict their position worse; and what to say of it."""
     plain, after = chosen.plain.model, found.model
-    if not (seen and found.choice.steps):
+    if not found.choice.steps:
         return found, ""
-    if plain.imposed or after.imposed:
-        return _proved_by_force(chosen, found, seen)
+    if not held_out(chosen, found, seen, rig).proved:
+        return _unproved(
+            chosen, found, "more than half of what was missing on the test logs is left"
+        )
+    if not seen or plain.imposed or after.imposed:
+        return found, ""
     worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
     if worse is None:
         return found, ""
     return _unproved(
         chosen, found,
-        f"position of the test logs is predicted worse over {worse.seconds:g} s"
+        f"the position of the test logs is predicted worse over {worse.seconds:g} s"
         f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)",
     )  # fmt: skip
-
-
-def _proved_by_force(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
-) -> tuple[Refinement, str]:
-    """As `_proved` where a rig leads the body, whose force alone is predicted."""
-    choice, rows = found.choice, chosen.plain.rows
-    slowest, logs = choice.base[MECHANICAL].slowest, list(rows.logs)
-    was, now = (
-        errors_of(model, slowest, steps, logs, seen, rows.drive)["test"].force_rms
-        for model, steps in ((chosen.plain.model, ()), (found.model, choice.steps))
-    )
-    if was is None or now is None or now < was:
-        return found, ""
-    said = f"force of the test logs is predicted no better ({was:.3g} -> {now:.3g})"
-    return _unproved(chosen, found, said)
 
 
 def _unproved(chosen: Selection, found: Refinement, said: str) -> tuple[Refinement, str]:
     """The plain model in place of effects that do not carry over, and what to say of it."""
     names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
     plain = Refinement(without_effects(chosen.plain, found.choice), chosen.plain.model)
-    return plain, f"the equations call for {names}, but with it the {said}: not named"
+    return plain, f"the equations call for {names}, but with it {said}: not named"
 
 
 def _chosen(

@@ -65,8 +65,8 @@ def verdict_of(choice: Choice, drift: Sequence[Change]) -> TraceVerdict:
     return "drift" if drift else "none"
 
 
-def is_headline(share: float) -> bool:
-    """Whether effects that leave this share of what was missing are told first."""
+def explains_most(share: float) -> bool:
+    """Whether effects that leave this share of what was missing explain most of it."""
     return share <= HALF
 
 
