@@ -13,25 +13,24 @@ width that of the errors.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
-from identification.compiled import compiled_fast
+from identification.arrays import Array
 from identification.errors import BadModel
 from identification.estimation.gauss_newton import smooth_jacobian
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.likely_square import LikelyLog
 from identification.estimation.windowed_run.parameters import (
+    kernel_rows,
     on_bristle,
     plant_with,
     units_in,
     values_of,
 )
 from identification.estimation.windowed_run.refinement import longest_window
-from identification.estimation.windowed_run.run_errors import (
-    NOISE_LOSS,
-    ROBUST_FROM,
-)
+from identification.estimation.windowed_run.run_errors import NOISE_LOSS
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     Freed,
@@ -43,12 +42,12 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
+from identification.simulation.karnopp_lanes import WIDTH
 from identification.thresholds import ADEQUATE
 
 # Of the robust square, for normal noise: the mean curvature of its half, and how much narrower than
 # the errors of its minimum it is itself (curvature over mean square slope), which is made up for.
 CURVATURE, AS_NOISE = 0.7761, 1.2523
-TOGETHER = 8  # factors of which one logarithm is taken
 REACH = 5.0  # times its value, and the largest force of friction, how far a parameter may lie
 LEAST_OF = 0.2  # of its value, that a mass, a band or an actuator's gain has at least
 SCALES = ("m", "dv_p", "dv_n", "k1", "k2")
@@ -100,7 +99,7 @@ class LikelyWindows:
             if walking:
                 factor, stretch = posed.stretched(covariance)
                 return replace(posed, factor=factor, stretch=stretch)
-            left = posed.square(plant) / posed.count / NOISE_LOSS
+            left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS
             if left <= ADEQUATE:
                 return replace(posed, factor=AS_NOISE / left, whole=seconds > RUN_WINDOW)
             # What the model lacks is correlated over a window.
@@ -120,6 +119,12 @@ class LikelyWindows:
         """The plant's own values (d,)."""
         return values_of(self.plant, self.names)
 
+    @cached_property
+    def likely(self) -> tuple[LikelyLog, ...]:
+        """The logs as the kernel of the likelihood takes them."""
+        pairs = zip(self.logs, self.found, strict=True)
+        return tuple(LikelyLog.of(self.plant, one, self.drive, own) for one, own in pairs)
+
     def cost(self, members: Array) -> Array:
         """Minus twice the log likelihood of members (k, d), (k,); infinite outside the bounds.
 
@@ -131,20 +136,35 @@ class LikelyWindows:
             at = self.center + (members - self.center) @ self.stretch.T
             inside &= np.all((at >= self.low) & (at <= self.high), axis=1)
         out = np.full(len(members), np.inf)
-        for i in np.flatnonzero(inside):
-            out[i] = self.square(plant_with(self.plant, self.names, at[i]))
+        out[inside] = self.squares(at[inside])
         return self.granted * np.log(out / self.count) if self.granted else self.factor * out
 
-    def square(self, plant: Plant) -> float:
-        """Robust square sum of what a plant leaves, infinite where it cannot be followed."""
-        total = 0.0
-        for one, own in zip(self.logs, self.found, strict=True):
-            run = window_run(plant, one, self.drive, own.begun)
-            if run is None:
-                return np.inf
-            r = window_errors(run, one, self.drive)
-            total += likely_square(own.begun.at, own.B, own.inverse, own.weight * r, ROBUST_FROM)
-        return total if np.isfinite(total) else np.inf
+    def squares(self, members: Array) -> Array:
+        """Robust square sums (k,) of what plants with the values (k, d), inside the bounds, leave;
+        infinite of one that cannot be followed.
+
+        All at once: walkers take the same windows, and differ in their plants alone.
+        """
+        total = np.zeros(len(members))
+        for one, own, likely in zip(self.logs, self.found, self.likely, strict=True):
+            one.halt.ask()
+            if not self.plant.effects:
+                rows = kernel_rows(self.plant, self.names, self.drive, members)
+                total += likely.simulated(rows)
+                continue
+            for low in range(0, len(members), WIDTH):
+                some = members[low : low + WIDTH]
+                total[low : low + WIDTH] += likely.shown(self._runs(some, one, own))[: len(some)]
+        return total
+
+    def _runs(self, members: Array, one: MotionLog, own: Freed) -> Array:
+        """Runs (n, 2, WIDTH) of plants with effects, positions shown and forces; NaN: lost."""
+        out = np.zeros((len(one.log), 2, WIDTH))
+        for i, x in enumerate(members):
+            tried = plant_with(self.plant, self.names, x)
+            run = window_run(tried, one, self.drive, own.begun)
+            out[:, :, i] = np.nan if run is None else np.transpose([run.shown, run.F])
+        return out
 
     def stretched(self, covariance: Array) -> tuple[float, Array]:
         """Factor of the cost, and matrix (d, d) by which what is off the center is stretched, so
@@ -204,35 +224,3 @@ def _bounds(plant: Plant, names: Sequence[str]) -> tuple[Array, Array]:
         near, far = sorted((sign * least, sign * most))
         low[i], high[i] = max(near, low[i]), min(far, high[i])
     return low, high
-
-
-@compiled_fast
-def likely_square(at: IntArray, B: Array, inverse: Array, r: Array, far: float) -> float:
-    """Robust square sum of weighted errors r (k, n) less what is likeliest of the states in which
-    the windows, from samples `at` on, begin, and the square of these; `r` is left as it is.
-
-    B (3, k, n), inverse (windows, 3, 3): as in `windows.Freed`. The states are the best linear
-    prediction of a normal random effect (Robinson, Statistical Science 6 (1991) 15).
-    """
-    rows, n = r.shape
-    total = 0.0
-    for w in range(len(at)):
-        low, high = at[w], at[w + 1] if w + 1 < len(at) else n
-        a, b, c = 0.0, 0.0, 0.0
-        for i in range(rows):
-            for k in range(low, high):
-                a += B[0, i, k] * r[i, k]
-                b += B[1, i, k] * r[i, k]
-                c += B[2, i, k] * r[i, k]
-        x = inverse[w, 0, 0] * a + inverse[w, 0, 1] * b + inverse[w, 0, 2] * c
-        y = inverse[w, 1, 0] * a + inverse[w, 1, 1] * b + inverse[w, 1, 2] * c
-        z = inverse[w, 2, 0] * a + inverse[w, 2, 1] * b + inverse[w, 2, 2] * c
-        total += x * x + y * y + z * z
-        for i in range(rows):
-            for first in range(low, high, TOGETHER):
-                product = 1.0
-                for k in range(first, min(first + TOGETHER, high)):
-                    left = r[i, k] - x * B[0, i, k] - y * B[1, i, k] - z * B[2, i, k]
-                    product *= 1.0 + left * left / (far * far)
-                total += np.log(product) * far * far
-    return total

@@ -37,9 +37,10 @@ from identification.simulation.karnopp_step import (
 )
 
 WIDTH = 16
-# Rows of the work array: the mode's columns first, then state, input, k1, k2 and the last velocity.
-Y, V, F, G, GAIN, COUPLING, V_OLD = range(COLUMNS, COLUMNS + 7)
-WORK_ROWS = COLUMNS + 7
+# Rows of the work array: the mode's columns first, then state, input, k1, k2 and the last velocity,
+# position and force, of which the latter two are kept by who does not put them out.
+Y, V, F, G, GAIN, COUPLING, V_OLD, Y_OLD, F_OLD = range(COLUMNS, COLUMNS + 9)
+WORK_ROWS = COLUMNS + 9
 
 
 @compiled_inline
@@ -165,6 +166,37 @@ def march(
             flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * command)
         if flagged:
             settle_flagged(flagged, s, modes, tables, p, h, flat, at)
+
+
+@compiled
+def march_corrected(
+    p: Array,
+    tables: Array,
+    s: Array,
+    modes: IntArray,
+    u: Array,
+    force: Array,
+    gain: float,
+    h: float,
+    out: Array,
+) -> None:
+    """As `march`, the run's force corrected by `gain` of its distance to the measured one at every
+    sample; in `out` as it was before. Source: steady gain of a local level, Harvey (1989)."""
+    flat = out.reshape(-1)
+    for k in range(len(u)):
+        command, measured, at, flagged = u[k], force[k], 2 * WIDTH * k, 0
+        for i in range(WIDTH):
+            here, before = s[Y * WIDTH + i], s[F * WIDTH + i]
+            f = before + gain * (measured - before)
+            flat[at + i] = here
+            flat[at + WIDTH + i] = before
+            s[Y_OLD * WIDTH + i] = here
+            s[F_OLD * WIDTH + i] = f
+            outside = (f < s[F_LO * WIDTH + i]) | (f > s[F_HI * WIDTH + i])
+            flagged |= int(outside) << i
+            flagged |= advance(s, i, h, f, s[GAIN * WIDTH + i] * command)
+        if flagged:
+            settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
 
 
 @compiled

@@ -9,6 +9,7 @@ from identification.effects._base import Param
 from identification.model.estimates import Drive
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.karnopp_step import kernel_parameters
 
 NARROW = 0.3  # of its value, that the mass keeps at least in a search
 SHAPE_REACH, PERIOD_REACH = 2.0, 1.2  # how far a search moves what an effect is not linear in
@@ -74,6 +75,17 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
             own[p.name] = float(np.clip(every.get(f"{acting.key}.{p.name}", here), low, high))
         effects.append(acting.effect.acting(own))
     return Plant(Karnopp(*nine), actuator, tuple(effects))
+
+
+def kernel_rows(plant: Plant, names: Sequence[str], drive: Drive, x: Array) -> Array:
+    """Kernel parameters (k, 11) of plants without effects with the values x (k, d), each the row of
+    `plant_with` where x lies inside the bounds that this has."""
+    begun, k1, k2 = plant_with(plant, names, values_of(plant, names)), 0.0, 0.0
+    if drive == "command" and isinstance(begun.actuator, Actuator):
+        k1, k2 = begun.actuator.k1, begun.actuator.k2
+    rows = np.repeat(kernel_parameters(begun.friction.array, k1, k2)[np.newaxis], len(x), axis=0)
+    rows[:, [(*NAMES, "k1", "k2").index(name) for name in names]] = x
+    return rows
 
 
 def even(plant: Plant) -> dict[str, float]:

@@ -154,18 +154,24 @@ def driven_by(one: MotionLog, drive: Drive) -> Log:
     return one.driving if drive == "force" else one.log
 
 
-def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
-    """Position (and, driven by the command, force) errors in units of the noise, (k, n).
+def compared(one: MotionLog, drive: Drive) -> tuple[tuple[Array, ...], Array, Array]:
+    """Signals (k of (n,)) that a run is compared with, position [m] and, driven by the command,
+    force [N]; the share of a distance to each that counts, and their noise (k,).
 
-    Source of the force's weight: steady gain of a local level, Harvey (1989); `README.md`, (3).
+    Source of the share: steady gain of a local level, Harvey (1989); `README.md`, (3).
     """
-    out = [(run.shown - one.log["y"]) / one.noise.y]
-    if drive == "command" and not one.held:
-        # Beside the sensor's noise, that of the force before it was corrected.
-        out.append(
-            (run.F - one.log["F"]) * np.sqrt(1.0 - one.noise.corrected) / max(one.noise.F, 1e-12)
-        )
-    return np.array(out)
+    if drive != "command" or one.held:
+        return (one.log["y"],), np.ones(1), np.array([one.noise.y])
+    # Beside the sensor's noise, that of the force before it was corrected.
+    share = np.array([1.0, np.sqrt(1.0 - one.noise.corrected)])
+    return (one.log["y"], one.log["F"]), share, np.array([one.noise.y, max(one.noise.F, 1e-12)])
+
+
+def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
+    """Errors of a run in units of the noise (k, n), of position and maybe force: `compared`."""
+    signals, share, noise = compared(one, drive)
+    seen = zip((run.shown, run.F), signals, share, noise, strict=False)
+    return np.array([(x - measured) * part / sd for x, measured, part, sd in seen])
 
 
 def _rest_near(wanted: int, step: int, rests: IntArray) -> int | None:
