@@ -42,6 +42,6 @@ def test_it_tells_what_the_fit_tells(followed: bool) -> None:
 def test_a_run_that_is_near_when_the_look_ends_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not first_look([made(3)], RIG).open
     monkeypatch.setattr(looking, "SAMPLES_RUN", 1.0)
-    monkeypatch.setattr(looking, "NEARLY_FOLLOWED", np.inf)
+    monkeypatch.setattr(looking, "HOPELESS", np.inf)
     cut_off = first_look([touched()], RIG)
     assert cut_off.open == (not cut_off.fit.imposed)
