@@ -26,11 +26,12 @@ AS_GOOD_AS_NONE = 1e-3  # of the force, the motion, the samples of a log
 COMPLETE = 1.0 + OF_ACCOUNT  # nothing is missing (1: what is left is noise)
 ADEQUATE = 1.0 + HALF  # hardly more than noise: followed, adequate, predicted
 ASTRAY = 3.0  # something is missing, or a measured force's noise has drifted as far
-HOPELESS = 25.0  # far more than noise: no run of the body's own, a machine that no model follows
+CHANCE_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
 
 # How sure: chances, deviations, twice a log-likelihood (blind.py: clean; real.py).
 CHANCE_LEVEL = 0.01  # chance up to which the largest gain of the library is significant
 BEYOND_CHANCE = 5.0  # deviations from 0 of one size of many tried; squared, of a criterion
+HOPELESS = BEYOND_CHANCE**2  # misfit far beyond noise: no run of the body's own, of any model
 GATE_MARGIN = 3.0  # times the information's deviation, by which a parameter is called identifiable
 PENALTY = 10.0  # criterion that each parameter of a structure has to gain (about log n: BIC)
 FAULT_FROM = 9.0  # times the noise, by which a sample stands out that no body can have made

@@ -1,4 +1,4 @@
-"""Verdict: what is left, whether it carries over to the test logs, and what is to be said of it."""
+"""Verdict: what is left on the test logs and on those of the fit, and what is to be said of it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.remarks import MinorRemark
-from identification.thresholds import ASTRAY
+from identification.thresholds import ASTRAY, OF_ACCOUNT
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import (
@@ -24,15 +24,16 @@ from identification.tracing.model_errors import (
 )
 from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.regression.stepwise import Choice
-from identification.tracing.remaining_structure import (
-    remaining_structure,
-    strongest,
-)
+from identification.tracing.remaining_structure import remaining_structure, strongest
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
 from identification.tracing.structure_search import Refinement, Selection, without_effects
 from identification.tracing.verdict import explains_most, other_law, verdict_of
 
 NOTHING = Dependence((), 0.0)
+AS_LARGE_AS_FRICTION = (
+    "what is left of the force is larger than friction itself: by these logs' noise, or by what it"
+    " hides"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,25 +103,31 @@ def judgement(
     changed = held.changed
     left = _left(choice, after, chosen) if held.lacking else NOTHING
     of_other_law = other_law(choice, left, held.share)
-    known = not of_other_law if choice.steps else not held.lacking
+    p, doubts = after.plant.friction, list(map(_not_its_law, of_other_law))
+    if not choice.steps and hides_friction(held.after["test"], max(p.F_cp, p.F_cn)):
+        doubts.append(AS_LARGE_AS_FRICTION)
+    known = not doubts and (bool(choice.steps) or not held.lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
-    doubts: tuple[str, ...] = ()
     if verdict == "unknown" and seen and not choice.steps and not after.imposed:
         told = plain.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
-        doubts = (how,) if levels else ()
-    said = (
-        *_remarks(choice, after, left, logs, seen, rig),
-        *doubts,
-        *map(_not_its_law, of_other_law),
-    )
+        doubts = [how] if levels else doubts
+    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts)
     complete = verdict != "unknown" and predicted(held.now, held.noise)
     return Judgement(
         verdict, held.before, held.after,
         left if verdict == "unknown" else NOTHING, changed, said,
         complete=complete, rest=Left(0.0 if complete else held.share, left.depends_on),
     )  # fmt: skip
+
+
+def hides_friction(left: Errors, coulomb: float) -> bool:
+    """Whether what is left of the force, however much of it is noise, is larger than friction
+    itself, so that an effect of its size would not show."""
+    if left.force_rms is None or left.force_relative is None:
+        return False
+    return left.force_rms > coulomb and left.force_relative > OF_ACCOUNT
 
 
 def _not_its_law(key: str) -> str:

@@ -14,7 +14,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, AS_GOOD_AS_NONE, ASTRAY, MATERIAL
+from identification.thresholds import ADEQUATE, AS_GOOD_AS_NONE, ASTRAY, COMPLETE, MATERIAL
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
@@ -122,15 +122,21 @@ def predicted(left: OnTest, noise: NoiseFloor) -> bool:
 def lacks(model: FittedStructure, errors: Errors, noise: NoiseFloor) -> bool:
     """Whether a model lacks something of account on the logs of its fit, with these errors there.
 
-    A free run that leaves more than noise, and more than a trifle of the motion; where there is
-    none, more force than noise leaves, and more than a trifle of the Coulomb level.
+    A free run that leaves far more than noise, and more than a trifle of the motion; or force far
+    beyond noise, of a prescribed motion beyond noise, and more than a trifle of the Coulomb level.
     """
-    if not model.imposed:
-        return model.misfit > ADEQUATE and off(model) > AS_GOOD_AS_NONE
     force, p = errors.force_rms, model.plant.friction
-    if force is None or force**2 <= ADEQUATE * noise.force_rms**2:
-        return False
-    return force**2 - noise.force_rms**2 > (MATERIAL * max(p.F_cp, p.F_cn)) ** 2
+    least = ADEQUATE if model.imposed else ASTRAY
+    beyond = 0.0 if force is None else force**2 - noise.force_rms**2
+    by_force = (
+        force is not None
+        and force**2 > least * noise.force_rms**2
+        and beyond > (MATERIAL * max(p.F_cp, p.F_cn)) ** 2
+    )
+    if model.imposed:
+        return by_force
+    by_run = model.misfit > ASTRAY and off(model) > AS_GOOD_AS_NONE
+    return by_run or (by_force and model.misfit > COMPLETE)
 
 
 def off(model: FittedStructure) -> float:

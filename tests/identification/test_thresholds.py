@@ -194,9 +194,9 @@ def left_of(force: float) -> OnTest:
 def test_complete() -> None:
     """A run that hardly leaves more than noise may do so with one effect alone; beside others it
     is not followed yet."""
-    few = choice("spring")
-    by_command = setting(41.0)
-    assert followed_up_to(few, by_command, False) == pytest.approx(1.1, abs=0.02)
+    assert followed_up_to(choice("spring"), setting(41.0), False) == pytest.approx(1.1, abs=0.02)
+    assert not lacks(run(1.08), left_of(9.0).errors, FLOOR)
+    assert lacks(run(1.12), left_of(9.0).errors, FLOOR)
 
 
 def test_adequate() -> None:
@@ -212,12 +212,14 @@ def test_adequate() -> None:
     prescribed = run(np.inf, imposed=True)
     assert not lacks(prescribed, left_of(1.09).errors, FLOOR)
     assert lacks(prescribed, left_of(1.38).errors, FLOOR)
-    assert not lacks(run(1.2), left_of(9.0).errors, FLOOR)
+    assert not lacks(run(1.2), left_of(1.38).errors, FLOOR)
 
 
 def test_astray() -> None:
     """Something is missing from an equation that leaves this; a model that left noise may leave so
     much of the next log."""
+    assert not lacks(run(1.2), left_of(np.sqrt(2.4)).errors, FLOOR)
+    assert lacks(run(1.2), left_of(np.sqrt(3.75)).errors, FLOOR)
     assert equations_explained({MECHANICAL: leaving(2.4)})
     assert not equations_explained({MECHANICAL: leaving(3.75)})
     assert not equations_explained({MECHANICAL: leaving(1.0), ACTUATOR: leaving(3.75)})
@@ -647,10 +649,10 @@ def test_material_to_the_other_way() -> None:
     assert not is_one_way(0.0125) and not is_one_way(0.5)
 
 
-def test_of_account_by_chance() -> None:
-    """Of twenty windows two may be lost to chance and no more; of six one, of four none."""
-    assert mean_loss(*lost_windows(20, 2)) < 1.5 and mean_loss(*lost_windows(20, 3)) > 2.0
-    assert mean_loss(*lost_windows(6, 1)) < 1.5 and mean_loss(*lost_windows(4, 1)) > 2.0
+def test_chance_windows() -> None:
+    """Of twenty windows three may be lost to chance and no more; of four one, of three none."""
+    assert mean_loss(*lost_windows(20, 3)) < 1.5 and mean_loss(*lost_windows(20, 4)) > 2.0
+    assert mean_loss(*lost_windows(4, 1)) < 1.5 and mean_loss(*lost_windows(3, 1)) > 2.0
 
 
 def lost_windows(windows: int, lost: int) -> tuple[Array, IntArray]:

@@ -19,7 +19,7 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, OF_ACCOUNT
+from identification.thresholds import ADEQUATE, CHANCE_WINDOWS
 
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
@@ -118,6 +118,6 @@ def _by_window(r: Array, window: IntArray, moves: BoolArray | None) -> tuple[Arr
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
     moving = len(size) if moves is None else int(np.count_nonzero(np.bincount(window, moves)))
-    lost = round(OF_ACCOUNT * moving)
+    lost = round(CHANCE_WINDOWS * moving)
     kept = np.argsort(each)[: max(1, len(size) - lost)]
     return np.asarray(each, dtype=np.float64), kept.astype(np.int64)

@@ -65,12 +65,15 @@ def test_a_model_is_complete_that_leaves_hardly_more_than_noise(
 def test_a_run_that_leaves_more_than_noise_lacks_something_where_it_is_off_the_motion(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    errors = Errors(9.0, None, None, None)  # of the equation alone
-    model = FittedStructure(stage(), {}, plant(), {}, False, 3.0)
+    errors = Errors(1.2, None, None, None)
+    model = FittedStructure(stage(), {}, plant(), {}, False, 5.0)
     for off, lacking in ((2e-3, True), (5e-4, False)):
         monkeypatch.setattr("identification.tracing.model_errors.off", lambda _, off=off: off)
         assert lacks(model, errors, NoiseFloor(1.0, None)) is lacking
     assert not lacks(replace(model, misfit=1.2), errors, NoiseFloor(1.0, None))
+    far = Errors(9.0, None, None, None)  # of an equation: a run that is followed answers it
+    assert lacks(replace(model, misfit=1.2), far, NoiseFloor(1.0, None))
+    assert not lacks(replace(model, misfit=1.05), far, NoiseFloor(1.0, None))
 
 
 @pytest.mark.parametrize(("force", "expected"), [(1.1, False), (2.0, True), (None, False)])
