@@ -24,7 +24,7 @@ from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
-from identification.thresholds import COMPLETE
+from identification.thresholds import COMPLETE, WORSE
 from identification.tracing.free_curve import free_curves
 from identification.tracing.judgement import Judgement, held_out, judgement
 from identification.tracing.model_errors import row_noise
@@ -149,9 +149,15 @@ def _proved(
     plain, after = chosen.plain.model, found.model
     if not found.choice.steps:
         return found, ""
-    if not held_out(chosen, found, seen, rig).proved:
+    held = held_out(chosen, found, seen, rig)
+    if not held.proved:
         return _unproved(
             chosen, found, "more than half of what was missing on the test logs is left"
+        )
+    was, now = (one["test"].force_rms for one in (held.before, held.after))
+    if was is not None and now is not None and now > WORSE * was:
+        return _unproved(
+            chosen, found, f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
         )
     if not seen or plain.imposed or after.imposed:
         return found, ""
