@@ -39,7 +39,7 @@ from identification.simulation.karnopp_step import (
 WIDTH = 16
 # Rows of the work array: the mode's columns first, then state, input, k1, k2 and the last velocity,
 # position and force, of which the latter two are kept by who does not put them out.
-Y, V, F, G, GAIN, COUPLING, V_OLD, Y_OLD, F_OLD = range(COLUMNS, COLUMNS + 9)
+Y, V, F, G, GAIN, COUPLING, V_OLD, BEFORE_Y, BEFORE_F = range(COLUMNS, COLUMNS + 9)
 WORK_ROWS = COLUMNS + 9
 
 
@@ -190,13 +190,13 @@ def march_corrected(
             f = before + gain * (measured - before)
             flat[at + i] = here
             flat[at + WIDTH + i] = before
-            s[Y_OLD * WIDTH + i] = here
-            s[F_OLD * WIDTH + i] = f
+            s[BEFORE_Y * WIDTH + i] = here
+            s[BEFORE_F * WIDTH + i] = f
             outside = (f < s[F_LO * WIDTH + i]) | (f > s[F_HI * WIDTH + i])
             flagged |= int(outside) << i
             flagged |= advance(s, i, h, f, s[GAIN * WIDTH + i] * command)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
+            settle_flagged(flagged, s, modes, tables, p, h, s, BEFORE_Y * WIDTH)
 
 
 @compiled

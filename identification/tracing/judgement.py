@@ -31,7 +31,7 @@ from identification.tracing.verdict import explains_most, other_law, verdict_of
 
 NOTHING = Dependence((), 0.0)
 AS_LARGE_AS_FRICTION = (
-    "what is left of the force is larger than friction itself: by these logs' noise, or by what it"
+    "what is left of the force is larger than friction itself, by these logs' noise or by what it"
     " hides"
 )
 
@@ -56,7 +56,7 @@ class HeldOut:
 
     now: what the refined one leaves of the test logs; share: of what was missing there, that is
     left; changed: parameters; lacking: whether something of account is missing on the training
-    logs.
+    logs; coulomb [N]: the larger level of the plain model.
     """
 
     before: Mapping[str, Errors]
@@ -66,6 +66,7 @@ class HeldOut:
     share: float
     changed: tuple[Change, ...]
     lacking: bool
+    coulomb: float
 
     @property
     def proved(self) -> bool:
@@ -73,6 +74,15 @@ class HeldOut:
         leaves more, but no more than before."""
         beside = bool(self.changed) and self.share < 1.0 and not self.lacking
         return explains_most(self.share) or beside
+
+    @property
+    def hides_friction(self) -> bool:
+        """Whether what is left of the force, however much of it is noise, is larger than friction
+        itself, so that an effect of its size would not show."""
+        left = self.after["test"]
+        if left.force_rms is None or left.force_relative is None:
+            return False
+        return left.force_rms > self.coulomb and left.force_relative > OF_ACCOUNT
 
 
 def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig) -> HeldOut:
@@ -86,9 +96,10 @@ def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], ri
     was = on_test(plain, errors_before["test"], unseen, rows.drive)
     now = was if after is plain else on_test(after, errors_after["test"], unseen, rows.drive)
     changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
+    coulomb = max(plain.plant.friction.F_cp, plain.plant.friction.F_cn)
     return HeldOut(
-        errors_before, errors_after, now, noise, share_left(was, now, noise), tuple(changed),
-        lacks(after, errors_after["train"], noise),
+        errors_before, errors_after, now, noise, share_left(was, now, noise, coulomb),
+        tuple(changed), lacks(after, errors_after["train"], noise), coulomb,
     )  # fmt: skip
 
 
@@ -103,12 +114,12 @@ def judgement(
     changed = held.changed
     left = _left(choice, after, chosen) if held.lacking else NOTHING
     of_other_law = other_law(choice, left, held.share)
-    p, doubts = after.plant.friction, list(map(_not_its_law, of_other_law))
-    if not choice.steps and hides_friction(held.after["test"], max(p.F_cp, p.F_cn)):
+    doubts = list(map(_not_its_law, of_other_law))
+    if held.hides_friction:
         doubts.append(AS_LARGE_AS_FRICTION)
     known = not doubts and (bool(choice.steps) or not held.lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
-    if verdict == "unknown" and seen and not choice.steps and not after.imposed:
+    if held.lacking and seen and not (doubts or choice.steps or after.imposed):
         told = plain.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
@@ -120,14 +131,6 @@ def judgement(
         left if verdict == "unknown" else NOTHING, changed, said,
         complete=complete, rest=Left(0.0 if complete else held.share, left.depends_on),
     )  # fmt: skip
-
-
-def hides_friction(left: Errors, coulomb: float) -> bool:
-    """Whether what is left of the force, however much of it is noise, is larger than friction
-    itself, so that an effect of its size would not show."""
-    if left.force_rms is None or left.force_relative is None:
-        return False
-    return left.force_rms > coulomb and left.force_relative > OF_ACCOUNT
 
 
 def _not_its_law(key: str) -> str:

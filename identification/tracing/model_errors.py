@@ -85,15 +85,18 @@ def on_test(
     return OnTest(errors, None if model.imposed else misfit(model.plant, logs, drive))
 
 
-def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
+def share_left(before: OnTest, after: OnTest, noise: NoiseFloor, coulomb: float = 0.0) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
     Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. An equation that
     lacks much comes first: one stop that a run loses by chance is more than all the rest of it.
-    Then the run, by its misfit, which knows how far the noise of force and command drifts. Ours:
-    `README.md`, (6).
+    Then the run, by its misfit, which knows how far the noise of force and command drifts. Force
+    that is nothing beside the Coulomb level [N] does not count. Ours: `README.md`, (6).
     """
-    by_equations = [_equation_share(before, after, noise, least) for least in (ASTRAY, ADEQUATE)]
+    beside = MATERIAL * coulomb
+    by_equations = [
+        _equation_share(before, after, noise, least, beside) for least in (ASTRAY, ADEQUATE)
+    ]
     by_run = None
     if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
         by_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
@@ -101,12 +104,16 @@ def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
     return next(known, 0.0)
 
 
-def _equation_share(before: OnTest, after: OnTest, noise: NoiseFloor, least: float) -> float | None:
+def _equation_share(
+    before: OnTest, after: OnTest, noise: NoiseFloor, least: float, beside: float
+) -> float | None:
     """As `share_left`, of the first equation of which more than `least` times the noise's square
-    was missing; None without one."""
-    for name in ("force_rms", "actuator_rms"):
+    was missing, and more force than `beside` [N]; None without one."""
+    for name, matters in (("force_rms", beside), ("actuator_rms", 0.0)):
         own, left, floor = (getattr(x, name) for x in (before.errors, after.errors, noise))
-        if own is not None and left is not None and floor and (own / floor) ** 2 > least:
+        if own is None or left is None or not floor:
+            continue
+        if own**2 > max(least * floor**2, floor**2 + matters**2):
             return float(max(left**2 - floor**2, 0.0) / (own**2 - floor**2))
     return None
 

@@ -26,7 +26,12 @@ from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE, WORSE
 from identification.tracing.free_curve import free_curves
-from identification.tracing.judgement import Judgement, held_out, judgement
+from identification.tracing.judgement import (
+    AS_LARGE_AS_FRICTION,
+    Judgement,
+    held_out,
+    judgement,
+)
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
@@ -154,6 +159,8 @@ def _proved(
         return _unproved(
             chosen, found, "more than half of what was missing on the test logs is left"
         )
+    if held.hides_friction:
+        return _unproved(chosen, found, AS_LARGE_AS_FRICTION)
     was, now = (one["test"].force_rms for one in (held.before, held.after))
     if was is not None and now is not None and now > WORSE * was:
         return _unproved(
