@@ -19,9 +19,8 @@ from identification.errors import BadCard, BadModel
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
 from workbench.cards.controller import CardController
-from workbench.cards.nearest import nearest
+from workbench.cards.nearest import keys_at, nearest
 from workbench.cards.recipe import Recipe
-from workbench.cards.table import CardTable
 from workbench.cards.units import si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
@@ -239,12 +238,13 @@ def explain(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     union = next((part for part in first["loc"][:-1] if part in _UNIONS), None)
     loc = first["loc"][:-1] if union else first["loc"]
-    where = ".".join(str(part) for part in loc if part != "function-before")
+    # Of a union pydantic names the validators too.
+    where = ".".join(one for one in map(str, loc) if not one.startswith("function-"))
     table = f"[{where}] " if where else ""
     kind, found = first["type"], first.get("input")
     if kind == "unknown_key":
         key = str(first["msg"])
-        return f"{table}unknown key {key!r}{nearest(key, _keys_at(first['loc']))}"
+        return f"{table}unknown key {key!r}{nearest(key, keys_at(CardFile, first['loc']))}"
     if kind == "missing":
         parent = ".".join(str(part) for part in first["loc"][:-1])
         if not parent:
@@ -253,7 +253,7 @@ def explain(error: ValidationError) -> str:
             return f"[{parent}] has too few values; add those that are missing"
         return f"[{parent}] has no {first['loc'][-1]!r}; add it"
     if kind == "model_type":
-        keys = ", ".join(f"{key} = ..." for key in _keys_at(loc)[:2])
+        keys = ", ".join(f"{key} = ..." for key in keys_at(CardFile, loc)[:2])
         return f"{table}{_shown(found)}: a table {{ {keys} }} needed"
     said = _UNIONS.get(str(union)) or _FAULTS.get(kind) or str(first["msg"])
     message = " ".join(said.removeprefix("Value error, ").split())
@@ -263,28 +263,3 @@ def explain(error: ValidationError) -> str:
 
 def _shown(found: object) -> str:
     return " ".join(repr(found).split())[:60]
-
-
-def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
-    """Keys of the section that stands at `loc`, found along the sections' fields."""
-    sections: list[type[CardTable]] = [CardFile]
-    for part in loc:
-        found = [s.model_fields[str(part)].annotation for s in sections if part in s.model_fields]
-        if found:
-            sections = [inner for annotation in found for inner in _sections_in(annotation)]
-        elif isinstance(part, str):
-            sections = [s for s in sections if _tag(s) == part] or sections
-    return [key for section in sections for key in section.model_fields]
-
-
-def _sections_in(annotation: Any) -> list[type[CardTable]]:
-    if isinstance(annotation, type) and issubclass(annotation, CardTable):
-        return [annotation]
-    parts = getattr(annotation, "__args__", ())
-    return [section for part in parts for section in _sections_in(part)]
-
-
-def _tag(section: type[CardTable]) -> str | None:
-    field = section.model_fields.get("kind")
-    tags = [str(tag) for tag in getattr(field.annotation, "__args__", ())] if field else []
-    return tags[0] if len(tags) == 1 else None

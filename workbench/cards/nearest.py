@@ -1,7 +1,8 @@
-"""The nearest known name, for a message on an unknown one."""
+"""The nearest known name, for a message on an unknown one; and which names a table may have."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from typing import Any
 
 
 def nearest(key: str, known: Iterable[str]) -> str:
@@ -12,3 +13,43 @@ def nearest(key: str, known: Iterable[str]) -> str:
     guess = f"; did you mean {lowered[close[0]]!r}?" if close else ";"
     listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
     return f"{guess} (there is: {listed or 'nothing'})"
+
+
+def keys_at(kind: Any, loc: Sequence[str | int]) -> list[str]:
+    """Keys of the table that stands at `loc`, as pydantic says it, in what is read as `kind`."""
+    from pydantic import TypeAdapter
+
+    whole = TypeAdapter(kind).json_schema()
+    here = [*_alternatives(whole, whole)]
+    for part in loc:
+        inside = [within for one in here for within in _inside(one, part)]
+        here = [one for within in inside for one in _alternatives(within, whole)] or here
+    return [key for one in here for key in one.get("properties", ())]
+
+
+Schema = Mapping[str, Any]
+
+
+def _alternatives(node: Schema, whole: Schema) -> Iterator[Schema]:
+    """The schemas that a node may be of, each by itself."""
+    if "$ref" in node:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+    several = node.get("anyOf") or node.get("oneOf")
+    for one in several or ():
+        yield from _alternatives(one, whole)
+    if not several:
+        yield node
+
+
+def _inside(node: Schema, part: str | int) -> Iterator[Schema]:
+    """What stands in a table by that key, in a list by that number; or the table, by its kind."""
+    keys = node.get("properties", {})
+    if isinstance(part, int):
+        yield from node.get("prefixItems", ())[part : part + 1]
+        yield from [node["items"]] if "items" in node else ()
+    elif part in keys:
+        yield keys[part]
+    elif keys.get("kind", {}).get("const") == part:
+        yield node
+    elif isinstance(node.get("additionalProperties"), Mapping):
+        yield node["additionalProperties"]

@@ -31,13 +31,19 @@ class Shown(NamedTuple):
 
     def by_name(self, quantities: Mapping[str, str]) -> dict[str, str]:
         """The unit of each number, of a unit or of a quantity whose unit hangs on the machine."""
-        own = {
+        return {name: self.named(one) for name, one in quantities.items()}
+
+    def named(self, quantity: str) -> str:
+        """The unit of a quantity, or the unit that is given itself."""
+        own: dict[str, str] = {
             **self._asdict(),
+            "acceleration": f"{self.position}/s^2",
             "damping": f"{self.force} s/{self.position}",
+            "force_per_command": over(self.force, self.command),
             "viscous": self.friction["F_vp"],
             "mass": self.friction["m"],
         }
-        return {name: own.get(one, one) for name, one in quantities.items()}
+        return own.get(quantity, quantity)
 
 
 def shown(rotary: bool, command: str = "V") -> Shown:

@@ -80,24 +80,14 @@ def checked(folder: Path, advance: Callable[[float], None]) -> dict[str, Any]:
 
 def described(effect: "Effect") -> dict[str, Any]:
     """An effect as JSON has it."""
+    of_each = ("name", "unit", "low", "high", "typical", "default", "meaning")
     return {
-        "key": effect.key,
-        "meaning": effect.meaning,
-        "equation": effect.equation,
-        "acts": effect.acts,
+        **{key: getattr(effect, key) for key in ("key", "meaning", "equation", "acts")},
         "gives": effect.place.gives,
-        "depends_on": effect.depends_on,
-        "signals": effect.signals,
-        "state_unit": effect.state_unit,
-        "parameters": [
-            {
-                "name": p.name, "unit": p.unit, "low": p.low, "high": p.high,
-                "typical": p.typical, "default": p.default, "meaning": p.meaning,
-            }
-            for p in effect.params
-        ],
+        **{key: getattr(effect, key) for key in ("depends_on", "signals", "state_unit")},
+        "parameters": [{key: getattr(p, key) for key in of_each} for p in effect.params],
         "source": effect.source,
-    }  # fmt: skip
+    }
 
 
 def _listed(found: "Sequence[Effect]", known: "Sequence[Effect]") -> "Screen":

@@ -72,7 +72,7 @@ def command(given: ExperimentOptions) -> int:
     report.html. The run begins with the machine at rest at the first r.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design_read import read_design
+    from workbench.documents.design_file import read_design
     from workbench.documents.model_file import read_model
     from workbench.report.experiment import experiment_view
     from workbench.report.next_steps import after_experiment

@@ -110,7 +110,7 @@ def command(given: ExportOptions) -> int:
         options.refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
         return _tables(given)
     options.refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
-    from workbench.documents.design_read import read_design
+    from workbench.documents.design_file import read_design
     from workbench.export.exported import exported, validation_line
     from workbench.export.targets import writers
 

@@ -130,7 +130,7 @@ def add(
     version.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design_read import read_design
+    from workbench.documents.design_file import read_design
     from workbench.documents.model_file import read_model
     from workbench.documents.reading import read_document
     from workbench.registry.values import Candidate

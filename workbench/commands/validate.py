@@ -47,7 +47,7 @@ def command(
     import numpy as np
 
     from workbench.cards.own_effects import library
-    from workbench.documents.design_read import read_design
+    from workbench.documents.design_file import read_design
     from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
     from workbench.report.next_steps import after_validate

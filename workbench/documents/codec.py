@@ -23,7 +23,7 @@ from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import Shown, in_unit, shown
-from workbench.documents.reading import PLACE, REFUSED, UNKNOWN_KEY, as_number
+from workbench.documents.reading import OF_OURS, PLACEHOLDER, UNKNOWN_KEY, as_number
 
 Output = Literal["command", "force"]
 NO_LIMIT = "the card gives no control_limit"
@@ -105,12 +105,12 @@ class InUnit:
             unit = info.context.units.named(self.unit)
             with at_its_place():
                 if whole:
-                    return in_unit(found, unit, f"[{PLACE}]")
+                    return in_unit(found, unit, f"[{PLACEHOLDER}]")
                 if found.value is None and self.why_none is not None:
                     if not found.reason:
-                        raise BadModel(f"[{PLACE}] is null; it needs a 'reason'")
+                        raise BadModel(f"[{PLACEHOLDER}] is null; it needs a 'reason'")
                     return None
-                return (positive if self.above_0 else number)(found, unit, PLACE)
+                return (positive if self.above_0 else number)(found, unit, PLACEHOLDER)
 
         def write(value: Any, info: Any) -> Any:
             if whole or (value is None and self.why_none is None):
@@ -182,7 +182,7 @@ def numbers(
     def read(found: Mapping[str, Estimate | None], info: Any) -> Any:
         own = {name: one for name, one in found.items() if name not in derived}
         wanted = info.context.units.by_name(units)
-        return make(**numbers_of(own, wanted, PLACE, positive if above_0 else number))
+        return make(**numbers_of(own, wanted, PLACEHOLDER, positive if above_0 else number))
 
     return Through(Mapping[str, Parameter | None], write, read)
 
@@ -210,7 +210,7 @@ def at_its_place() -> Iterator[None]:
     try:
         yield
     except (BadModel, BadSpecification) as error:
-        raise PydanticCustomError(REFUSED, "{said}", {"said": str(error)}) from None
+        raise PydanticCustomError(OF_OURS, "{said}", {"said": str(error)}) from None
 
 
 def _no_key(_value: object) -> object:

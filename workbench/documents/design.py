@@ -1,15 +1,22 @@
 """The design of one machine: controllers, margins, compensator.
 
-Here values are plain SI numbers; in design.json (workbench/documents/design_file.py) every
-parameter has its unit.
+Values are plain SI numbers; in design.json every parameter has the unit that its field is annotated
+with.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import (
+    Field,
+    PlainSerializer,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from design.cascade import CascadeGains
 from design.compensator import Compensator
@@ -21,19 +28,52 @@ from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
 from design.schedule import Over, Schedule
-from design.series_filters import SeriesFilter
+from design.series_filters import FilterKind, SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
+from workbench.cards.parameter_units import in_unit
 from workbench.cards.units import Motion
-from workbench.documents.drive import Command, ForceLoop, Output, Present
+from workbench.documents.codec import (
+    NOT_WRITTEN,
+    Around,
+    Command,
+    InUnit,
+    Output,
+    Parameter,
+    Through,
+    entry,
+    number,
+    numbers,
+    numbers_of,
+    written,
+)
+from workbench.documents.drive import (
+    FORCE_LOOP_UNITS,
+    PRESENT_LOOP,
+    FiltersFile,
+    ForceLoop,
+    LawFile,
+    Present,
+    filters_file,
+    filters_of,
+    law_file,
+    law_of,
+)
 from workbench.documents.model import used
+from workbench.documents.reading import PLACEHOLDER
 
 From = Literal["physical", "arx"]
 Structure = Literal["rst", "pid", "p-pi"]
 DESIGNED_STRUCTURES: tuple[Structure, ...] = ("rst", "pid", "p-pi")
 Recommended = Literal["rst", "pid", "p-pi", "none"]
 LEAST_SPAN = 1e-3  # m/s, from which a direction counts in full where no feed-forward says
+# Units of what is written as numbers by name.
+FRICTION_AHEAD = {"F_cp": "force", "F_cn": "force", "F_vp": "viscous", "F_vn": "viscous"}
+PID_UNITS = {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"}
+CASCADE_UNITS = {"k_v": "1/s", "k_p": "damping", "T_n": "s", "eps": "s", "v_ff": "1"}
+AHEAD_UNITS = {**FRICTION_AHEAD, "band": "velocity", "m": "mass", "most": "force"}
+POLES = numbers(lambda w_n, zeta: (w_n, zeta), {"w_n": "rad/s", "zeta": "1"}, above_0=True)
 
 
 @dataclass(frozen=True)
@@ -47,10 +87,10 @@ class Linear:
     why: str
     A: tuple[float, ...]
     B: tuple[float, ...]
-    h: float
-    m: Estimate | None
-    F_v: Estimate | None
-    resonance: Mapping[str, Estimate] | None = None
+    h: Annotated[float, InUnit("s", above_0=True)]
+    m: Annotated[Estimate | None, InUnit("mass")]
+    F_v: Annotated[Estimate | None, InUnit("viscous")]
+    resonance: Mapping[str, Parameter] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +120,48 @@ class MarginValues:
 
 
 @dataclass(frozen=True)
+class SeriesFile:
+    """`SeriesFilter` as a result has it, its width at -3 dB and depth, and b/a in z^-1."""
+
+    kind: FilterKind
+    frequency: Annotated[float, InUnit("Hz", above_0=True)]
+    numerator: Annotated[float, InUnit("1")]
+    denominator: Annotated[float, InUnit("1", above_0=True)]
+    width: Annotated[float | None, InUnit("Hz", for_readers=True)]
+    depth_db: float | None
+    b: tuple[float, ...]
+    a: tuple[float, ...]
+
+
+def _series_file(one: SeriesFilter, _around: Around) -> SeriesFile:
+    return SeriesFile(
+        one.kind, one.frequency, one.numerator, one.denominator, one.width, one.depth_db,
+        one.filter.b, one.filter.a,
+    )  # fmt: skip
+
+
+def _series(found: SeriesFile, info: Any) -> SeriesFilter:
+    """The filter; raises BadModel where its coefficients are not those of its numbers."""
+    h = info.data.get("h", math.nan)  # of its controller; where that is refused, so is this
+    one = SeriesFilter(found.kind, found.frequency, found.numerator, found.denominator, h)
+    made = one.filter
+    for key, ours, theirs in (("b", made.b, found.b), ("a", made.a, found.a)):
+        if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=1e-9, atol=1e-12):
+            raise BadModel(
+                f"[{PLACEHOLDER}] {key} is not the {found.kind} of its numbers;"
+                " run 'workbench design' again"
+            )
+    return one
+
+
+def _anti_windup(found: LawFile, info: Any) -> tuple[float, ...]:
+    """The part of a law that is not the controller beside it, in the unit of the command."""
+    if info.context.command is not None:
+        law_of(found, info.context.units, PLACEHOLDER)
+    return found.W
+
+
+@dataclass(frozen=True)
 class Controller:
     """S F_ref = T r - R y, polynomials in z^-1, run every h [s].
 
@@ -94,21 +176,55 @@ class Controller:
     R: tuple[float, ...]
     S: tuple[float, ...]
     T: tuple[float, ...]
-    h: float
-    dominant: tuple[float, float]
+    h: Annotated[float, InUnit("s", above_0=True)]
+    dominant: Annotated[tuple[float, float], POLES]
     auxiliary: tuple[tuple[float, float], ...]
+    rate: Annotated[
+        float | None,
+        InUnit("velocity", above_0=True, why_none="no limit of force or command to keep"),
+        Field(alias="reference_rate"),
+    ]
+    lag: Annotated[float, InUnit("s"), Field(alias="reference_lag")]
     margins: MarginValues
-    rate: float | None
-    lag: float
     overshoot: float
     missed: tuple[str, ...]
-    gains: PIDGains | None = None
+    gains: Annotated[PIDGains | None, numbers(PIDGains, PID_UNITS)] = None
     note: str | None = None
-    W: tuple[float, ...] | None = None
-    cascade: CascadeGains | None = None
-    series: SeriesFilter | None = None
-    feed_forward: FeedForward | None = None
-    acceleration: float | None = None
+    # Written by `_with_law`, as the whole law.
+    W: Annotated[
+        tuple[float, ...] | None,
+        Through(LawFile, lambda _value, _around: None, _anti_windup),
+        Field(alias="law"),
+    ] = None
+    cascade: Annotated[
+        CascadeGains | None, numbers(CascadeGains, CASCADE_UNITS, derived=("k_p_command",))
+    ] = None
+    series: Annotated[
+        SeriesFilter | None, Through(SeriesFile, _series_file, _series), Field(alias="filter")
+    ] = None
+    feed_forward: Annotated[FeedForward | None, numbers(FeedForward, AHEAD_UNITS)] = None
+    acceleration: Annotated[
+        float | None, InUnit("acceleration", above_0=True), Field(alias="reference_acceleration")
+    ] = None
+
+    @model_serializer(mode="wrap")
+    def _with_law(
+        self, plain: SerializerFunctionWrapHandler, info: SerializationInfo[Around]
+    ) -> dict[str, Any]:
+        """The controller with the law that its drive runs, and k_p in the command's unit."""
+        found: dict[str, Any] = plain(self)
+        around = info.context
+        command = around.command
+        if command is not None:
+            found["law"] = written(law_file(self.law(command), around), around)
+        if self.cascade is not None:
+            per, units = command and command.force_per_command, around.units
+            own = None
+            if command and per and command.unit != units.force:
+                unit = f"{command.unit} s/{units.position}"
+                own = Estimate(self.cascade.k_p / per, unit)
+            found["cascade"]["k_p_command"] = own and entry(own, around)
+        return found
 
     @property
     def rst(self) -> RST:
@@ -159,6 +275,41 @@ class CompensatorValues:
 
 
 @dataclass(frozen=True)
+class CompensatorFile:
+    """`CompensatorValues` as a result has it."""
+
+    N_c: Annotated[float, InUnit("1")]
+    e_T: Annotated[float, InUnit("position")]
+    friction: Mapping[str, Parameter]
+    filters: FiltersFile | None = None
+    excess: bool = False
+
+
+def _compensator_file(one: CompensatorValues, _around: Around) -> CompensatorFile:
+    filters = None if one.filters is None or one.h is None else filters_file(one.filters, one.h)
+    return CompensatorFile(one.N_c, one.e_T, one.friction, filters, one.excess)
+
+
+def _compensator(found: CompensatorFile, info: Any) -> CompensatorValues:
+    units, filters = info.context.units.friction, found.filters
+    nine = {name: _nine(one, name, units) for name, one in found.friction.items()}
+    if filters is None:
+        return CompensatorValues(found.N_c, found.e_T, nine, excess=found.excess)
+    return CompensatorValues(
+        found.N_c, found.e_T, nine, filters_of(filters), filters.h, found.excess
+    )
+
+
+def _nine(found: Estimate, name: str, units: Mapping[str, str]) -> Estimate:
+    where = f"[{PLACEHOLDER}.friction.{name}]"
+    if name not in units:
+        raise BadModel(f"{where} is none of the nine: {', '.join(units)}")
+    if found.value is None and (not found.reason or found.assumed is None):
+        raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
+    return in_unit(found, units[name], where)
+
+
+@dataclass(frozen=True)
 class Recommendation:
     """Which controller, with or without the compensator, and why, in one line with numbers.
 
@@ -171,12 +322,17 @@ class Recommendation:
     keep_present: bool = False
 
 
+def _in_full(value: Any, info: SerializationInfo[Around]) -> Any:
+    """Values of a schedule, whose parameters have always been written with all keys."""
+    return [written(one, info.context._replace(in_full=True)) for one in value]
+
+
 @dataclass(frozen=True)
 class ScheduledController:
     """A controller at each point of a schedule; recommended: whether it clearly wins over the fixed
     one, and why, in one line with numbers."""
 
-    points: tuple[Controller, ...]
+    points: Annotated[tuple[Controller, ...], PlainSerializer(_in_full)]
     recommended: bool
     why: str
 
@@ -201,6 +357,51 @@ class GainSchedule:
 
 
 @dataclass(frozen=True)
+class ScheduleFile:
+    """`GainSchedule` as a result has it."""
+
+    over: Over
+    points: tuple[Mapping[str, Estimate | None], ...]
+    pid: ScheduledController | None = None
+    p_pi: ScheduledController | None = None
+
+
+def _schedule_units(over: Over, around: Around) -> dict[str, str]:
+    """Units of a schedule's row by name."""
+    at = {"place": "position", "load": "force", "direction": "1"}[over]
+    return around.units.by_name({"at": at, **FRICTION_AHEAD})
+
+
+def _schedule_file(one: GainSchedule, around: Around) -> ScheduleFile:
+    units = _schedule_units(one.over, around)
+    rows = ((at, *friction) for at, friction in zip(one.at, one.friction, strict=True))
+    points = tuple(
+        {name: Estimate(x, unit) for x, (name, unit) in zip(row, units.items(), strict=True)}
+        for row in rows
+    )
+    return ScheduleFile(one.over, points, one.controllers.get("pid"), one.controllers.get("p-pi"))
+
+
+def _schedule(found: ScheduleFile, info: Any) -> GainSchedule:
+    """The schedule; raises BadModel where a controller has not one at every point."""
+    units = _schedule_units(found.over, info.context)
+    rows = [
+        tuple(numbers_of(one, units, f"{PLACEHOLDER}.points[{k}]", number).values())
+        for k, one in enumerate(found.points)
+    ]
+    every: dict[Structure, ScheduledController | None] = {"pid": found.pid, "p-pi": found.p_pi}
+    controllers = {name: one for name, one in every.items() if one is not None}
+    for name, one in controllers.items():
+        if len(one.points) != len(rows):
+            raise BadModel(
+                f"[{PLACEHOLDER}.{name}] {len(one.points)} controllers at {len(rows)} points; run"
+                " 'workbench design' again"
+            )
+    friction = tuple((row[1], row[2], row[3], row[4]) for row in rows)
+    return GainSchedule(found.over, tuple(row[0] for row in rows), friction, controllers)
+
+
+@dataclass(frozen=True)
 class Design:
     """Controllers of one machine; one may be None with its reason in `refused`.
 
@@ -213,20 +414,25 @@ class Design:
     card: str
     motion: Motion
     plant: Linear
-    force: ForceLoop | None
+    force: Annotated[ForceLoop | None, FORCE_LOOP_UNITS]
     rst: Controller | None
     pid: Controller | None
     refused: Mapping[str, str]
     recommended: Recommended
-    compensator: CompensatorValues
+    compensator: Annotated[
+        CompensatorValues, Through(CompensatorFile, _compensator_file, _compensator)
+    ]
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
     command: Command | None = None
-    present: Present | None = None
+    present: Annotated[Present | None, PRESENT_LOOP] = None
     recommendation: Recommendation | None = None
-    read: tuple[str, ...] = field(default=(), compare=False)
     p_pi: Controller | None = None
-    schedule: GainSchedule | None = None
+    schedule: Annotated[GainSchedule | None, Through(ScheduleFile, _schedule_file, _schedule)] = (
+        None
+    )
+    read: Annotated[tuple[str, ...], *NOT_WRITTEN] = field(default=(), compare=False)
+    schema: Literal["design/2"] = "design/2"
 
     @property
     def controllers(self) -> dict[str, Controller]:

@@ -1,160 +1,30 @@
-"""design.json: a design as it is written, every parameter with its unit."""
+"""design.json: a design as it is written, every parameter with its unit; and read back, in SI, and
+refused where it contradicts itself."""
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-from design.cascade import CascadeGains
-from design.feed_forward import FeedForward
-from design.pid import PIDGains
-from design.schedule import Over
-from design.series_filters import FilterKind, SeriesFilter
+import numpy as np
+
+from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import Shown, shown
-from workbench.cards.units import Motion
-from workbench.documents.design import (
-    Controller,
-    Design,
-    From,
-    GainSchedule,
-    MarginValues,
-    Recommendation,
-    Recommended,
-    Structure,
-)
-from workbench.documents.drive import (
-    Command,
-    CommandFile,
-    FiltersFile,
-    ForceLoopFile,
-    LawFile,
-    Output,
-    PresentFile,
-    command_file,
-    filters_file,
-    force_file,
-    law_file,
-    present_file,
-)
-from workbench.documents.reading import plain
+from workbench.cards.parameter_units import Shown, converted, shown
+from workbench.documents.codec import Around, around_in, written
+from workbench.documents.design import Design
+from workbench.documents.model import used
+from workbench.documents.plausible import refuse_apart, refuse_unequal
+from workbench.documents.reading import Stored, read_raw, validated
 
 DESIGN_SCHEMA = "design/2"
-# A value's numbers by name, each with its unit; None: it has no such number.
-Numbers = Mapping[str, Estimate | None]
-# The unit of each, or the name of one that hangs on the machine, as `Shown.by_name` has it.
-FRICTION_AHEAD = {"F_cp": "force", "F_cn": "force", "F_vp": "viscous", "F_vn": "viscous"}
-UNITS_OF: Mapping[type, Mapping[str, str]] = {
-    PIDGains: {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
-    CascadeGains: {"k_v": "1/s", "k_p": "damping", "T_n": "s", "eps": "s", "v_ff": "1"},
-    FeedForward: {**FRICTION_AHEAD, "band": "velocity", "m": "mass", "most": "force"},
-}
-POLE_UNITS = {"w_n": "rad/s", "zeta": "1"}
-
-
-@dataclass(frozen=True)
-class _LinearFile:
-    source: From
-    why: str
-    A: tuple[float, ...]
-    B: tuple[float, ...]
-    h: Estimate
-    m: Estimate | None
-    F_v: Estimate | None
-    resonance: Mapping[str, Estimate] | None = None
-
-
-@dataclass(frozen=True)
-class SeriesFile:
-    """`SeriesFilter` as a result has it, its width at -3 dB and depth, and b/a in z^-1."""
-
-    kind: FilterKind
-    frequency: Estimate
-    numerator: Estimate
-    denominator: Estimate
-    width: Estimate
-    depth_db: float | None
-    b: tuple[float, ...]
-    a: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class ControllerFile:
-    R: tuple[float, ...]
-    S: tuple[float, ...]
-    T: tuple[float, ...]
-    h: Estimate
-    dominant: Numbers
-    auxiliary: tuple[tuple[float, float], ...]
-    reference_rate: Estimate
-    reference_lag: Estimate
-    margins: MarginValues
-    overshoot: float
-    missed: tuple[str, ...]
-    gains: Numbers | None = None
-    note: str | None = None
-    law: LawFile | None = None
-    cascade: Numbers | None = None
-    filter: SeriesFile | None = None
-    feed_forward: Numbers | None = None
-    reference_acceleration: Estimate | None = None
-
-
-@dataclass(frozen=True)
-class ScheduledFile:
-    """`ScheduledController` as a result has it."""
-
-    points: tuple[ControllerFile, ...]
-    recommended: bool
-    why: str
-
-
-@dataclass(frozen=True)
-class ScheduleFile:
-    """`GainSchedule` as a result has it."""
-
-    over: Over
-    points: tuple[Numbers, ...]
-    pid: ScheduledFile | None = None
-    p_pi: ScheduledFile | None = None
-
-
-@dataclass(frozen=True)
-class _CompensatorFile:
-    N_c: Estimate
-    e_T: Estimate
-    friction: Mapping[str, Estimate]
-    filters: FiltersFile | None = None
-    excess: bool = False
-
-
-@dataclass(frozen=True)
-class DesignFile:
-    """`Design` as design.json has it: every parameter with its unit and, if known, its spread."""
-
-    card: str
-    motion: Motion
-    plant: _LinearFile
-    force: ForceLoopFile | None
-    rst: ControllerFile | None
-    pid: ControllerFile | None
-    refused: Mapping[str, str]
-    recommended: Recommended
-    compensator: _CompensatorFile
-    remarks: tuple[str, ...]
-    versions: Mapping[str, str]
-    command: CommandFile | None = None
-    present: PresentFile | None = None
-    recommendation: Recommendation | None = None
-    p_pi: ControllerFile | None = None
-    schedule: ScheduleFile | None = None
-    schema: Literal["design/2"] = "design/2"
 
 
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document: dict[str, Any] = plain(as_file(found, units_of(found)))
+    document = written(found, Around(units_of(found), found.command, found.output))
     return {"schema": document.pop("schema"), **document}
 
 
@@ -164,119 +34,76 @@ def design_digest(found: Design) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def units_of(found: Design | DesignFile) -> Shown:
+def units_of(found: Design) -> Shown:
     """Units of a design's numbers."""
     return shown(found.motion == "rotary", found.command.unit if found.command else "V")
 
 
-def as_file(found: Design, units: Shown) -> DesignFile:
-    p, c = found.plant, found.compensator
-    limit = found.command.limit if found.command else None
+def read_design(path: Path | Stored) -> Design:
+    """The design in the file `path`, or stored, in SI; raises BadModel in one line where it is
+    none."""
+    raw = read_raw(path, DESIGN_SCHEMA)
+    around = around_in(raw, "motion", raw.get("command"), "unit")
+    found = validated(raw, path, Design, around)
+    try:
+        ours = design_document(found)
+        _refuse_other_laws(raw, ours, found)
+        pairs = tuple(_pairs(raw, ours, ""))
+        _refuse_changed_units(pairs, found)
+    except BadModel as error:
+        raise BadModel(f"{path}: {error}") from None
+    if not found.controllers:
+        raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
+    said = (converted(one, ours, f"[{where}]") for where, one, ours in pairs)
+    return replace(found, read=tuple(line for line in said if line))
 
-    def controller(one: Controller | None) -> ControllerFile | None:
-        return None if one is None else _controller_file(one, found.command, found.output, units)
 
-    return DesignFile(
-        card=found.card,
-        motion=found.motion,
-        plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v, p.resonance),
-        force=None if found.force is None else force_file(found.force, limit, units),
-        rst=controller(found.rst),
-        pid=controller(found.pid),
-        p_pi=controller(found.p_pi),
-        refused=found.refused,
-        recommended=found.recommended,
-        compensator=_CompensatorFile(
-            Estimate(c.N_c, "1"),
-            Estimate(c.e_T, units.position),
-            c.friction,
-            None if c.filters is None or c.h is None else filters_file(c.filters, c.h),
-            c.excess,
-        ),
-        remarks=found.remarks,
-        versions=found.versions,
-        command=None if found.command is None else command_file(found.command, units),
-        present=None if found.present is None else present_file(found.present, limit, units),
-        recommendation=found.recommendation,
-        schedule=None if found.schedule is None else _schedule_file(found, found.schedule, units),
+def _pairs(raw: object, ours: object, where: str) -> Iterator[tuple[str, Estimate, Estimate]]:
+    """Every parameter of a file as it is written and in our units, with its place."""
+    if not (isinstance(raw, Mapping) and isinstance(ours, Mapping)):
+        return
+    if "value" in ours and "unit" in ours:
+        yield where, Estimate(**raw), Estimate(**ours)
+        return
+    for key, one in raw.items():
+        yield from _pairs(one, ours.get(key), f"{where}.{key}" if where else key)
+
+
+def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], found: Design) -> None:
+    """Raises BadModel where a value in another unit is not what the file says in other places."""
+    at = {where: (one, ours) for where, one, ours in pairs}
+    start = "compensator.friction."
+    nine = {w.removeprefix(start): both for w, both in at.items() if w.startswith(start)}
+    refuse_apart(
+        {name: both[0] for name, both in nine.items()},
+        {name: both[1] for name, both in nine.items()},
+        f"[{start}",
     )
+    if "plant.m" in at:
+        (one, ours), (other, same) = at["plant.m"], nine["m"]
+        refuse_unequal("[plant.m]", one, ours, used(same), f"[{start}m]")
+        refuse_unequal(f"[{start}m]", other, same, used(ours), "[plant.m]")
+    for name in found.controllers:
+        place = name.replace("-", "_")
+        (one, ours), (other, same) = at[f"{place}.h"], at["plant.h"]
+        refuse_unequal(f"[{place}.h]", one, ours, used(same), "[plant.h]")
+        refuse_unequal("[plant.h]", other, same, used(ours), f"[{place}.h]")
 
 
-def _schedule_file(found: Design, table: GainSchedule, units: Shown) -> ScheduleFile:
-    names = schedule_units(table.over, units)
-
-    def of(name: Structure) -> ScheduledFile | None:
-        one = table.controllers.get(name)
-        if one is None:
-            return None
-        points = [_controller_file(p, found.command, found.output, units) for p in one.points]
-        return ScheduledFile(tuple(points), one.recommended, one.why)
-
-    points = tuple(
-        _with_units(dict(zip(names, (at, *friction), strict=True)), names)
-        for at, friction in zip(table.at, table.friction, strict=True)
-    )
-    return ScheduleFile(table.over, points, of("pid"), of("p-pi"))
-
-
-def schedule_units(over: Over, units: Shown) -> dict[str, str]:
-    """Units of a schedule's row by name."""
-    at = {"place": "position", "load": "force", "direction": "1"}[over]
-    return units.by_name({"at": at, **FRICTION_AHEAD})
-
-
-def _with_units(values: Mapping[str, float], units: Mapping[str, str]) -> dict[str, Estimate]:
-    return {name: Estimate(values[name], unit) for name, unit in units.items()}
-
-
-def _numbers(value: object, units: Shown) -> dict[str, Estimate] | None:
-    """A value of `UNITS_OF` as it is written; None for None."""
-    if value is None:
-        return None
-    return _with_units(vars(value), units.by_name(UNITS_OF[type(value)]))
-
-
-def _controller_file(
-    one: Controller, command: Command | None, output: Output, units: Shown
-) -> ControllerFile:
-    reason = None if one.rate is not None else "no limit of force or command to keep"
-    return ControllerFile(
-        R=one.R,
-        S=one.S,
-        T=one.T,
-        h=Estimate(one.h, "s"),
-        dominant=_with_units(dict(zip(POLE_UNITS, one.dominant, strict=True)), POLE_UNITS),
-        auxiliary=one.auxiliary,
-        reference_rate=Estimate(one.rate, units.velocity, reason=reason),
-        reference_lag=Estimate(one.lag, "s"),
-        margins=one.margins,
-        overshoot=one.overshoot,
-        missed=one.missed,
-        gains=_numbers(one.gains, units),
-        note=one.note,
-        law=law_file(one.law(command), output, command.limit, units) if command else None,
-        cascade=None if one.cascade is None else _cascade_file(one.cascade, command, units),
-        filter=None if one.series is None else _series_file(one.series),
-        feed_forward=_numbers(one.feed_forward, units),
-        reference_acceleration=None if one.acceleration is None else Estimate(
-            one.acceleration, f"{units.position}/s^2"
-        ),
-    )  # fmt: skip
-
-
-def _cascade_file(gains: CascadeGains, command: Command | None, units: Shown) -> Numbers:
-    """Its gains, and k_p in the unit of the drive's command."""
-    per = command.force_per_command if command else None
-    own = None
-    if command and per and command.unit != units.force:
-        unit = f"{command.unit} s/{units.position}"
-        own = Estimate(gains.k_p / per, unit)
-    return {**(_numbers(gains, units) or {}), "k_p_command": own}
-
-
-def _series_file(one: SeriesFilter) -> SeriesFile:
-    made = one.filter
-    return SeriesFile(
-        one.kind, Estimate(one.frequency, "Hz"), Estimate(one.numerator, "1"),
-        Estimate(one.denominator, "1"), Estimate(one.width, "Hz"), one.depth_db, made.b, made.a,
-    )  # fmt: skip
+def _refuse_other_laws(raw: Mapping[str, Any], ours: Mapping[str, Any], found: Design) -> None:
+    """Raises BadModel where a law is not the controller beside it."""
+    for name in found.controllers:
+        place = name.replace("-", "_")
+        law, own = raw[place].get("law"), ours[place]["law"]
+        if law is None:
+            continue
+        if own is None:
+            raise BadModel(f"[{name}.law] needs [command]; run 'workbench design' again")
+        for key in "RST":
+            if len(own[key]) != len(law[key]) or not np.allclose(
+                own[key], law[key], rtol=1e-9, atol=0.0
+            ):
+                raise BadModel(
+                    f"[{name}.law] {key} is not [{name}] {key} in the unit of the command; run"
+                    " 'workbench design' again"
+                )

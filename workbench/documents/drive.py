@@ -1,13 +1,12 @@
 """What a drive runs, as results hold it: its command, the difference equation, a force loop, and
 the controller that a machine has now.
 
-Here values are plain numbers in SI and in the unit of the command; the file's dataclasses have
-every parameter with its unit.
+Values are plain numbers in SI and in the unit of the command; a file has each with its unit.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -15,35 +14,78 @@ from design.drive_law import DriveLaw
 from design.filters import CompensatorFilters, sampled
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
-from identification.model.plant import over
 from identification.signals.filters import Filter, slope_filter
-from workbench.cards.parameter_units import Shown, in_unit, shown
-from workbench.cards.units import Motion
-
-Output = Literal["command", "force"]
-NO_LIMIT = "the card gives no control_limit"
+from workbench.cards.parameter_units import Shown
+from workbench.documents.codec import Around, Command, InUnit, Output, Parameter, Through
+from workbench.documents.reading import PLACEHOLDER
 
 
 @dataclass(frozen=True)
 class ForceLoop:
     """C_F = k_i (1 + h z^-1/(T_i (1 - z^-1))), k_i [V/N], T_i [s], run every h [s]."""
 
-    k_i: float
-    T_i: float
-    h: float
+    k_i: Annotated[float, InUnit("force_gain")]
+    T_i: Annotated[float, InUnit("s", above_0=True)]
+    h: Annotated[float, InUnit("s", above_0=True)]
 
 
 @dataclass(frozen=True)
-class Command:
-    """What the drive takes: its unit, and the limit of its size in that unit, None for none.
+class ForceLoopFile(ForceLoop):
+    """`ForceLoop` as a result has it; limit: of the command."""
 
-    force_per_command: a motor's k_a [N per unit], 1 where the drive takes a force, None where an
-    actuator stands between.
-    """
+    limit: Annotated[float | None, InUnit("command", for_readers=True)] = None
+    equation: tuple[str, ...] = ()
 
+
+def _force_file(one: ForceLoop, around: Around) -> ForceLoopFile:
+    lines = force_lines(one, around.limit, around.units)
+    return ForceLoopFile(one.k_i, one.T_i, one.h, around.limit, tuple(lines))
+
+
+FORCE_LOOP_UNITS = Through(
+    ForceLoopFile, _force_file, lambda found, _: ForceLoop(found.k_i, found.T_i, found.h)
+)
+
+
+@dataclass(frozen=True)
+class LawFile:
+    """`DriveLaw` as a result has it; input: the unit of r and y; limit: of the output."""
+
+    output: Output
     unit: str
-    limit: float | None
-    force_per_command: float | None
+    input: str
+    h: Annotated[float, InUnit("s", above_0=True)]
+    R: tuple[float, ...]
+    S: tuple[float, ...]
+    T: tuple[float, ...]
+    W: tuple[float, ...]
+    limit: Annotated[float | None, InUnit("command", for_readers=True)]
+    equation: tuple[str, ...] = ()
+
+
+def law_file(law: DriveLaw, around: Around) -> LawFile:
+    """The law as a result writes it."""
+    units, output = around.units, around.output
+    limit = around.limit if output == "command" else None
+    lines = equation_lines(law, output, around.limit, units)
+    return LawFile(
+        output, getattr(units, output), units.position, law.h, law.R, law.S, law.T, law.W, limit,
+        tuple(lines),
+    )  # fmt: skip
+
+
+def law_of(found: LawFile, units: Shown, where: str) -> DriveLaw:
+    """The law of a file; raises BadModel where it is none, or in other units."""
+    for key, unit, ours in (
+        ("unit", found.unit, getattr(units, found.output)),
+        ("input", found.input, units.position),
+    ):
+        if unit != ours:
+            raise BadModel(f"[{where}] {key} = {unit!r}, {ours!r} needed; run the command again")
+    try:
+        return DriveLaw(found.R, found.S, found.T, found.W, found.h)
+    except BadSpecification as error:
+        raise BadModel(f"[{where}] {error}") from None
 
 
 @dataclass(frozen=True)
@@ -62,58 +104,36 @@ class Present:
 
 
 @dataclass(frozen=True)
-class LawFile:
-    """`DriveLaw` as a result has it; input: the unit of r and y; limit: of the output."""
-
-    output: Output
-    unit: str
-    input: str
-    h: Estimate
-    R: tuple[float, ...]
-    S: tuple[float, ...]
-    T: tuple[float, ...]
-    W: tuple[float, ...]
-    limit: Estimate | None
-    equation: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ForceLoopFile:
-    """`ForceLoop` as a result has it; limit: of the command."""
-
-    k_i: Estimate
-    T_i: Estimate
-    h: Estimate
-    limit: Estimate | None = None
-    equation: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class CommandFile:
-    """`Command` as a result has it."""
-
-    unit: str
-    limit: Estimate | None
-    force_per_command: Estimate | None
-
-
-@dataclass(frozen=True)
 class PresentFile:
     """`Present` as a result has it."""
 
     kind: str
-    gains: Mapping[str, Estimate]
+    gains: Mapping[str, Parameter]
     law: LawFile
-    force: ForceLoopFile | None = None
-    reference_rate: Estimate | None = None
+    force: Annotated[ForceLoop | None, FORCE_LOOP_UNITS] = None
+    reference_rate: Annotated[float | None, InUnit("velocity", above_0=True)] = None
 
 
-@dataclass(frozen=True)
-class FilterFile:
-    """A filter b(z^-1)/a(z^-1), a[0] = 1."""
+def present_file(found: Present, limit: float | None, units: Shown) -> PresentFile:
+    """The machine's own controller as a result writes it; limit: of the command."""
+    around = Around(units, Command(units.command, limit, None), found.output)
+    law = law_file(found.law, around)
+    return PresentFile(found.kind, found.gains, law, found.force, found.rate)
 
-    b: tuple[float, ...]
-    a: tuple[float, ...]
+
+def present_of(found: PresentFile, units: Shown, where: str) -> Present:
+    """The machine's own controller of a file; raises BadModel where it is none."""
+    law = law_of(found.law, units, f"{where}.law")
+    return Present(
+        found.kind, found.gains, found.law.output, law, found.force, found.reference_rate
+    )
+
+
+PRESENT_LOOP = Through(
+    PresentFile,
+    lambda one, around: present_file(one, around.limit, around.units),
+    lambda found, info: present_of(found, info.context.units, PLACEHOLDER),
+)
 
 
 @dataclass(frozen=True)
@@ -124,132 +144,32 @@ class FiltersFile:
     slope: from the positions behind A to the velocity.
     """
 
-    A: FilterFile
-    B: FilterFile
-    C: FilterFile
+    A: Filter
+    B: Filter
+    C: Filter
     slope: tuple[float, ...]
-    h: Estimate
-
-
-def law_file(law: DriveLaw, output: Output, limit: float | None, units: Shown) -> LawFile:
-    """The law as a result writes it; limit: of the command."""
-    unit, bounded = getattr(units, output), output == "command" and limit is not None
-    return LawFile(
-        output=output,
-        unit=unit,
-        input=units.position,
-        h=Estimate(law.h, "s"),
-        R=law.R,
-        S=law.S,
-        T=law.T,
-        W=law.W,
-        limit=Estimate(limit, unit) if bounded else None,
-        equation=tuple(equation_lines(law, output, limit, units)),
-    )
-
-
-def law_of(written: LawFile, units: Shown, where: str) -> DriveLaw:
-    """The law of a file; raises BadModel where it is none, or in other units."""
-    for key, unit, ours in (
-        ("unit", written.unit, getattr(units, written.output)),
-        ("input", written.input, units.position),
-    ):
-        if unit != ours:
-            raise BadModel(f"[{where}] {key} = {unit!r}, {ours!r} needed; run the command again")
-    h = positive(written.h, "s", f"{where}.h")
-    try:
-        return DriveLaw(written.R, written.S, written.T, written.W, h)
-    except BadSpecification as error:
-        raise BadModel(f"[{where}] {error}") from None
-
-
-def force_file(force: ForceLoop, limit: float | None, units: Shown) -> ForceLoopFile:
-    """The force loop as a result writes it; limit: of the command."""
-    return ForceLoopFile(
-        Estimate(force.k_i, units.force_gain),
-        Estimate(force.T_i, "s"),
-        Estimate(force.h, "s"),
-        None if limit is None else Estimate(limit, units.command),
-        tuple(force_lines(force, limit, units)),
-    )
-
-
-def force_of(found: ForceLoopFile, units: Shown, where: str) -> ForceLoop:
-    """The force loop of a file; raises BadModel where it is none."""
-    return ForceLoop(
-        number(found.k_i, units.force_gain, f"{where}.k_i"),
-        positive(found.T_i, "s", f"{where}.T_i"),
-        positive(found.h, "s", f"{where}.h"),
-    )
-
-
-def command_file(found: Command, units: Shown) -> CommandFile:
-    """The command as a result writes it."""
-    per, limit = found.force_per_command, found.limit
-    return CommandFile(
-        found.unit,
-        Estimate(limit, found.unit, reason=NO_LIMIT if limit is None else None),
-        None if per is None else Estimate(per, over(units.force, found.unit)),
-    )
-
-
-def command_of(written: CommandFile, motion: Motion) -> Command:
-    """The command of a file; raises BadModel where a number is of another kind."""
-    unit, limit, per = written.unit, written.limit, written.force_per_command
-    units = shown(motion == "rotary", unit)
-    bounded = limit is not None and limit.value is not None
-    return Command(
-        unit,
-        positive(limit, unit, "command.limit") if limit is not None and bounded else None,
-        None if per is None else number(per, over(units.force, unit), "command.force_per_command"),
-    )
-
-
-def present_file(found: Present, limit: float | None, units: Shown) -> PresentFile:
-    """The machine's own controller as a result writes it; limit: of the command."""
-    return PresentFile(
-        kind=found.kind,
-        gains=found.gains,
-        law=law_file(found.law, found.output, limit, units),
-        force=None if found.force is None else force_file(found.force, limit, units),
-        reference_rate=None if found.rate is None else Estimate(found.rate, units.velocity),
-    )
-
-
-def present_of(written: PresentFile, units: Shown, where: str) -> Present:
-    """The machine's own controller of a file; raises BadModel where it is none."""
-    rate = written.reference_rate
-    return Present(
-        kind=written.kind,
-        gains=written.gains,
-        output=written.law.output,
-        law=law_of(written.law, units, f"{where}.law"),
-        force=None if written.force is None else force_of(written.force, units, f"{where}.force"),
-        rate=None if rate is None else positive(rate, units.velocity, f"{where}.reference_rate"),
-    )
+    h: Annotated[float, InUnit("s", above_0=True)]
 
 
 def filters_file(filters: CompensatorFilters, h: float) -> FiltersFile:
     """The compensator's filters as a result writes them; h [s]."""
-    A, B, C = (FilterFile(f.b, f.a) for f in (filters.velocity, filters.error, filters.force))
-    return FiltersFile(A, B, C, slope_filter(h, filters.N_d).b, Estimate(h, "s"))
+    slope = slope_filter(h, filters.N_d).b
+    return FiltersFile(filters.velocity, filters.error, filters.force, slope, h)
 
 
 def filters_of(written: FiltersFile) -> CompensatorFilters:
     """The compensator's filters of a file; raises BadModel where they are none."""
-    h = positive(written.h, "s", "compensator.filters.h")
-    A, B, C = (Filter(f.b, f.a) for f in (written.A, written.B, written.C))
-    found = CompensatorFilters(A, B, C, len(written.slope))
+    found = CompensatorFilters(written.A, written.B, written.C, len(written.slope))
     try:
-        slope = slope_filter(h, found.N_d).b
-        for one in (A, B, C):
+        slope = slope_filter(written.h, found.N_d).b
+        for one in (written.A, written.B, written.C):
             sampled(one)
     except BadSpecification as error:
         raise BadModel(f"[compensator.filters] {error}") from None
     if not np.allclose(slope, written.slope, rtol=1e-9):
         raise BadModel(
-            f"[compensator.filters] slope = {written.slope}: the velocity (5) at h = {h:g} s needs"
-            f" {slope}"
+            f"[compensator.filters] slope = {written.slope}: the velocity (5) at h ="
+            f" {written.h:g} s needs {slope}"
         )
     return found
 
@@ -299,19 +219,3 @@ def _terms(values: Sequence[float], name: str) -> list[str]:
         for back, value in enumerate(values)
         if value != 0.0
     ]
-
-
-def number(found: Estimate, unit: str, where: str) -> float:
-    """A chosen value in `unit`; raises BadModel where there is none, or in another kind of unit."""
-    value = in_unit(found, unit, f"[{where}]").value
-    if value is None:
-        raise BadModel(f"[{where}] is null; a number in {unit!r} needed")
-    return value
-
-
-def positive(found: Estimate, unit: str, where: str) -> float:
-    """As `number`, above 0."""
-    value = number(found, unit, where)
-    if not (value > 0 and np.isfinite(value)):
-        raise BadModel(f"[{where}] {value:g} {unit}: must be > 0")
-    return value

@@ -1,41 +1,39 @@
 """model.json: a model as it is written, and read back in SI."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from identification.effects._library import Library, built_in
 from identification.errors import BadModel
+from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import actuator_units
 from workbench.cards.effect_values import estimates_in_si
-from workbench.cards.parameter_units import all_converted, friction_units, in_unit
+from workbench.cards.parameter_units import all_converted, friction_units, in_unit, shown
+from workbench.documents.codec import Around, Command, around_in, written
 from workbench.documents.model import Model, ModelFile, fields_of
 from workbench.documents.plausible import refuse_changed_units
-from workbench.documents.reading import Stored, as_number, plain, read_result
+from workbench.documents.reading import Stored, as_number, plain, read_raw, validated
 
 MODEL_SCHEMA = "model/1"
 
 
 def model_document(model: Model) -> dict[str, Any]:
     """The model as model.json writes it: the schema first, one entry an estimate."""
-    document = asdict(ModelFile(**fields_of(model)))
-    document["friction"] = {name: as_number(model.friction[name]) for name in NAMES}
-    if model.actuator is not None:
-        document["actuator"] = {key: as_number(value) for key, value in model.actuator.items()}
-    document["effects"] = {
-        key: {name: as_number(value) for name, value in found.items()}
-        for key, found in model.effects.items()
-    }
-    document["falling"] = {name: as_number(one) for name, one in model.falling.items()}
-    document["lag"] = None if model.lag is None else as_number(model.lag)
-    if model.resonance is not None:
-        document["resonance"] = {name: as_number(one) for name, one in model.resonance.items()}
+    document = plain(ModelFile(**fields_of(model)))
+    document["friction"] = {name: document["friction"][name] for name in NAMES}
     if model.controller is not None:
-        document["controller"] = plain(model.controller)
+        document["controller"] = written(model.controller, around_of(model.rig))
     return {"schema": document.pop("schema"), **document}
+
+
+def around_of(rig: Rig) -> Around:
+    """What the written form of a rig's controller hangs on."""
+    units = shown(rig.motion == "rotary", rig.command_unit)
+    return Around(units, Command(units.command, rig.control_limit, None))
 
 
 def read_model(path: Path | Stored, library: Library | None = None) -> Model:
@@ -43,7 +41,9 @@ def read_model(path: Path | Stored, library: Library | None = None) -> Model:
 
     library: the effects that it may name, by default all but a user's own files.
     """
-    found = read_result(path, ModelFile, MODEL_SCHEMA)
+    raw = read_raw(path, MODEL_SCHEMA)
+    rig = raw.get("rig")
+    found = validated(raw, path, ModelFile, around_in(rig, "motion", rig, "command_unit"))
     if library is None:
         library = _installed() if found.effects else built_in()
     try:

@@ -3,21 +3,22 @@ them; and read back: strict JSON into frozen dataclasses, one line where it does
 
 import json
 import math
-import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.card import OFFERED_FOR_VELOCITY
-from workbench.cards.nearest import nearest
+from workbench.cards.nearest import keys_at, nearest
 from workbench.files import ABSURD, RESULT_BYTES, broken_link, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
 UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
+OF_OURS = "refused"  # type of an error of ours, whose text has PLACEHOLDER for where it is
+PLACEHOLDER = "\0"
 MOST_DIGITS = 30  # of a whole number in a result
 
 
@@ -32,32 +33,49 @@ class Stored:
         return self.name
 
 
-def read_result(path: Path | Stored, kind: type[Value], schema: str) -> Value:
+def read_result(path: Path | Stored, kind: type[Value], schema: str, around: Any = None) -> Value:
     """The result of dataclass `kind` in the JSON file `path`, or of one that is stored.
 
-    Raises BadModel, one line: file, key, what was found and needed; an unknown key comes with the
-    nearest right one.
+    Raises as `read_raw` and `validated`.
     """
+    return validated(read_raw(path, schema), path, kind, around)
+
+
+def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
+    """The JSON object in the file, or stored; raises BadModel where it is not of that schema."""
     raw = _read_json(path)
     if not isinstance(raw, Mapping):
         raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a {schema} file")
     found = raw.get("schema")
-    if found != schema:
-        if str(found).startswith("velocity-") and not schema.startswith("velocity-"):
-            raise BadModel(
-                f'{path}: of a rig of kind = "velocity", for which this is not offered; there are'
-                f" {OFFERED_FOR_VELOCITY}"
-            )
-        said = "no 'schema'" if found is None else f"schema {_shown(found)}"
-        raise BadModel(f"{path}: {said}, {schema!r} needed; give the file that command writes")
+    if found == schema:
+        return raw
+    if str(found).startswith("velocity-") and not schema.startswith("velocity-"):
+        raise BadModel(
+            f'{path}: of a rig of kind = "velocity", for which this is not offered; there are'
+            f" {OFFERED_FOR_VELOCITY}"
+        )
+    said = "no 'schema'" if found is None else f"schema {_shown(found)}"
+    raise BadModel(f"{path}: {said}, {schema!r} needed; give the file that command writes")
+
+
+def validated(
+    raw: Mapping[str, Any], path: Path | Stored, kind: type[Value], around: Any = None
+) -> Value:
+    """The value that a JSON object holds; around: what units of its numbers hang on.
+
+    Raises BadModel, one line: file, key, what was found and needed; an unknown key comes with the
+    nearest right one.
+    """
     from pydantic import TypeAdapter, ValidationError
 
     try:
-        text = json.dumps(raw)
-        return TypeAdapter(kind).validate_json(text, strict=True, extra="forbid")
+        return TypeAdapter(kind).validate_json(
+            json.dumps(raw), strict=True, extra="forbid", context=around
+        )
     except ValidationError as error:
-        found = [dict(one) for one in error.errors(include_url=False)]
-        first = next((one for one in found if one["type"] == UNKNOWN_KEY), found[0])
+        every = [dict(one) for one in error.errors(include_url=False)]
+        # What is no such file at all comes before a number that is refused.
+        first = min(every, key=lambda one: (one["type"] != UNKNOWN_KEY, one["type"] == OF_OURS))
         raise BadModel(f"{path}: {_explained(first, kind)}") from None
     except BadModel as error:
         raise BadModel(f"{path}: {error}") from None
@@ -126,27 +144,13 @@ def _whole(text: str) -> int:
     return int(text)
 
 
-def _keys_at(kind: Any, loc: Sequence[str | int]) -> list[str]:
-    """Keys of the dataclass that stands at `loc` in one of `kind`."""
-    for part in loc:
-        hints = [get_type_hints(one) for one in _options(kind) if is_dataclass(one)]
-        inside = [get_args(one) for one in _options(kind) if get_args(one)]
-        kind = hints[0][str(part)] if hints else inside[0][0 if isinstance(part, int) else -1]
-    return [each.name for one in _options(kind) if is_dataclass(one) for each in fields(one)]
-
-
-def _options(kind: Any) -> tuple[Any, ...]:
-    """The types of a union, or the type itself."""
-    return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
-
-
 def _explained(first: Mapping[str, Any], kind: Any) -> str:
     loc = [str(part) for part in first["loc"]]
     table = f"[{'.'.join(loc[:-1])}] " if loc[:-1] else ""
+    if first["type"] == OF_OURS:
+        return str(first["msg"]).replace(PLACEHOLDER, ".".join(loc))
     if first["type"] == UNKNOWN_KEY:
-        return (
-            f"{table}unknown key {loc[-1]!r}{nearest(loc[-1], _keys_at(kind, first['loc'][:-1]))}"
-        )
+        return f"{table}unknown key {loc[-1]!r}{nearest(loc[-1], keys_at(kind, first['loc'][:-1]))}"
     if first["type"] in ("missing", "missing_argument"):
         return f"{table}has no {loc[-1]!r}; add it, or run the command again"
     where = f"[{'.'.join(loc)}] " if loc else ""
@@ -160,12 +164,17 @@ def _shown(value: object) -> str:
 
 def plain(value: object) -> Any:
     """Dataclasses as dictionaries, parameters as results carry them."""
-    if isinstance(value, Estimate):
-        return as_number(value)
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {key: plain(entry) for key, entry in value.items()}
+    match value:
+        case Estimate():
+            return as_number(value)
+        case _ if is_dataclass(value):
+            return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+        case Mapping():
+            return {key: plain(entry) for key, entry in value.items()}
+        case list():
+            return [plain(entry) for entry in value]
+        case tuple():
+            return tuple(plain(entry) for entry in value)
     return value
 
 

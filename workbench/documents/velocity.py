@@ -1,7 +1,7 @@
 """Model and design of a rig whose velocity follows the command, as they are written and read."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,7 +10,7 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.velocity.model import NAMES_OF_VALVE, NUMBERS, Valve
 from workbench.cards.nearest import nearest
-from workbench.documents.reading import as_number, plain, read_document, read_result
+from workbench.documents.reading import plain, read_document, read_result
 
 VELOCITY_MODEL = "velocity-model/1"
 VELOCITY_DESIGN = "velocity-design/1"
@@ -132,12 +132,7 @@ class VelocityDesign:
 
 def velocity_document(found: VelocityModel | VelocityDesign) -> dict[str, Any]:
     """The model or design as it is written: the schema first, one entry an estimate."""
-    out: dict[str, Any] = asdict(found)
-    for name in ("valve", "controller"):
-        if name in out:
-            out[name] = {key: as_number(one) for key, one in getattr(found, name).items()}
-    if isinstance(found, VelocityModel):
-        out["effects"] = {key: plain(own) for key, own in found.effects.items()}
+    out = plain(found)
     return {"schema": out.pop("schema"), "kind": out.pop("kind"), **out}
 
 

@@ -86,8 +86,8 @@ def values_of(what: Exported) -> dict[str, Any]:
     law, force, compensation = loop.law, loop.force, loop.compensation
     own = what.design.p_pi if what.controller == "p-pi" else None
     return {
-        "law": {"R": law.R, "S": law.S, "T": law.T, "W": law.W, "h": law.h},
-        "force": None if force is None else {"k_i": force.k_i, "T_i": force.T_i, "h": force.h},
+        "law": asdict(law),
+        "force": None if force is None else asdict(force),
         "h": loop.h,
         "limit": loop.limit,
         "rate": loop.rate,

@@ -32,7 +32,7 @@ from workbench.cards.card import Card, load_card
 from workbench.cards.own_effects import library
 from workbench.course import Course, Stages, moving, running
 from workbench.documents.design import Design, Structure
-from workbench.documents.design_read import read_design
+from workbench.documents.design_file import read_design
 from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
 from workbench.interface.inputs import (

@@ -10,8 +10,7 @@ from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
 from workbench.cards.own_effects import library as installed
-from workbench.documents.design_file import design_document
-from workbench.documents.design_read import read_design
+from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model
 from workbench.documents.model_file import model_document, read_model
 from workbench.documents.reading import Stored

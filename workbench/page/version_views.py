@@ -85,7 +85,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
 
 def _read(text: str) -> "Design":
     """The design of a document as text, read as from its file; raises UserError."""
-    from workbench.documents.design_read import read_design
+    from workbench.documents.design_file import read_design
     from workbench.documents.reading import Stored
 
     return read_design(Stored("design.json", json.loads(text)))

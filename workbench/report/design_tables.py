@@ -3,9 +3,10 @@
 from design.drive_law import DriveLaw
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number
+from workbench.documents.codec import Output
 from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import units_of
-from workbench.documents.drive import Output, equation_lines, force_lines
+from workbench.documents.drive import equation_lines, force_lines
 from workbench.output import Row
 from workbench.report.view import OUT, notes
 from workbench.screen import Part, instead, listed, more, tabled

@@ -180,14 +180,13 @@ def doctor_picture(found: Examined, path: Path) -> None:
     drawn.savefig(path, format="png", dpi=110)
 
 
-Seen = CheckedLog | Examined
 SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 MOST_BANDS = 60
 NOISE_WIDTHS = 4.0  # of the velocity, within which a direction is not sure
 DRIVE_WORDS = {"F": "applied force", "u": "command"}
 
 
-def doctor_charts(found: Seen) -> list[Chart]:
+def doctor_charts(found: CheckedLog) -> list[Chart]:
     """The pictures of a log that was looked at; fewer where nothing of it can be drawn."""
     clock = _clock_chart(found)
     if found.log is None:
@@ -200,18 +199,18 @@ def doctor_charts(found: Seen) -> list[Chart]:
     return [time] if over is None else [time, over]
 
 
-def unit_of(found: Seen, name: str) -> tuple[float, str]:
+def unit_of(found: CheckedLog, name: str) -> tuple[float, str]:
     """Factor and unit in which a signal is shown."""
     unit = found.command_unit if name == "u" else si_unit(name, found.rig.motion) or ""
     return SCREEN_UNITS.get(unit, (1.0, unit))
 
 
-def speed_unit(found: Seen) -> tuple[float, str]:
+def speed_unit(found: CheckedLog) -> tuple[float, str]:
     """Factor and unit in which a speed is shown."""
     return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
 
 
-def _position(found: Seen) -> Panel:
+def _position(found: CheckedLog) -> Panel:
     log = found.log
     assert log is not None
     factor, unit = unit_of(found, "y")
@@ -229,7 +228,7 @@ def _position(found: Seen) -> Panel:
     return Panel("", f"position [{unit}]", lines, bands=bands)
 
 
-def _drive(found: Seen) -> list[Panel]:
+def _drive(found: CheckedLog) -> list[Panel]:
     log = found.log
     assert log is not None
     out = []
@@ -241,8 +240,8 @@ def _drive(found: Seen) -> list[Panel]:
     return out
 
 
-def _clock_chart(found: Seen) -> Panel:
-    t, h = found.times if isinstance(found, Examined) else found.raw["t"], found.clock.h
+def _clock_chart(found: CheckedLog) -> Panel:
+    t, h = found.raw["t"], found.clock.h
     step = np.diff(t) / h if h > 0.0 else np.diff(t)
     top = max(2.0, 1.1 * float(np.nanmax(step))) if len(step) else 2.0
     line = Line("step", t[1:], step, "quiet")
@@ -250,7 +249,7 @@ def _clock_chart(found: Seen) -> Panel:
     return Panel("time [s]", label, [line], y_range=(0.0, top), height=130)
 
 
-def _over_speed(found: Seen) -> Chart | None:
+def _over_speed(found: CheckedLog) -> Chart | None:
     log = found.log
     assert log is not None
     name = "F" if "F" in log else "u"

@@ -22,6 +22,7 @@ from identification.signals.check import check_driven
 from identification.thresholds import HALF
 from workbench.cards.card_tables import limit_units
 from workbench.cards.readable import number, shown_unit
+from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 
@@ -298,28 +299,17 @@ def axis_document(test: AxisTest) -> dict[str, Any]:
         "reasons": test.reasons,
         "quantities": {one.name: _number(one) for one in test.quantities},
         "breakaways": test.breakaways,
-        "travel": {
-            "place": test.travel.place,
-            "positive": test.travel.positive,
-            "negative": test.travel.negative,
-        },
+        "travel": {way: getattr(test.travel, way) for way in ("place", "positive", "negative")},
         "version": test.earlier.version if test.earlier else None,
         "remarks": test.remarks,
     }  # fmt: skip
 
 
 def _number(one: Quantity) -> dict[str, Any]:
-    estimate, allowed = one.estimate, one.allowed
+    keys = ("value", "unit", "sd", "low", "high", "reason")
+    shown = keys if one.estimate.value is None else keys[:-1]
     return {
-        "value": estimate.value,
-        "unit": estimate.unit,
-        "sd": estimate.sd,
-        "low": estimate.low,
-        "high": estimate.high,
-        **({"reason": estimate.reason} if estimate.value is None else {}),
+        **{key: getattr(one.estimate, key) for key in shown},
         "light": one.light or None,
-        "limits": None if allowed is None else {
-            "low": allowed.low, "high": allowed.high, "source": allowed.source,
-            "logs": allowed.logs, "mean": allowed.mean, "sd": allowed.sd,
-        },
-    }  # fmt: skip
+        "limits": plain(one.allowed),
+    }

@@ -79,49 +79,6 @@ class Delay:
 
 
 @dataclass(frozen=True, eq=False)
-class Examined:
-    """What a log shows before any fit.
-
-    identifiability: what each parameter of the model can be known by, by name; add: runs that
-    would identify the rest; effects: by how many deviations of the noise each would show at a size
-    that matters, None where that was not asked; refused: why `identify` would not take the log,
-    empty where it would.
-    log and motion: the first run, for the picture; None where the log is refused before.
-    """
-
-    file: str
-    rig: Rig
-    clock: Clock
-    sensors: tuple[SensorState, ...]
-    bad: tuple[BadSamples, ...]
-    delays: tuple[Delay, ...]
-    ways: Ways | None
-    identifiability: tuple[Identifiable, ...]
-    add: tuple[str, ...]
-    refused: str
-    remarks: tuple[str, ...]
-    command_unit: str
-    times: Array = field(repr=False)
-    log: Log | None = field(default=None, repr=False)
-    motion: Motion | None = field(default=None, repr=False)
-    effects: Mapping[str, float] | None = None
-
-    @property
-    def main(self) -> tuple[Identifiable, ...]:
-        """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
-        of_valve = self.rig.kind == "velocity"
-        return tuple(one for one in self.identifiability if of_valve or one.name in NAMES)
-
-    @property
-    def verdict(self) -> str:
-        """ "refused", "ready" (all nine can be identified), "in part", or "nothing" (none can)."""
-        if self.refused:
-            return "refused"
-        can = [one.can for one in self.main]
-        return "ready" if all(can) else "in part" if any(can) else "nothing"
-
-
-@dataclass(frozen=True, eq=False)
 class CheckedLog:
     """A log as far as it is known without identifiability: the first and quick part of a check.
 
@@ -142,6 +99,40 @@ class CheckedLog:
     def log(self) -> Log | None:
         """The longest run."""
         return max(self.runs, key=len) if self.runs else None
+
+
+@dataclass(frozen=True, eq=False)
+class Examined(CheckedLog):
+    """What a log shows before any fit.
+
+    identifiability: what each parameter of the model can be known by, by name; add: runs that
+    would identify the rest; effects: by how many deviations of the noise each would show at a size
+    that matters, None where that was not asked; refused: why `identify` would not take the log,
+    empty where it would.
+    log and motion: the first run, for the picture; None where the log is refused before.
+    """
+
+    sensors: tuple[SensorState, ...]
+    delays: tuple[Delay, ...]
+    ways: Ways | None
+    identifiability: tuple[Identifiable, ...]
+    add: tuple[str, ...]
+    motion: Motion | None = field(repr=False)
+    effects: Mapping[str, float] | None
+
+    @property
+    def main(self) -> tuple[Identifiable, ...]:
+        """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
+        of_valve = self.rig.kind == "velocity"
+        return tuple(one for one in self.identifiability if of_valve or one.name in NAMES)
+
+    @property
+    def verdict(self) -> str:
+        """ "refused", "ready" (all nine can be identified), "in part", or "nothing" (none can)."""
+        if self.refused:
+            return "refused"
+        can = [one.can for one in self.main]
+        return "ready" if all(can) else "in part" if any(can) else "nothing"
 
 
 def checked_log(path: Path, card: Card) -> CheckedLog:
@@ -197,21 +188,18 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
         remarks += hardly_identifiable(runs, found.rig)
+    of_log = {
+        **vars(found),
+        "refused": found.refused or seen.reason,
+        "remarks": tuple(dict.fromkeys([*remarks, *seen.remarks])),
+    }
     return Examined(
-        file=found.file,
-        rig=found.rig,
-        clock=found.clock,
+        **of_log,
         sensors=tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t"),
-        bad=found.bad,
         delays=_delays(log, seen.motion, late) if log is not None and seen.motion else (),
         ways=seen.ways,
         identifiability=seen.identifiability,
         add=tuple(dict.fromkeys(one.add for one in seen.identifiability if one.add)),
-        refused=found.refused or seen.reason,
-        remarks=tuple(dict.fromkeys([*remarks, *seen.remarks])),
-        command_unit=found.command_unit,
-        times=found.raw["t"],
-        log=log,
         motion=seen.motion,
         effects=seen.effects,
     )

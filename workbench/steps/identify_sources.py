@@ -12,7 +12,7 @@ from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, without_end
 from workbench.documents.model import Model
 from workbench.documents.plausible import model_remarks
-from workbench.documents.reading import as_number
+from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, Progress, identify
@@ -141,7 +141,7 @@ def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
         "acceptance": found.acceptance,
         "r_hat": dict(found.r_hat),
         "ess": dict(found.ess),
-        "parameters": {name: as_number(one) for name, one in estimates.items()},
+        "parameters": plain(estimates),
     }
 
 

@@ -13,8 +13,9 @@ from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
 from workbench.cards.parameter_units import shown
+from workbench.documents.codec import Command
 from workbench.documents.design import From, Linear
-from workbench.documents.drive import Command, ForceLoop
+from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
 
 FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design

@@ -27,8 +27,10 @@ from workbench.cards.controller import CardController
 from workbench.cards.effect_values import exact
 from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
+from workbench.documents.codec import written
 from workbench.documents.drive import PresentFile
-from workbench.documents.reading import as_number, plain
+from workbench.documents.model_file import around_of
+from workbench.documents.reading import as_number
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop, servo_run
 from workbench.steps.present import present
@@ -246,7 +248,11 @@ def truth(
         "duration_s": recipe.duration,
         "h_s": recipe.h,
         "loop": _loop(recipe.loop) if recipe.loop else None,
-        **({"controller": plain(controller)} if controller and recipe.by_card else {}),
+        **(
+            {"controller": written(controller, around_of(rig))}
+            if controller and rig and recipe.by_card
+            else {}
+        ),
     }
 
 

@@ -1,7 +1,7 @@
 """Training and test runs -> trace: what the model lacks, errors before and after, and the model."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
 from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.documents.plausible import model_remarks
-from workbench.documents.reading import as_number, versions
+from workbench.documents.reading import plain, versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
 from workbench.steps.identify import (
     arx_or_reason,
@@ -175,68 +175,53 @@ def effect_estimates(found: FoundEffect, rig: Rig) -> dict[str, Estimate]:
 
 def trace_document(traced: Traced) -> dict[str, Any]:
     """The trace as trace.json writes it: the keys of the contract, and what it allows beside."""
-    found, rig = traced.trace, traced.model.rig
-    return {
-        "schema": TRACE_SCHEMA,
-        "card": traced.model.card,
-        "log": fingerprints(traced.train),
-        "test_log": fingerprints(traced.test),
-        "verdict": found.verdict,
-        "before": {name: asdict(errors) for name, errors in found.before.items()},
-        "after": {name: asdict(errors) for name, errors in found.after.items()},
-        "noise_floor": {"force_rms": found.noise_force},
-        "effects": [
-            {
-                "key": e.effect.key,
-                "params": _numbers(effect_estimates(e, rig)),
-                "explained": e.explained,
-                "p_value": e.p_value,
-            }
-            for e in found.effects
-        ],
-        **_surroundings(traced),
-        "curves": [_curve(one) for one in found.curves],
-        "rivals": [asdict(rival) for rival in found.rivals],
-        "unknown": {
-            "depends_on": list(found.unknown.depends_on),
-            "explained": found.unknown.explained,
-        },
-        "complete": found.complete,
-        "missing_of_friction": dict(
-            zip(("before", "after"), found.missing or (None, None), strict=True)
-        ),
-        "left": {"share": found.left.share, "depends_on": list(found.left.depends_on)},
-        "drift": [asdict(change) for change in found.drift],
-        "next_experiment": found.next_experiment,
-        "not_tried": list(found.not_tried),
-        "parameters": {
-            "before": _numbers(found.parameters_before),
-            "after": _numbers(found.parameters_after),
-        },
-        "bad_samples": [one.as_json() for one in traced.bad],
-        "remarks": [*traced.remarks, *found.remarks],
-        "versions": versions(),
-    }
-
-
-def _surroundings(traced: Traced) -> dict[str, Any]:
-    """Gravity, constant force and lag, which the plain model has; null where none shows."""
-    model = traced.model
+    found, model = traced.trace, traced.model
     gravity, force = model.effects.get("gravity"), model.effects.get("constant_force")
-    shown = not traced.trace.surroundings.none
-    return {
-        "gravity": _numbers(gravity) if gravity and shown else None,
-        "constant_force": as_number(force["F_0"]) if force and shown else None,
-        "lag": None if model.lag is None else as_number(model.lag),
-        "resonance": None if model.resonance is None else _numbers(model.resonance),
-    }
+    shown = not found.surroundings.none  # of what acts beside the applied force
+    effects = [
+        {"key": e.effect.key, "params": effect_estimates(e, model.rig), "explained": e.explained,
+         "p_value": e.p_value}
+        for e in found.effects
+    ]  # fmt: skip
+    document: dict[str, Any] = plain(
+        {
+            "schema": TRACE_SCHEMA,
+            "card": model.card,
+            "log": fingerprints(traced.train),
+            "test_log": fingerprints(traced.test),
+            "verdict": found.verdict,
+            "before": found.before,
+            "after": found.after,
+            "noise_floor": {"force_rms": found.noise_force},
+            "effects": effects,
+            "gravity": gravity if gravity and shown else None,
+            "constant_force": force["F_0"] if force and shown else None,
+            "lag": model.lag,
+            "resonance": model.resonance,
+            "curves": [_curve(one) for one in found.curves],
+            "rivals": list(found.rivals),
+            "unknown": {
+                "depends_on": list(found.unknown.depends_on),
+                "explained": found.unknown.explained,
+            },
+            "complete": found.complete,
+            "missing_of_friction": dict(
+                zip(("before", "after"), found.missing or (None, None), strict=True)
+            ),
+            "left": {"share": found.left.share, "depends_on": list(found.left.depends_on)},
+            "drift": list(found.drift),
+            "next_experiment": found.next_experiment,
+            "not_tried": list(found.not_tried),
+            "parameters": {"before": found.parameters_before, "after": found.parameters_after},
+            "bad_samples": list(traced.bad),
+            "remarks": [*traced.remarks, *found.remarks],
+            "versions": versions(),
+        }
+    )
+    return document
 
 
 def _curve(one: FreeCurve) -> dict[str, Any]:
     """A free curve and its law, an array each as a list."""
     lists = {name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}
     return {"key": one.effect, "equation": one.equation, "signal": one.signal, **lists}
-
-
-def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
-    return {name: as_number(e) for name, e in estimates.items()}

@@ -21,7 +21,7 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
-from workbench.documents.reading import as_number, versions
+from workbench.documents.reading import plain, versions
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
 from workbench.steps.other_kind import looks_like_friction
@@ -128,7 +128,7 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
         "noise_floor": {"position_rms": found.noise},
         "effects": [
             {"key": key, "words": STRUCTURES[key].words,
-             "params": {name: as_number(one) for name, one in own.items()}}
+             "params": plain(own)}
             for key, own in found.model.effects.items()
         ],
         "rivals": [
@@ -136,7 +136,7 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
             for one in left.rivals
         ],
         "not_tried": list(left.not_tried),
-        "parameters": {name: as_number(one) for name, one in found.model.valve.items()},
+        "parameters": plain(found.model.valve),
         "remarks": list(found.model.remarks),
         "versions": versions(),
     }  # fmt: skip

@@ -14,8 +14,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cli import main
-from workbench.documents.design_file import design_document
-from workbench.documents.design_read import read_design
+from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
 from workbench.steps.design import design

@@ -11,6 +11,7 @@ from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
+from workbench.documents.reading import plain
 
 Criterion = Literal["D", "T"]
 FASTER_THAN_LOGS = (
@@ -141,38 +142,32 @@ def half_width(estimate: Estimate) -> float | None:
 
 def experiment_document(found: Experiment) -> dict[str, Any]:
     """The experiment as experiment.json writes it; infinite limits are null."""
-    limits = found.limits
-    return {
-        "schema": found.schema,
-        "card": found.card,
-        "motion": found.motion,
-        "criterion": found.criterion,
-        "parameters": found.parameters,
-        "limits": {
-            "stroke": limits.stroke,
-            "speed": limits.speed,
-            "force": limits.force,
-            "command": limits.command,
-            "seconds": limits.seconds,
-        },
-        "h": found.h,
-        "samples": len(found.r),
-        "controller": found.controller,
-        "segments": [vars(one) for one in found.segments],
-        "promise": {
-            one.name: {k: v for k, v in vars(one).items() if k != "name"} for one in found.promise
-        },
-        "separation": [vars(one) for one in found.separation],
-        "safety": {
-            "machines": found.safety.machines,
-            "exceeding": found.safety.exceeding,
-            "scale": found.safety.scale,
-            "peaks": vars(found.safety.peaks),
-        },
-        "efficiency": found.efficiency,
-        "loose": found.chaotic,
-        "tried": {"segments": found.tried[0], "runs": found.tried[1]},
-        "seed": found.seed,
-        "remarks": found.remarks,
-        "versions": found.versions,
-    }
+    limits = ("stroke", "speed", "force", "command", "seconds")
+    safety = ("machines", "exceeding", "scale", "peaks")
+    document: dict[str, Any] = plain(
+        {
+            "schema": found.schema,
+            "card": found.card,
+            "motion": found.motion,
+            "criterion": found.criterion,
+            "parameters": found.parameters,
+            "limits": {name: getattr(found.limits, name) for name in limits},
+            "h": found.h,
+            "samples": len(found.r),
+            "controller": found.controller,
+            "segments": list(found.segments),
+            "promise": {
+                one.name: {k: v for k, v in vars(one).items() if k != "name"}
+                for one in found.promise
+            },
+            "separation": list(found.separation),
+            "safety": {name: getattr(found.safety, name) for name in safety},
+            "efficiency": found.efficiency,
+            "loose": found.chaotic,
+            "tried": {"segments": found.tried[0], "runs": found.tried[1]},
+            "seed": found.seed,
+            "remarks": found.remarks,
+            "versions": found.versions,
+        }
+    )
+    return document
