@@ -12,7 +12,6 @@ from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, M
 from identification.estimation.structure_fit import FittedStructure, searched
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
-from identification.model.plant import Actuator
 from identification.thresholds import ASTRAY, COMPLETE
 from tests.identification.plants import ACTUATOR as ELECTRO_PNEUMATIC
 from tests.identification.plants import made_log, table
@@ -54,9 +53,7 @@ def test_of_a_log_with_few_windows_the_equations_are_those_of_windows_of_any_wid
     p, truth = regressed_plant(stage, found, (), recorded).plant, table(1)
     for name in FIVE[:4]:
         assert getattr(p.friction, name) == pytest.approx(getattr(truth, name), rel=0.2)
-    assert isinstance(
-        p.actuator, Actuator
-    )  # of the shorter one no window shows the command's equation
+    assert p.actuator is not None  # of the shorter one no window shows the command's equation
     assert (ACTUATOR in found) is (samples == 600)
     assert p.actuator.k1 == pytest.approx(ELECTRO_PNEUMATIC.k1, rel=0.01)
 
