@@ -35,6 +35,7 @@ from identification.estimation.imposed_motion import (
     without_estimates,
 )
 from identification.estimation.late_position import what_acts_beside
+from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
     RecordedLogs,
     chosen_drive,
@@ -42,13 +43,12 @@ from identification.estimation.recorded_logs import (
     led_by_rig,
     recorded_logs,
 )
-from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
-from identification.estimation.regression.row_fit import rough
 from identification.estimation.settling import is_adequate, settled
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
+    search_is_hopeless,
     searched,
 )
 from identification.estimation.surroundings import surrounding_estimates, widened_friction
@@ -83,6 +83,7 @@ LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
     " a noisy clock or command; stick limits and band are not identifiable"
 )
+WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
 def fit_plant(
@@ -290,9 +291,8 @@ def finished(
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, PRESCRIBED_WHY)
-    if recorded.drive == "force" and not (quick or rough(found.outcomes)):
-        report("searching", 0.0)
-        found = searched(found, recorded, search)
+    if not (quick or needs_no_search(found, recorded)):
+        found = searched(found, recorded, search, report, WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:
@@ -346,6 +346,13 @@ def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> Ka
     `left_by` has it."""
     share = min(left[0], left[1]) / left[2]
     return without_estimates(fit, share) if is_unexplained(share) else fit
+
+
+def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether no search for the plain plant is made: it is followed, a motor drives it, whose
+    stops are searched already, or a search is hopeless."""
+    open_to_more = found.imposed or found.misfit > COMPLETE
+    return recorded.held or not open_to_more or search_is_hopeless(found, recorded)
 
 
 def _identified(fit: KarnoppFit) -> int:

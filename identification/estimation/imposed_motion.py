@@ -28,9 +28,10 @@ from identification.estimation.regression.equation_rows import (
     mechanical,
 )
 from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted
-from identification.estimation.regression.motion_log import motion_log, slowest_sure
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import motion_rows, rows_and_windows
 from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.estimation.regression.weighted_rows import (
     Rows,
     left_unseen,
@@ -81,6 +82,7 @@ def _made(
 ) -> KarnoppFit:
     """A fit of the force equation as one of the machine."""
     logs = recorded.plain
+    firsts = [first_estimate(log, held=recorded.held) for log in logs]
     noise_F = float(np.median([one.noise.F for one in recorded.logs]))
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
@@ -89,7 +91,7 @@ def _made(
     samples = np.tile(center, (NORMAL_SETS, 1))
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
-    nine = _assumed(center, recorded.logs, _slightest_mass(rows))
+    nine = _assumed(center, firsts, _slightest_mass(rows))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -101,7 +103,7 @@ def _made(
         covariance=fit.covariance,
         samples=drawn,
         drive="command" if recorded.held else "force",
-        noise_y=float(np.median([one.noise.y for one in recorded.logs])),
+        noise_y=float(np.median([first.motion.noise for first in firsts])),
         noise_F=noise_F,
         chi_square=(fit.rms / noise_F) ** 2,
         adequate=False,
@@ -239,17 +241,18 @@ def _slightest_mass(data: Sequence[Rows]) -> float:
     return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
 
 
-def _assumed(center: Array, logs: Sequence[MotionLog], slight: float) -> Array:
+def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> Array:
     """All nine for simulation: the five of sliding of their signs, stick just above slip;
     slight: a mass [kg] that the equation does without."""
+    nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
     m = center[0] if center[0] > 0 else slight
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
-    fastest = float(np.median([float(np.max(np.abs(one.signals["v"]))) for one in logs]))
-    edge = min(slowest_sure(logs), WIDEST_ASSUMED * fastest)
+    fastest = float(np.median([float(np.max(np.abs(f.motion.v))) for f in firsts]))
+    edge = np.minimum(nine[5:7], WIDEST_ASSUMED * fastest)
     stick = coulomb + viscous * edge
-    return np.array([m, *coulomb, *viscous, edge, -edge, stick[0], -stick[1]])
+    return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 
 
 def _estimates(

@@ -7,17 +7,13 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._base import AT_REST, Effect
-from identification.errors import NotIdentifiable
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.effect_columns import Values, in_columns
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
-from identification.estimation.regression.motion_log import slowest_sure
-from identification.estimation.regression.motion_rows import motion_rows
-from identification.estimation.regression.row_fit import RowFit, first_stage, with_sizes
+from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
-from identification.estimation.regression.weighted_rows import OVERLAP, solve_rows, stacked
+from identification.estimation.regression.weighted_rows import OVERLAP
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import TWICE
@@ -51,24 +47,22 @@ def regressed_plant(
     Sources: Messenger, Bortz (2021); inverse dynamic model, Gautier, Khalil, CDC 1988.
     """
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
-    logs, rig, sliding = recorded.logs, recorded.rig, outcomes.get(MECHANICAL)
-    prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True)) if sliding else {}
+    sliding = outcomes[MECHANICAL]
+    prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
+    logs, rig = recorded.logs, recorded.rig
     up, down = borne(logs)
     stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
     if BREAKAWAY in outcomes:
         found = outcomes[BREAKAWAY].fit.theta
         stick_p = float(found[0]) if found[0] > 0 else stick_p
         stick_n = -float(found[1]) if found[1] > 0 else stick_n
-    slow = max(sliding.slowest if sliding else 0.0, slowest_sure(stage.logs))
+    slow = max(sliding.slowest, float(np.min([5.0 * one.noise.v for one in stage.logs])))
     nine = Karnopp(**five, dv_p=slow, dv_n=-slow, F_sp=stick_p, F_sn=stick_n)
     drives: Actuator | Motor | None = None
     if ACTUATOR in outcomes:
         k1, k2 = (float(x) for x in outcomes[ACTUATOR].fit.theta[:2])
         drives = Actuator(max(k1, 1e-9), max(k2, 0.0))
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
-    elif recorded.by_command:
-        whole = fit_actuator(recorded.plain)
-        drives = Actuator(max(whole.k1, 1e-9), max(whole.k2, 0.0))
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
     acting, unidentified = [], dict[str, float]()
@@ -79,25 +73,6 @@ def regressed_plant(
         unidentified |= dict.fromkeys(none, np.inf)
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
     return RegressedPlant(Plant(nine, drives, tuple(acting)), prior, unidentified, slow)
-
-
-def without_effects(recorded: RecordedLogs) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The equations of logs without effects, and what they give; where too few of their windows
-    slide, their parameters are those of windows of any width.
-
-    Raises NotIdentifiable where nothing moves. Source: weak form, Messenger, Bortz (2021).
-    """
-    stage, found = first_stage(recorded.logs, recorded.by_command)
-    if MECHANICAL in found:
-        return stage, found
-    rows = stacked(motion_rows(stage.logs, stage.theta))
-    if len(rows.b) < len(FIVE):
-        noise = max(one.noise.v for one in stage.logs)
-        raise NotIdentifiable(
-            f"{recorded.name}: no motion above the noise of the velocity ({noise:.3g} m/s); record"
-            " a run in which the body moves"
-        )
-    return replace(stage, theta=solve_rows(rows).theta), found
 
 
 def _of_effect(

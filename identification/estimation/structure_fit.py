@@ -6,18 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.effects._base import Effect
+from identification.errors import UserError
+from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
 from identification.estimation.regressed_plant import (
     RegressedPlant,
     inertia_is_lost,
     regressed_plant,
-    without_effects,
 )
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.motion_log import shortened
-from identification.estimation.regression.row_fit import RowFit, mean_square, rough
+from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
+from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import (
     Effort,
@@ -30,8 +33,8 @@ from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.stick_search import stick_search, widest_band
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
-from identification.model.plant import Plant
-from identification.progress import Halted
+from identification.model.plant import Actuator, Motor, Plant
+from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 
 PIECE_SECONDS = 10.0  # s of each log, in which fewer marginal stops are lost than in the whole
@@ -69,15 +72,13 @@ def fitted_structure(
     logs, drive = recorded.logs, recorded.drive
     regressed = regressed_plant(stage, outcomes, effects, recorded)
     plant, prior = regressed.plant, dict(regressed.prior)
-    slides = MECHANICAL in outcomes
-    lost = inertia_is_lost(outcomes[MECHANICAL]) if slides else led_by_rig(recorded)
-    if drive == "force" and lost:
+    if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
         return FittedStructure(stage, outcomes, plant, {**prior, **regressed.unidentified}, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
     # follows the velocity as the log shows it, so even of the right effect more than noise is left.
     remembers = any(effect.evolve and effect.place.rubs for effect, _ in effects)
     left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
-    missing = max(left, default=0.0) > ASTRAY and not remembers
+    missing = max(left) > ASTRAY and not remembers
     hopeless = missing and (bool(effects) or rough(outcomes))
     done: Refit | None = None
     try:
@@ -170,31 +171,84 @@ def band(model: FittedStructure) -> float:
 def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedStructure:
     """The plant without effects: by the equations, refined on its free run.
 
-    A search follows where the equations of an actuator's plant are right but its run is not. Ours,
-    of the paper's plant.
+    Where these have too few rows of sliding, the run alone is fitted, from a first estimate. A
+    search follows where the equations of an actuator's plant are right but its run is not. Ours, of
+    the paper's plant.
     """
     regressed, search = rng.spawn(2)
-    stage, first = without_effects(recorded)
+    stage, first = first_stage(recorded.logs, recorded.by_command)
+    if MECHANICAL not in first:
+        return _from_first_estimate(stage, first, recorded)
     model = fitted_structure(stage, first, (), recorded, regressed)
-    steered = recorded.by_command and not (model.imposed or rough(model.outcomes))
-    return searched(model, recorded, search) if steered else model
+    if model.imposed or model.misfit <= COMPLETE or search_is_hard(model, recorded):
+        return model
+    return searched(model, recorded, search)
+
+
+def search_is_hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether a search for the plain plant takes long, or hardly has a chance."""
+    return loose(model.plant, recorded.drive) or rough(model.outcomes)
+
+
+def search_is_hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether it takes long and hardly has a chance."""
+    return loose(model.plant, recorded.drive) and rough(model.outcomes)
+
+
+def _from_first_estimate(
+    stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
+) -> FittedStructure:
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = Karnopp.from_array(np.median(found, axis=0))
+    plant = Plant(nine, actuator_of(recorded))
+    if led_by_rig(recorded):
+        return FittedStructure(stage, first, plant, {}, True)
+    done: Refit | None = None
+    try:
+        done = refit(
+            plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
+        )  # fmt: skip
+        return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
+    except Halted as halted:
+        best, least = _best_so_far(plant, done, halted, recorded)
+        return FittedStructure(stage, first, best, {}, False, least)
+
+
+def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
+    """What drives a plant of these logs, by the command's own equation."""
+    if recorded.rig.kind == "motor" and recorded.rig.force_per_command is not None:
+        return Motor(recorded.rig.force_per_command)
+    if not recorded.by_command:
+        return None
+    found = fit_actuator(recorded.plain)
+    return Actuator(max(found.k1, 1e-9), max(found.k2, 0.0))
 
 
 def searched(
-    model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator
-) -> FittedStructure:
-    """The plain model, where more than noise is left, with its stops searched by themselves about
-    what the equations give, if its run then follows the logs better.
+    model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
+    report: Progress = quiet, attempts: int = 1,
+) -> FittedStructure:  # fmt: skip
+    """The plain model from global searches, where one of these follows the logs better.
 
     Halted, it is the best so far.
     """
-    if model.misfit <= COMPLETE:
-        return model
-    regressed = regressed_plant(model.stage, model.outcomes, (), recorded)
-    try:
-        found = _stops_searched(replace(regressed, prior={}), recorded, rng)
-    except Halted:
-        return model
-    if found.misfit >= model.misfit:
-        return model
-    return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit, imposed=False)
+    for attempt in range(attempts):
+        try:
+            plant = searched_plant(
+                recorded.plain, rng, drive=recorded.drive, report=report, attempt=attempt,
+                halt=recorded.halt,
+            )  # fmt: skip
+        except (UserError, Halted):
+            return model
+        try:
+            found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
+            left_by = misfit(plant, recorded.logs, recorded.drive)
+            better = found.misfit < left_by
+            best, least = (found.plant, found.misfit) if better else (plant, left_by)
+            if least < model.misfit:
+                model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+        except Halted:
+            return model
+        if model.misfit <= COMPLETE:
+            break
+    return model

@@ -27,6 +27,7 @@ STUCK, SLIP_P, SLIP_N, BAND_P, BAND_N, EDGE_P, EDGE_N = range(7)
 MODES = 7
 # Plant parameters as rows of the kernels: the nine in the order of karnopp.NAMES, then k1, k2.
 M, F_CP, F_CN, F_VP, F_VN, DV_P, DV_N, F_SP, F_SN, K1, K2 = range(11)
+PARAMETERS = 11
 # Columns of a mode's row: v+ = a11 v + a12 (F-c) + b1 g, dy = p1 v + p2 (F-c) + p3 g, then the
 # region in which the step holds; l1 v + l2 (F-c) is a velocity that the sample cannot dip below.
 A11, A12, B1, P1, P2, P3, C, V_LO, V_HI, F_LO, F_HI, L1, L2 = range(13)

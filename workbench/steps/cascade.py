@@ -17,7 +17,6 @@ from design.tune import Goals
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.model.plant import Motor
-from identification.thresholds import FAR_LESS
 from workbench.cards.readable import number
 from workbench.documents.design import Controller, Design, Linear, Recommended, margin_values
 from workbench.documents.drive import ForceLoop
@@ -29,6 +28,7 @@ BAND_OF_SPEED = 0.01  # of the fastest speed seen, within which Coulomb friction
 SHARE_OF_FORCE = 0.9  # of the force that friction leaves, which a step may take
 FORCE_BEYOND_LOGS = 2.0  # times the largest force seen, up to which a feed-forward goes
 SPEED_BEYOND_LOGS = 1.5  # times the fastest speed seen, up to which a step is moved
+UNSEEN_SAMPLES = 0.4  # samples, that motion and force may be apart without a log to show it
 FORCE_LAG = 1e-3  # s, that a drive takes to make a force (current loops: 0.1 to 1 ms)
 WELL_BELOW = 4.0  # times its poles' frequency, at least, that a resonance lies above them
 
@@ -59,7 +59,7 @@ def unseen_lag(model: Model) -> float:
     log to show it [s]: a part of its samples, and of a force that is logged without the command
     behind it what a drive takes to make one."""
     delay_known = model.lag is not None or "input_delay" in model.effects
-    sampled = 0.0 if delay_known else FAR_LESS * model.period
+    sampled = 0.0 if delay_known else UNSEEN_SAMPLES * model.period
     return sampled + (FORCE_LAG if model.simulated.actuator is None else 0.0)
 
 

@@ -25,12 +25,8 @@ from identification.estimation.regression.standstill import (
     breakaways,
     rest_stretches,
 )
-from identification.experiment.identifiability import (
-    Tellable,
-    first_plant,
-    identifiability,
-    tellable_effects,
-)
+from identification.estimation.regression.three_step import first_estimate
+from identification.experiment.identifiability import Tellable, identifiability, tellable_effects
 from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Drive, Estimate, KarnoppFit
 from identification.model.karnopp import NAMES
@@ -270,7 +266,7 @@ def identifiability_of_runs(
         around = first.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
-        m = first_plant(recorded).friction.m
+        m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
     except (BadLog, NotIdentifiable) as error:
         return RunsIdentifiability(motion, reason=str(error))
     events = [breakaways(one, m) for one in recorded.logs]

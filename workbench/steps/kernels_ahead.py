@@ -42,11 +42,11 @@ def compile_fits() -> None:
 
 
 def are_compiled() -> bool:
-    """Whether the cache holds the kernel of a fit's errors."""
-    from identification.estimation.windowed_run.windows import freed_kernel
+    """Whether the cache holds the kernel of a fit's search."""
+    from identification.estimation.plain_search.cost import cost_kernel
 
-    cache = Path(freed_kernel.stats.cache_path)  # type: ignore[attr-defined]
-    return any(cache.glob("windows.freed_kernel-*.nbi"))
+    cache = Path(cost_kernel.stats.cache_path)  # type: ignore[attr-defined]
+    return any(cache.glob("cost.cost_kernel-*.nbi"))
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """A log with its motion, its windows in the two equations, and its noise: all that rows and runs
 take from it."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -142,11 +141,6 @@ def _direction(motion: Motion) -> Array:
     """Direction of the motion (n,), 0 where its velocity's noise leaves it open."""
     sure = np.abs(motion.v) > SURE_OF_DIRECTION * motion.v_noise
     return np.where(sure, np.sign(motion.v), 0.0)
-
-
-def slowest_sure(logs: Sequence[MotionLog]) -> float:
-    """Speed [m/s] below which no log shows in which direction its body goes."""
-    return float(min(SURE_OF_DIRECTION * one.noise.v for one in logs))
 
 
 def _gone(y: Array, motion: Motion, h: float) -> Array:

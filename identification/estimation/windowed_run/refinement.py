@@ -22,6 +22,7 @@ from identification.estimation.gauss_newton import (
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import (
     even,
+    loose,
     names_of,
     on_bristle,
     plant_is_motor,
@@ -37,6 +38,7 @@ from identification.estimation.windowed_run.run_errors import (
 )
 from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, start_band
 from identification.estimation.windowed_run.windows import (
+    COARSE,
     RUN_WINDOW,
     WHOLE,
     freed,
@@ -48,6 +50,7 @@ from identification.estimation.windowed_run.windows import (
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halted
+from identification.simulation.effect_table import LONGEST_BRISTLE
 from identification.thresholds import ADEQUATE, COMPLETE, HOPELESS
 
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
@@ -62,6 +65,7 @@ REACHED = 60.0  # misfit up to which short windows may reach the minimum
 ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
 # At most, of a refinement, of one on a bristle and of a quick one
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
+IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
@@ -158,17 +162,21 @@ class _Unknowns:
         """The plant of the unknowns (d,)."""
         return plant_with(self.plant, self.names, self.full(x))
 
-    def misfit(self, x: Array) -> float:
+    def of_plant(self, plant: Plant) -> Array:
+        """The unknowns (d,) of another plant."""
+        return np.asarray(values_of(plant, self.names)[self.at] / self.unit[self.at])
+
+    def misfit(self, x: Array, bristle: float = COARSE) -> float:
         """What the free run of the unknowns (d,) leaves."""
-        return misfit(self.plant_at(x), self.logs, self.drive)
+        return misfit(self.plant_at(x), self.logs, self.drive, bristle)
 
     def refined(
-        self, x: Array, seconds: float, tie: bool, part: float = 0.0,
+        self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
         reach: Array | float = np.inf, little: float | None = None,
     ) -> Minimum:  # fmt: skip
         """The nearest minimum over windows of so many seconds; tie: the regression is the prior."""
         now = self.plant_at(x)
-        errors_of = judge(now, self.logs, self.drive, seconds)
+        errors_of = judge(now, self.logs, self.drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST_FROM, FARTHEST))
         tied = np.flatnonzero(np.isfinite(self.trust) & (self.trust > 0))
@@ -249,6 +257,12 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
         if again.followed and not (seconds == longest and _worse(unknowns, again, at)):
             at = again
     at, found = _ended(unknowns, at, quick)
+    if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
+        # Without a spring the errors of the sub-steps add up.
+        trial = unknowns.refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
+        left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
+        if left_by < found:
+            at, found = trial, left_by
     if effort == "long" and steady and not slow and found <= ADEQUATE:
         return _over_long_runs(unknowns, at, found, longest)
     return at, found, False

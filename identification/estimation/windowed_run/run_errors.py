@@ -8,6 +8,7 @@ from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import loose
 from identification.estimation.windowed_run.windows import (
+    COARSE,
     RUN_WINDOW,
     WHOLE,
     Freed,
@@ -27,14 +28,16 @@ ROBUST_FROM = 3.0  # residual in noise units from which it counts less
 Judge = Callable[[Plant], Array]
 
 
-def judge(plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float) -> Judge:
+def judge(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, bristle: float = COARSE
+) -> Judge:
     """Errors of a plant like this one, in units of the sensors' noise: position (and, driven by the
     command, force) over all logs, less what the windows' uncertain states account for.
 
-    Windows that this plant loses by chance (`misfit`) are left out: 0. Sources: windows, Bock
-    (1983); states, Robinson (1991): `README.md`, (1), (2).
+    Windows that this plant loses by chance (`misfit`) are left out: 0. bristle [s]: longest
+    sub-step of one. Sources: windows, Bock (1983); states, Robinson (1991): `README.md`, (1), (2).
     """
-    free = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
+    free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
     sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
     lost = [_lost(plant, one, drive, own) for one, own in zip(logs, free, strict=True)]
 
@@ -78,13 +81,16 @@ def soft(r: Array, far: float = ROBUST_FROM) -> Array:
     return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far)
 
 
-def misfit(plant: Plant, logs: Sequence[MotionLog], drive: Drive, *, every: bool = False) -> float:
+def misfit(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, bristle: float = COARSE, *,
+    every: bool = False,
+) -> float:  # fmt: skip
     """What the free run leaves of that signal of that log which it follows worst.
 
-    Robust mean square in units of the sensors' noise: 1 where noise alone is left. Where nothing
-    brings the position back, a breakaway that the force only just reaches is a matter of chance and
-    takes its window with it: the worst windows do not count, unless every one is to. Robust as
-    Cauchy's function (Holland, Welsch 1977); `README.md`, (4).
+    Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
+    longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
+    just reaches is a matter of chance and takes its window with it: the worst windows do not count,
+    unless every one is to. Robust as Cauchy's function (Holland, Welsch 1977); `README.md`, (4).
     """
     worst = 0.0
     free = loose(plant, drive) and not every
@@ -92,7 +98,7 @@ def misfit(plant: Plant, logs: Sequence[MotionLog], drive: Drive, *, every: bool
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not walks(one, drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
-            begun = starts(one, drive, seconds)
+            begun = starts(one, drive, seconds, bristle)
             r = window_residual(plant, one, drive, freed(plant, one, drive, begun))
             if r is not None:
                 window = window_of(begun, len(one.log)) if free else None

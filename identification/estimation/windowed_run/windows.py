@@ -45,7 +45,8 @@ STATE_STEP = 0.3  # of a state's deviation, by which the change with it is taken
 class Starts:
     """Samples (k,) at which the windows of a log begin, states there, and their deviations.
 
-    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known.
+    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known. step [s]:
+    longest sub-step of a bristle in the runs.
     """
 
     at: IntArray
@@ -53,12 +54,16 @@ class Starts:
     v: Array
     F: Array
     sd: Array
+    step: float = COARSE
 
 
-def starts(one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW) -> Starts:
+def starts(
+    one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW, bristle: float = COARSE
+) -> Starts:
     """Windows of about so many seconds, begun at rest where the body rests near by.
 
-    Source: restarts as in multiple shooting, Bock (1983); where they lie is ours.
+    bristle [s]: longest sub-step of one. Source: restarts as in multiple shooting, Bock (1983);
+    where they lie is ours.
     """
     n, h = len(one.log), one.log.h
     step = max(2, round(min(seconds / h, 2.0 * n)))
@@ -93,6 +98,7 @@ def starts(one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW) -> Starts:
         np.where(rest, 0.0, one.signals["v"][index]),
         np.asarray(one.log["F"])[index],
         sd,
+        bristle,
     )
 
 
@@ -125,7 +131,7 @@ def window_run(
             drive,
             restarts=(begun.at, y, v, F),
             gain=one.noise.corrected if drive == "command" else 0.0,
-            bristle_step=COARSE,
+            bristle_step=begun.step,
         )
 
     sensors = [acting.effect for acting in plant.effects if acting.effect.place.shows]

@@ -5,19 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification.arrays import Array, IntArray
-from identification.compiled import compiled
+from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import run_kernel
 from identification.simulation.karnopp_lanes import (
-    GAIN,
     WIDTH,
-    F,
-    Y,
-    advance,
+    march,
+    march_held,
     place,
     prepare_lanes,
-    settle_flagged,
     work_space,
 )
 from identification.simulation.karnopp_step import kernel_parameters
@@ -40,29 +36,6 @@ def spread(nine: Karnopp, seed: int, size: float = 0.3) -> Array:
     )
 
 
-@compiled
-def march(
-    p: Array,
-    tables: Array,
-    s: Array,
-    modes: IntArray,
-    u: Array,
-    h: float,
-    out: Array,
-) -> None:
-    """Steps driven by a command: out[k, 0] positions, out[k, 1] forces before step k, per lane."""
-    flat = out.reshape(-1)
-    for k in range(len(u)):
-        command, at, flagged = u[k], 2 * WIDTH * k, 0
-        for i in range(WIDTH):
-            force = s[F * WIDTH + i]
-            flat[at + i] = s[Y * WIDTH + i]
-            flat[at + WIDTH + i] = force
-            flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * command)
-        if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, flat, at)
-
-
 def lanes(p: Array, start: tuple[float, float, float], u: Array) -> Array:
     """Positions and forces (n, 2, WIDTH) of a block driven by a command, in two chunks."""
     s, modes, tables = work_space()
@@ -75,13 +48,19 @@ def lanes(p: Array, start: tuple[float, float, float], u: Array) -> Array:
     return out
 
 
-def alone(p: Array, start: tuple[float, float, float], u: Array) -> Array:
+def alone(
+    p: Array,
+    start: tuple[float, float, float],
+    u: Array,
+    held: tuple[Array, Array, Array] | None = None,
+) -> Array:
     """Position, velocity and force (3, n) of one row of parameters."""
     n = len(u)
     zero, at = np.zeros(n), np.zeros(1, dtype=np.int64)
+    force, slope, y_m = held or (zero, zero, zero)
     y, v, f = (np.array([value]) for value in start)
     out, modes = np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-    run_kernel(p[None], H, False, 0.0, u, zero, zero, zero, at, y, v, f, out, modes)
+    run_kernel(p[None], H, held is not None, 0.0, u, force, slope, y_m, at, y, v, f, out, modes)
     return out
 
 
@@ -95,6 +74,26 @@ def test_lanes_are_the_scalar_run(number: int, start: tuple[float, float, float]
         one = alone(p[lane], start, u)
         assert np.max(np.abs(out[:, 0, lane] - one[0])) < 1e-12
         assert np.max(np.abs(out[:, 1, lane] - one[2])) < 1e-8
+
+
+@pytest.mark.parametrize("coupling", [0.0, 1e3, 1e6])
+def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
+    p = spread(table(2), 7)
+    p[:, 9], p[:, 10] = 0.0, coupling
+    u = excited(4000, 4)
+    truth = alone(spread(table(2), 7)[0], (0.0, 0.0, 0.0), u)
+    y, force = truth[0], truth[2]
+    slope_y, slope = (np.append(np.diff(a) / H, 0.0) for a in (y, force))
+    s, modes, tables = work_space()
+    prepare_lanes(p, H, tables, s)
+    for lane in range(WIDTH):
+        place(s, modes, tables, p, lane, y[0], 0.0, force[0])
+    out = np.zeros((len(u), 2, WIDTH))
+    march_held(p, tables, s, modes, y, force, slope_y, slope, H, out)
+    for lane in range(WIDTH):
+        one = alone(p[lane], (y[0], 0.0, force[0]), 0.0 * u, (force, slope, y))
+        assert np.max(np.abs(out[:, 0, lane] - one[0])) < 1e-12
+        assert np.max(np.abs(out[:, 1, lane] - one[2])) < 1e-12 * max(coupling, 1e3)
 
 
 @settings(max_examples=30)

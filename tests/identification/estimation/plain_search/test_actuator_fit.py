@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from identification.estimation.regression.actuator_fit import fit_actuator
+from identification.estimation.plain_search.actuator_fit import fit_actuator
 from tests.identification.plants import ACTUATOR, made_log, table
 
 
-def test_k1_and_k2_are_found() -> None:
+def test_k1_and_k2_are_found_within_their_spread() -> None:
     fit = fit_actuator([made_log(table(1), seed=1), made_log(table(3), seed=2)])
     assert fit.plausible
     assert fit.k1 == pytest.approx(ACTUATOR.k1, rel=2e-3)
     assert fit.k2 == pytest.approx(ACTUATOR.k2, rel=2e-3)
+    assert np.all(np.abs(fit.constants) < 0.5)
     assert fit.relative < 0.02
 
 

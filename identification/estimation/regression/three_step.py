@@ -1,0 +1,145 @@
+"""First estimate of the nine parameters, in three steps of our own.
+
+The paper names a three-step method of a companion paper without giving it; this one is ours.
+1. Sliding: least squares of the force on the motion gives m, F_cp, F_cn, F_vp, F_vn.
+2. Breakaway: the force at which each rest ends gives F_sp, F_sn.
+3. Band: the speed at which the body stops dead gives dv_p, dv_n.
+Smoothing blurs steps 2 and 3, so their outcome only centres the search that follows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arrays import Array
+from identification.errors import NotIdentifiable
+from identification.log import Log
+from identification.model.inverse_model import InverseModel, Smoothing, fit_inverse
+from identification.signals.differentiate import Motion, differentiate
+
+NO_MOTION = 1.5  # times the noise below which a position's own spread is no motion
+FASTER_MOVES = 5.0  # times the noise of the velocity: faster samples move
+BEFORE_STOP = 0.02  # s of motion used before a stop
+CUTOFFS = (None, 10.0, 3.0)  # Hz; slow motion needs more smoothing to stand out of its noise
+PERIODS = 40.0  # of a cut-off that a log must last
+SEARCH_FACTOR = 4.0  # the search goes this factor beyond a first estimate
+FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
+
+
+@dataclass(frozen=True)
+class FirstEstimate:
+    """Nine values in the order of karnopp.NAMES, the search's range around them, and the motion.
+
+    low, high (9,): bounds for the magnitudes; rest (n,): whether the body stands still.
+    """
+
+    nine: Array
+    low: Array
+    high: Array
+    motion: Motion
+    rest: NDArray[np.bool_]
+
+
+def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
+    """First estimate of the nine from position and force.
+
+    held: the force is a zero-order hold of a command. Raises NotIdentifiable where nothing in the
+    log moves. Ours: the paper names three steps of a companion paper and gives none.
+    """
+    motion = differentiate(log["y"], log.h)
+    moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
+    fastest = float(np.quantile(np.abs(motion.v), FASTEST_QUANTILE))
+    if (
+        fastest <= FASTER_MOVES * motion.v_noise
+        or float(np.std(log["y"])) < NO_MOTION * motion.noise
+    ):
+        raise NotIdentifiable(
+            f"{log.name}: no motion above the noise of the velocity ({motion.v_noise:.3g} m/s);"
+            " record a run in which the body moves"
+        )
+    force = np.abs(log["F"] - np.mean(log["F"]))
+    level = float(np.quantile(force, 0.9))
+    sliding = _sliding(log, held)
+    m, coulomb_p, coulomb_n, viscous_p, viscous_n = _magnitudes(sliding, motion, level, fastest)
+    rest = ~moving
+    stick_p, stick_n = _breakaways(log["F"], rest, motion.v, (coulomb_p, coulomb_n))
+    edge_p, edge_n = _stops(log.h, rest, motion.v, 0.05 * fastest)
+    nine = np.array(
+        [m, coulomb_p, coulomb_n, viscous_p, viscous_n, edge_p, -edge_n, stick_p, -stick_n]
+    )
+    scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
+    # A motor's force has no ramps that would show a narrow band: do not search one.
+    narrow = fastest / (500 if held else 3000)
+    low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
+    high = np.array(
+        [
+            m * SEARCH_FACTOR,
+            2 * scale,
+            2 * scale,
+            2 * max(viscous_p, viscous_n, 0.1 * scale / fastest),
+            2 * max(viscous_p, viscous_n, 0.1 * scale / fastest),
+            fastest / 2,
+            fastest / 2,
+            3 * scale,
+            3 * scale,
+        ]
+    )
+    return FirstEstimate(nine, low, high, motion, rest)
+
+
+def usable_cutoffs(log: Log) -> list[float | None]:
+    """Of CUTOFFS those that the log's sampling and length allow."""
+    return [c for c in CUTOFFS if c is None or (c * log.h < 0.4 and c * log.duration > PERIODS)]
+
+
+def _sliding(log: Log, held: bool) -> InverseModel | None:
+    for cutoff in usable_cutoffs(log):
+        try:
+            return fit_inverse(log, "directional", Smoothing(cutoff=cutoff, held=held))
+        except NotIdentifiable:
+            continue
+    return None
+
+
+def _magnitudes(
+    sliding: InverseModel | None, motion: Motion, level: float, fastest: float
+) -> tuple[float, float, float, float, float]:
+    """Step 1, bounded to be positive: mass and friction that could explain forces of this level."""
+    peak = float(np.quantile(np.abs(motion.a), FASTEST_QUANTILE))
+    mass = level / max(peak, 1e-12)
+    if sliding is None:
+        return mass, 0.5 * level, 0.5 * level, 0.5 * level / fastest, 0.5 * level / fastest
+    m = sliding.m if sliding.m > 0.01 * mass else 0.3 * mass
+    floor = 0.02 * level
+    return (
+        m,
+        max(sliding.F_cp, floor),
+        max(sliding.F_cn, floor),
+        max(sliding.F_vp, 0.0),
+        max(sliding.F_vn, 0.0),
+    )
+
+
+def _breakaways(
+    force: Array, rest: NDArray[np.bool_], v: Array, otherwise: tuple[float, float]
+) -> tuple[float, float]:
+    """Step 2: median magnitude of the force at which a rest ends, by direction of the motion."""
+    ends = np.flatnonzero(rest[:-1] & ~rest[1:])
+    up = ends[(v[ends + 1] > 0) & (force[ends] > 0)]
+    down = ends[(v[ends + 1] < 0) & (force[ends] < 0)]
+    stick_p = float(np.median(force[up])) if len(up) else otherwise[0]
+    stick_n = float(-np.median(force[down])) if len(down) else otherwise[1]
+    return max(stick_p, 0.1 * otherwise[0]), max(stick_n, 0.1 * otherwise[1])
+
+
+def _stops(h: float, rest: NDArray[np.bool_], v: Array, otherwise: float) -> tuple[float, float]:
+    """Step 3: median speed shortly before the body comes to rest, by direction."""
+    back = max(2, round(BEFORE_STOP / h))
+    begins = np.flatnonzero(~rest[:-1] & rest[1:])
+    begins = begins[begins >= back]
+    before = v[begins - back // 2]
+    up, down = before[before > 0], before[before < 0]
+    edge_p = float(np.median(up)) if len(up) else otherwise
+    edge_n = float(-np.median(down)) if len(down) else otherwise
+    return edge_p, edge_n
