@@ -27,7 +27,7 @@ from identification.simulation.karnopp_lanes import (
     work_space,
 )
 
-CHUNK = 64  # samples of all lanes that stay in the cache until their errors are summed
+SAMPLES_TOGETHER = 64  # samples of all lanes that stay in the cache until their errors are summed
 LARGE = 1e100  # product of factors of which the logarithm is taken, far from what overflows
 BEGUN_IN = 3  # of a window: y, v, F
 
@@ -122,8 +122,8 @@ def square_kernel(
         for i in range(len(p)):
             place(s, modes, tables, p, i, begun[0, w], begun[1, w], begun[2, w])
         sums[:] = 0.0
-        for low in range(first, end, CHUNK):
-            high = min(low + CHUNK, end)
+        for low in range(first, end, SAMPLES_TOGETHER):
+            high = min(low + SAMPLES_TOGETHER, end)
             part, driving = out[low - begins : high - begins], force[low:high]
             if len(p) > 0 and held:  # nothing draws it to the log: k2 is 0
                 march_held(
