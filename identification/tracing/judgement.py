@@ -104,13 +104,12 @@ def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], ri
 
 
 def judgement(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
+    chosen: Selection, found: Refinement, held: HeldOut, seen: Sequence[MotionLog], rig: Rig
 ) -> Judgement:
-    """What is to be said of a refined structure whose effects, if any, are proved by the held-out
-    logs `seen`."""
+    """What is to be said of a refined structure that leaves `held`, and whose effects, if any, are
+    proved by the held-out logs `seen`."""
     rows, plain = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
-    held = held_out(chosen, found, seen, rig)
     changed = held.changed
     left = _left(choice, after, chosen) if held.lacking else NOTHING
     of_other_law = other_law(choice, left, held.share)

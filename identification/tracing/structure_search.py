@@ -31,17 +31,8 @@ INTERVALS = "the last step of the plain model's fit, with its intervals"
 
 
 @dataclass(frozen=True, eq=False)
-class FirstEffect:
-    """The plain model, and the choice of the effect that its equations call for first, if any."""
-
-    plain: PlainModel
-    setting: Setting
-    choice: Choice
-
-
-@dataclass(frozen=True, eq=False)
 class Selection:
-    """The effects that the equations choose."""
+    """The plain model, and the effects that the equations choose, or the first of them."""
 
     plain: PlainModel
     setting: Setting
@@ -58,17 +49,17 @@ class Refinement:
 
 def first_effect(
     plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Progress
-) -> FirstEffect:
+) -> Selection:
     """The effect that the equations call for first."""
     rows, start, first, library = plain.rows, plain.start, plain.first, plain.library
     logs = list(rows.logs)
     setting = Setting(
         logs, logs, rows.drive, rig, library, start, first, plain.model, rng.spawn(1)[0]
     )
-    return FirstEffect(plain, setting, choose(start, first, library, rng, report, most=1))
+    return Selection(plain, setting, choose(start, first, library, rng, report, most=1))
 
 
-def selection(begin: FirstEffect, rng: np.random.Generator, report: Progress) -> Selection:
+def selection(begin: Selection, rng: np.random.Generator, report: Progress) -> Selection:
     """The effects that the equations call for, one after the other."""
     plain, setting = begin.plain, begin.setting
     choice = begun = begin.choice

@@ -28,6 +28,7 @@ from identification.thresholds import COMPLETE, WORSE
 from identification.tracing.free_curve import free_curves
 from identification.tracing.judgement import (
     AS_LARGE_AS_FRICTION,
+    HeldOut,
     Judgement,
     held_out,
     judgement,
@@ -40,7 +41,6 @@ from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
-    FirstEffect,
     Refinement,
     Selection,
     first_effect,
@@ -130,12 +130,13 @@ def _traced(
     found = refinement(chosen, report)
     with halt.closing():
         seen = [chosen.plain.rows.recorded.given(log) for log in test]
-        found, doubt = _proved(chosen, found, seen, rig)
+        found, held, doubt = _proved(chosen, found, seen, rig)
     report("settling", 0.0)
     chosen, found = settled_plain(chosen, found, settle, report)
     report("telling", 0.0)
     with halt.closing():
-        judged = judgement(chosen, found, seen, rig)
+        held = held or held_out(chosen, found, seen, rig)
+        judged = judgement(chosen, found, held, seen, rig)
         told = _told(chosen, found, judged, seen, halt.not_tried)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
 
@@ -148,12 +149,13 @@ def _slides(log: Log, rig: Rig) -> bool:
 
 def _proved(
     chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
-) -> tuple[Refinement, str]:
-    """The refinement, or the plain model where its effects do not explain most of what was missing
-    on the held-out logs, or predict their position worse; and what to say of it."""
+) -> tuple[Refinement, HeldOut | None, str]:
+    """The refinement and what it leaves of the held-out logs, or the plain model where its effects
+    do not explain most of what was missing there, or predict force or position worse; and what to
+    say of it."""
     plain, after = chosen.plain.model, found.model
     if not found.choice.steps:
-        return found, ""
+        return found, None, ""
     held = held_out(chosen, found, seen, rig)
     if not held.proved:
         return _unproved(
@@ -167,10 +169,10 @@ def _proved(
             chosen, found, f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
         )
     if not seen or plain.imposed or after.imposed:
-        return found, ""
+        return found, held, ""
     worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
     if worse is None:
-        return found, ""
+        return found, held, ""
     return _unproved(
         chosen, found,
         f"the position of the test logs is predicted worse over {worse.seconds:g} s"
@@ -178,11 +180,11 @@ def _proved(
     )  # fmt: skip
 
 
-def _unproved(chosen: Selection, found: Refinement, said: str) -> tuple[Refinement, str]:
+def _unproved(chosen: Selection, found: Refinement, said: str) -> tuple[Refinement, None, str]:
     """The plain model in place of effects that do not carry over, and what to say of it."""
     names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
     plain = Refinement(without_effects(chosen.plain, found.choice), chosen.plain.model)
-    return plain, f"the equations call for {names}, but with it {said}: not named"
+    return plain, None, f"the equations call for {names}, but with it {said}: not named"
 
 
 def _chosen(
@@ -209,7 +211,7 @@ def _chosen(
 def _first(
     rows: RecordedRows, rig: Rig, library: Library,
     rngs: tuple[np.random.Generator, np.random.Generator], report: Progress,
-) -> FirstEffect:  # fmt: skip
+) -> Selection:  # fmt: skip
     """The plain model of the rows, and the effect that the equations call for first beside it."""
     begin, choose = rngs
     report("refining", 0.0)

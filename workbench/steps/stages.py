@@ -3,8 +3,6 @@
 IDENTIFY_STAGES = {
     "refining": (0.0, 0.4),
     "searching": (0.4, 0.6),
-    "searching stretches": (0.4, 0.6),
-    "searching near": (0.6, 0.65),
     "weighing": (0.5, 0.95),
     "posterior": (0.6, 1.0),
 }
@@ -16,8 +14,6 @@ TRACE_STAGES = {
     "judging": (0.75, 0.9),
     "settling": (0.45, 0.5),
     "searching": (0.5, 0.7),
-    "searching stretches": (0.5, 0.7),
-    "searching near": (0.7, 0.75),
     "weighing": (0.6, 0.95),
     "telling": (0.95, 1.0),
 }

@@ -29,7 +29,7 @@ from identification.simulation.karnopp_lanes import (
 
 SAMPLES_TOGETHER = 64  # samples of all lanes that stay in the cache until their errors are summed
 LARGE = 1e100  # product of factors of which the logarithm is taken, far from what overflows
-BEGUN_IN = 3  # of a window: y, v, F
+START_STATES = 3  # of a window: y, v, F
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class LikelyLog:
             states[2] = force[own.begun.at]
         signals, share, sd = compared(one, drive)
         rows, seen = len(signals), np.zeros((2, len(log)))
-        weight, B = np.zeros_like(seen), np.zeros((BEGUN_IN, *seen.shape))
+        weight, B = np.zeros_like(seen), np.zeros((START_STATES, *seen.shape))
         seen[:rows], B[:, :rows] = signals, own.B / ROBUST_FROM
         weight[:rows] = own.weight * (share / sd / ROBUST_FROM)[:, np.newaxis]
         return cls(
@@ -114,7 +114,7 @@ def square_kernel(
     s, modes, tables = work_space()
     if len(p) > 0:
         prepare_lanes(p, h, tables, s)
-    states, sums = np.zeros((BEGUN_IN, WIDTH)), np.zeros((BEGUN_IN, WIDTH))
+    states, sums = np.zeros((START_STATES, WIDTH)), np.zeros((START_STATES, WIDTH))
     square[:] = 0.0
     for w in range(len(at)):
         first, end = at[w], at[w + 1] if w + 1 < len(at) else len(u)
@@ -136,9 +136,9 @@ def square_kernel(
                 march(p, tables, s, modes, u[low:high], h, part)
             _add_state_sums(part, seen, weight, B, low, sums)
         for i in range(WIDTH):
-            for j in range(BEGUN_IN):
+            for j in range(START_STATES):
                 state = 0.0
-                for other in range(BEGUN_IN):
+                for other in range(START_STATES):
                     state += inverse[w, j, other] * sums[other, i] * ROBUST_FROM * ROBUST_FROM
                 states[j, i] = state
                 square[i] += state * state
