@@ -63,14 +63,32 @@ def trial(
     return sum(x.criterion for x in found.values()), found
 
 
-def best_of(
-    stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]
-) -> EffectCandidate | None:
-    """The effect at its best beside what the stage holds; None where it cannot show or stand.
+@dataclass(frozen=True, eq=False)
+class FirstShape:
+    """An effect at the best of the shapes to begin with: the equations it shows in, `score` of a
+    shape, the shape and what it gains, and where it may be refined."""
 
-    Source: variable projection, Golub, Pereyra (1973); the shape by grid and Nelder, Mead (1965).
+    stage: EffectRows
+    effect: Effect
+    base: Mapping[str, RowFit]
+    shown_in: tuple[str, ...]
+    score: Callable[[Values], float]
+    shape: Values
+    gain: float
+    bounds: tuple[tuple[float, float], ...]
+
+    @property
+    def by_rounds(self) -> bool:
+        """Whether what it does depends on the friction itself, so that this tells little yet."""
+        return needs_rounds(self.effect)
+
+
+def first_shape(stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]) -> FirstShape | None:
+    """The effect at the best shape of a grid; None where it cannot show.
+
+    Source: variable projection, Golub, Pereyra (1973).
     """
-    shown_in = [e for e in equations_of(effect, stage.by_command, stage.held) if e in base]
+    shown_in = tuple(e for e in equations_of(effect, stage.by_command, stage.held) if e in base)
     if not shown_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
         return None
     if effect.signals and not any(
@@ -79,36 +97,70 @@ def best_of(
         return None
     free = shape_params(effect)
     grids = [shape_grid(effect, p, stage.logs) for p in free]
-    starts = [
-        dict(zip((p.name for p in free), map(float, x), strict=True)) for x in product(*grids)
-    ]
-
-    bounds = [bounds_of(p, g) for p, g in zip(free, grids, strict=True)]
-    own = stage
 
     def score(shape: Values) -> float:
-        total, found = trial(own, effect, shape, shown_in)
+        total, found = trial(stage, effect, shape, shown_in)
         fair = needs_rounds(effect) or admissible(effect, with_sizes(effect, shape, found))
         return total if fair else OUT_OF_BOUNDS
 
-    best = min(starts, key=score)
+    names = [p.name for p in free]
+    starts = [dict(zip(names, map(float, x), strict=True)) for x in product(*grids)]
+    least, best = min(((score(x), x) for x in starts), key=lambda one: one[0])
+    gain = sum(base[e].criterion for e in shown_in) - least
+    bounds = tuple(bounds_of(p, g) for p, g in zip(free, grids, strict=True))
+    return FirstShape(stage, effect, base, shown_in, score, best, float(gain), bounds)
+
+
+def best_of(
+    stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]
+) -> EffectCandidate | None:
+    """The effect at its best beside what the stage holds; None where it cannot show or stand."""
+    start = first_shape(stage, effect, base)
+    return None if start is None else refined(start)
+
+
+def refined(start: FirstShape) -> EffectCandidate | None:
+    """The effect at its best; None where it cannot stand.
+
+    Source: variable projection, Golub, Pereyra (1973); the shape by Nelder, Mead (1965).
+    """
+    effect, shown_in, own, bounds = start.effect, start.shown_in, start.stage, start.bounds
+    free = shape_params(effect)
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
-    best = shaped(free, bounds, best, score)
+
+    def score(shape: Values) -> float:
+        return trial(own, effect, shape, shown_in)[0] if start.by_rounds else start.score(shape)
+
+    best = shaped(free, bounds, start.shape, score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
     if half != best and score(half) < score(best) + PENALTY:
         best = half  # a harmonic had taken the whole of it
     total, found = trial(own, effect, best, shown_in)
-    for i in range(SUBSTITUTIONS if needs_rounds(effect) else 0):
+    for i in range(SUBSTITUTIONS if start.by_rounds else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
         if i == 0:  # the plain friction's levels had bent its shape
             best = shaped(free, bounds, best | defaults, score)
         total, found = trial(own, effect, best, shown_in)
-    values = with_sizes(effect, best, found)
-    if not admissible(effect, values):
+    return _candidate(start, best, total, found)
+
+
+def unrefined(start: FirstShape) -> EffectCandidate | None:
+    """The effect at the shape it begins with; None where it cannot stand there."""
+    return _candidate(
+        start, start.shape, *trial(start.stage, start.effect, start.shape, start.shown_in)
+    )
+
+
+def _candidate(
+    start: FirstShape, shape: Values, total: float, found: dict[str, RowFit]
+) -> EffectCandidate | None:
+    """The candidate of this shape; None where its sizes are none that it may have."""
+    values = with_sizes(start.effect, shape, found)
+    if not admissible(start.effect, values):
         return None
-    gain = sum(base[e].criterion for e in shown_in) - total
-    return EffectCandidate(effect, values, found, float(gain))
+    gain = sum(start.base[e].criterion for e in start.shown_in) - total
+    return EffectCandidate(start.effect, values, found, float(gain))
 
 
 def shaped(

@@ -35,7 +35,14 @@ from identification.estimation.regression.signals_behind_effects import (
 )
 from identification.progress import Halted, Progress
 from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
-from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.candidates import (
+    EffectCandidate,
+    FirstShape,
+    best_of,
+    first_shape,
+    refined,
+    unrefined,
+)
 from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import by_luck, chance
 
@@ -43,6 +50,7 @@ ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
+IN_SIGHT = 0.1  # of what the best shape of any effect's grid gains, from which a shape is refined
 HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even searched
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
@@ -206,16 +214,27 @@ def polished(
 def all_candidates(
     stage: EffectRows, base: Mapping[str, RowFit], library: Library, report: Callable[[float], None]
 ) -> list[EffectCandidate]:
-    """Every effect of the library that is not in the stage yet, at its best beside it."""
+    """Every effect of the library that is not in the stage yet, beside it: at its best, or as it
+    begins where that is far behind another's begin."""
     taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
     keys = [k for k in library if k not in taken and k not in ABSORBED]
-    found: list[EffectCandidate] = []
     with ThreadPoolExecutor(2) as pool:
-        each = pool.map(lambda key: best_of(stage, library[key], base), keys)
-        for i, candidate in enumerate(each):
-            if candidate is not None:
-                found.append(candidate)
-            report((i + 1) / len(keys))
+        starts = []
+        for i, start in enumerate(
+            pool.map(lambda key: first_shape(stage, library[key], base), keys)
+        ):
+            starts += [] if start is None else [start]
+            report(0.5 * (i + 1) / len(keys))
+        least = IN_SIGHT * max((start.gain for start in starts), default=0.0)
+
+        def done(start: FirstShape) -> EffectCandidate | None:
+            near = start.by_rounds or start.gain >= least
+            return refined(start) if near else unrefined(start)
+
+        found: list[EffectCandidate] = []
+        for i, candidate in enumerate(pool.map(done, starts)):
+            found += [] if candidate is None else [candidate]
+            report(0.5 + 0.5 * (i + 1) / len(starts))
     return found
 
 
