@@ -23,7 +23,6 @@ from identification.tracing.free_run.backward_elimination import (
     suffices,
 )
 from identification.tracing.free_run.forward_selection import judged_forward
-from identification.tracing.free_run.rivals import discriminated
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
 
@@ -92,7 +91,7 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
         choice, model = fewest(choice, setting)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    return Refinement(discriminated(choice, model, setting), by_equations(choice, model, setting))
+    return Refinement(choice, by_equations(choice, model, setting))
 
 
 def by_equations(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:

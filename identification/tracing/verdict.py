@@ -18,11 +18,10 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
 from identification.thresholds import HALF, OF_ACCOUNT
-from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
-from identification.tracing.regression.stepwise import Choice, Step, explained_part
+from identification.tracing.regression.stepwise import Choice, Step, equal_rivals, explained_part
 from identification.tracing.remaining_structure import signals_at, signals_of
 from identification.tracing.result import (
     Change,
@@ -110,8 +109,6 @@ def rivals_of(choice: Choice, seen: Sequence[MotionLog]) -> tuple[EffectRival, .
             why = (
                 f"explains as much as {step.candidate.effect.key} on these logs"
                 if key in equal
-                else f"leaves more in the run than {step.candidate.effect.key} does"
-                if key in step.apart
                 else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
             )
             out.append(EffectRival(key, _test_rms(step, c, stage), why))

@@ -96,7 +96,6 @@ from identification.tracing.free_run.backward_elimination import (
     followed_up_to,
 )
 from identification.tracing.free_run.forward_selection import decisive
-from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.levels_refitted import explains_the_change, follows_worse
 from identification.tracing.model_errors import NoiseFloor, OnTest, lacks, share_left
 from identification.tracing.parameter_drift import changes
@@ -107,6 +106,7 @@ from identification.tracing.regression.significance import by_luck, chance
 from identification.tracing.regression.stepwise import (
     Choice,
     Step,
+    equal_rivals,
     gives_way,
     is_trusted,
     material,

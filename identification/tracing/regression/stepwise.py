@@ -61,8 +61,7 @@ FURTHER_EFFECT = "a further effect beside the first"
 class Step:
     """One effect taken: the candidate, its p-value, its rivals in order, stage and base before.
 
-    explained: share of what is missing that it accounts for in the free run, where that decided;
-    apart: keys of rivals that the equations do not separate from it, but the free run does.
+    explained: share of what is missing that it accounts for in the free run, where that decided.
     """
 
     candidate: EffectCandidate
@@ -71,7 +70,6 @@ class Step:
     stage: EffectRows
     base: Mapping[str, RowFit]
     explained: float | None = None
-    apart: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,6 +275,14 @@ def merit(candidate: EffectCandidate) -> float:
     penalty that is calibrated on machines without an effect.
     """
     return candidate.gain - PENALTY * len(candidate.effect.params)
+
+
+def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
+    """Rivals that explain as much as the effect taken, but for luck."""
+    mine = merit(step.candidate)
+    return tuple(
+        c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
+    )
 
 
 def shows_fast(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
