@@ -64,6 +64,7 @@ def summary(found: Trace) -> dict[str, Any]:
                 "sd": {k: e.sd for k, e in one.params.items()},
                 "explained": one.explained,
                 "p_value": one.p_value,
+                "probability": one.probability,
             }
             for one in found.effects
         ],
@@ -75,6 +76,7 @@ def summary(found: Trace) -> dict[str, Any]:
         "noise_force": found.noise_force,
         "noise_actuator": found.noise_actuator,
         "missing": found.missing,
+        "evidence": found.evidence,
         "gained": None if found.missing_force is None else found.missing_force.gained,
         "parameters": {k: e.value for k, e in found.parameters_after.items()},
         "next_experiment": found.next_experiment,

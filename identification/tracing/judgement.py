@@ -23,6 +23,7 @@ from identification.tracing.model_errors import (
     share_left,
 )
 from identification.tracing.parameter_drift import parameter_drift
+from identification.tracing.probability import Evidence, is_probable, probability
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import remaining_structure, strongest
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
@@ -104,16 +105,20 @@ def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], ri
 
 
 def judgement(
-    chosen: Selection, found: Refinement, held: HeldOut, seen: Sequence[MotionLog], rig: Rig
-) -> Judgement:
+    chosen: Selection, found: Refinement, held: HeldOut, terms: Evidence,
+    seen: Sequence[MotionLog], rig: Rig,
+) -> Judgement:  # fmt: skip
     """What is to be said of a refined structure that leaves `held`, and whose effects, if any, are
-    proved by the held-out logs `seen`."""
+    proved by the held-out logs `seen`; terms: the evidence of these."""
     rows, plain = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
     changed = held.changed
     left = _left(choice, after, chosen) if held.lacking else NOTHING
     of_other_law = other_law(choice, left, held.share)
     doubts = list(map(_not_its_law, of_other_law))
+    sure = probability(terms)
+    if choice.steps and not is_probable(sure):
+        doubts.append(_hardly_probable(choice, sure))
     if held.hides_friction:
         doubts.append(AS_LARGE_AS_FRICTION)
     known = not doubts and (bool(choice.steps) or not held.lacking)
@@ -135,6 +140,15 @@ def judgement(
 def _not_its_law(key: str) -> str:
     """What to say of an effect whose own signals tell of what it leaves."""
     return f"like {key}, but not its law: what is left depends on the same signals"
+
+
+def _hardly_probable(choice: Choice, sure: float) -> str:
+    """What to say of effects that are rather others' stand-ins than the machine's."""
+    names = " and ".join(step.candidate.effect.key for step in choice.steps)
+    return (
+        f"like {names}, but rather another effect that resembles what they do: of machines on which"
+        f" as much is left, {100 * sure:.0f} % have what is named"
+    )
 
 
 def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependence:

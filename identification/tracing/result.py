@@ -31,12 +31,14 @@ class Errors:
 @dataclass(frozen=True)
 class FoundEffect:
     """An effect that was added: its parameters, the share of what was missing that it explains,
-    and the chance that the largest gain of a model without any effect is as large."""
+    the chance that the largest gain of a model without any effect is as large, and how probable it
+    is that the machine has it (`probability`)."""
 
     effect: Effect
     params: Mapping[str, Estimate]
     explained: float
     p_value: float
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,11 @@ class MissingForce:
         return self.before is not self.after
 
     @property
+    def share_left(self) -> float | None:
+        """The force that is still missing with the effects, over that without; None of none."""
+        return self.after.rms / self.before.rms if self.before.rms > 0.0 else None
+
+    @property
     def gained(self) -> float:
         """What the effects gain of the log-likelihood of what was measured there [nats], the latent
         force as large as each model needs it."""
@@ -150,7 +157,8 @@ class Trace:
     for, so that its verdict is one for the time being. command_period: as of a fit. curves: of the
     effects named that are a function of a logged signal. surroundings: what acts beside the applied
     force, which is part of the plain model: errors and parameters are of logs without it.
-    missing_force: None where no body slides.
+    missing_force: None where no body slides. evidence: terms of `probability`, where effects are
+    named.
     """
 
     verdict: TraceVerdict
@@ -178,6 +186,7 @@ class Trace:
     curves: tuple[FreeCurve, ...] = ()
     surroundings: Surroundings = NO_SURROUNDINGS
     missing_force: MissingForce | None = None
+    evidence: tuple[float, ...] = ()
 
     @property
     def missing(self) -> tuple[float, float] | None:

@@ -22,6 +22,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
 from identification.model.surroundings import Surroundings
 from identification.thresholds import CHANCE_LEVEL
+from identification.tracing.probability import evidence, probability
 from identification.tracing.result import (
     Dependence,
     Errors,
@@ -125,17 +126,19 @@ def _with_named(
     """The trace with these effects first among its own; left: of "train" and "test", what the
     equation leaves without them and with them.
 
-    `explained` is of all of them together. Each stood out of 0 by so many deviations that chance
-    would not, so its p-value is at most the level asked for.
+    `explained` and `probability` are of all of them together. Each stood out of 0 by so many
+    deviations that chance would not, so its p-value is at most the level asked for.
     """
     without, with_them = left["test"]
-    known = surrounding_estimates(around)
+    known, share = surrounding_estimates(around), (with_them / without) ** 2
+    sure = probability(evidence(None, share, len(named)))
     found = tuple(
         FoundEffect(
             one.effect,
             {p.name: known[f"{one.key}.{p.name}"] for p in one.effect.params},
-            1.0 - (with_them / without) ** 2,
+            1.0 - share,
             CHANCE_LEVEL,
+            sure,
         )
         for one in named
     )
@@ -146,7 +149,7 @@ def _with_named(
         effects=(*found, *of.effects),
         verdict="effect" if nothing_else else of.verdict,
         complete=of.complete or of.verdict == "none",
-        left=replace(of.left, share=of.left.share * (with_them / without) ** 2),
+        left=replace(of.left, share=of.left.share * share),
     )
 
 

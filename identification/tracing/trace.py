@@ -36,10 +36,11 @@ from identification.tracing.judgement import (
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
+from identification.tracing.probability import Evidence, evidence
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
-from identification.tracing.result import Trace, TraceVerdict
+from identification.tracing.result import MissingForce, Trace, TraceVerdict
 from identification.tracing.structure_search import (
     Refinement,
     Selection,
@@ -136,9 +137,22 @@ def _traced(
     report("telling", 0.0)
     with halt.closing():
         held = held or held_out(chosen, found, seen, rig)
-        judged = judgement(chosen, found, held, seen, rig)
-        told = _told(chosen, found, judged, seen, halt.not_tried)
+        lacks = _missing(chosen, found, seen)
+        force_left = None if lacks is None else lacks.share_left
+        terms = evidence(force_left, held.share, len(found.choice.steps))
+        judged = judgement(chosen, found, held, terms, seen, rig)
+        told = _told(chosen, found, judged, terms, halt.not_tried, seen, lacks)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
+
+
+def _missing(
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
+) -> MissingForce | None:  # fmt: skip
+    """The force that the plain model and the refined one lack on the test logs, or without them on
+    those of the fit."""
+    choice, after, logs = found.choice, found.model, list(chosen.plain.rows.logs)
+    slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(after))
+    return missing_force(chosen.plain.model, after, seen or logs, slowest)
 
 
 def _slides(log: Log, rig: Rig) -> bool:
@@ -221,13 +235,12 @@ def _first(
 
 
 def _told(
-    chosen: Selection, found: Refinement, judged: Judgement, seen: Sequence[MotionLog],
-    not_tried: tuple[str, ...],
+    chosen: Selection, found: Refinement, judged: Judgement, terms: Evidence,
+    not_tried: tuple[str, ...], seen: Sequence[MotionLog], lacks: MissingForce | None,
 ) -> Trace:  # fmt: skip
-    """All of it as the trace's result; seen: the test logs."""
+    """All of it as the trace's result; terms: evidence of the effects; seen: the test logs."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
-    slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(after))
     return Trace(
         verdict=_so_far(judged.verdict, after, not_tried),
         before=judged.before,
@@ -236,7 +249,7 @@ def _told(
         noise_F=float(np.mean([one.noise.F for one in logs])),
         noise_force=row_noise(choice.base, MECHANICAL) or 0.0,
         noise_actuator=row_noise(choice.base, ACTUATOR),
-        effects=tuple(found_effect(s, after, choice) for s in choice.steps),
+        effects=tuple(found_effect(s, after, choice, terms) for s in choice.steps),
         rivals=rivals_of(choice, seen),
         unknown=judged.left,
         drift=judged.drift,
@@ -252,7 +265,8 @@ def _told(
         left=judged.rest,
         command_period=rows.recorded.command_period,
         curves=free_curves(choice),
-        missing_force=missing_force(before, after, seen or logs, slowest),
+        missing_force=lacks,
+        evidence=terms if choice.steps else (),
     )
 
 

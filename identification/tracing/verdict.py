@@ -19,6 +19,7 @@ from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
 from identification.thresholds import HALF, OF_ACCOUNT
 from identification.tracing.model_errors import seen_by
+from identification.tracing.probability import Evidence, probability
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
 from identification.tracing.regression.stepwise import Choice, Step, equal_rivals, explained_part
@@ -81,8 +82,11 @@ def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]
     )
 
 
-def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEffect:
-    """An effect taken, with its sizes in the refined plant and the share it explains."""
+def found_effect(
+    step: Step, after: FittedStructure, choice: Choice, terms: Evidence
+) -> FoundEffect:  # fmt: skip
+    """An effect taken, with its sizes in the refined plant, the share it explains and how probable
+    it is by the evidence, which it shares with rivals that explain as much."""
     effect = step.candidate.effect
     acting = next(a for a in after.plant.effects if a.key == effect.key)
     params = {
@@ -94,7 +98,8 @@ def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEff
     explained = step.explained
     if explained is None:
         explained = explained_part(step.candidate, step.base)
-    return FoundEffect(effect, params, explained, step.p_value)
+    sure = probability(terms, alike=len(equal_rivals(step)))
+    return FoundEffect(effect, params, explained, step.p_value, sure)
 
 
 def rivals_of(choice: Choice, seen: Sequence[MotionLog]) -> tuple[EffectRival, ...]:

@@ -59,7 +59,7 @@ def found_effect(key: str) -> FoundEffect:
     values = VALUES[key]
     sd = {name: 0.01 * abs(value) for name, value in values.items()}
     params = {p.name: of_effect(p, values[p.name], sd[p.name]) for p in effect.params}
-    return FoundEffect(effect, params, 0.987, 0.005)
+    return FoundEffect(effect, params, 0.987, 0.005, 0.97)
 
 
 def residual(equation: str, keys: Sequence[str]) -> Residual:

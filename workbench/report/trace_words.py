@@ -12,6 +12,7 @@ from workbench.steps.trace import Traced
 
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
+CERTAIN = 0.99  # probability above which digits say nothing
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -57,7 +58,10 @@ def share_of_friction(part: float) -> str:
 
 def _verdict_sentence(traced: Traced) -> str:
     found = traced.trace
-    names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
+    names = "; and ".join(
+        f"{words(e.effect.key)} – {e.effect.meaning} (probability {chance(e.probability)})"
+        for e in found.effects
+    )
     error = fall_of_error(traced) if found.effects else ""
     errors = f" {error}" if error else ""
     changed = ", ".join(_changed(change) for change in found.drift)
@@ -80,6 +84,11 @@ def _verdict_sentence(traced: Traced) -> str:
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _:
             return _partly(traced, names, errors) if found.effects else _unknown(traced)
+
+
+def chance(probability: float) -> str:
+    """A probability as text [%]."""
+    return "over 99 %" if probability > CERTAIN else f"{100 * probability:.0f} %"
 
 
 def _unknown(traced: Traced) -> str:

@@ -180,7 +180,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
     shown = not found.surroundings.none  # of what acts beside the applied force
     effects = [
         {"key": e.effect.key, "params": effect_estimates(e, model.rig), "explained": e.explained,
-         "p_value": e.p_value}
+         "p_value": e.p_value, "probability": e.probability}
         for e in found.effects
     ]  # fmt: skip
     document: dict[str, Any] = plain(

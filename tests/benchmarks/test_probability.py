@@ -1,0 +1,44 @@
+"""The bench of probabilities reads what traces named, and finds the curve that made its cases."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.probability import Named, fitted, is_of_choice, named_in
+from identification.tracing.probability import evidence
+
+
+def line(mode: str, true: list[str], named: list[str]) -> str:
+    terms = evidence(0.1, 0.2, len(named)) if named else ()
+    found = {"effects": [{"key": key} for key in named], "evidence": terms}
+    truth = {"effects": {key: {} for key in true}}
+    return json.dumps({"case": f"{mode}:{true}", "mode": mode, "truth": truth, "trace": found})
+
+
+def test_an_effect_is_right_where_the_log_has_it_and_the_library_too(tmp_path: Path) -> None:
+    file = tmp_path / "blind.jsonl"
+    lines = [
+        line("single", ["spring"], ["spring", "cogging"]),
+        line("removed", ["spring"], ["tight_spot"]),
+        line("clean", [], []),
+        json.dumps({"case": "x", "mode": "single", "failed": "no loop"}),
+    ]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert [(one.key, one.right) for one in named_in([file])] == [
+        ("spring", True), ("cogging", False), ("tight_spot", False),
+    ]  # fmt: skip
+
+
+def test_the_fit_finds_the_curve_that_made_the_cases() -> None:
+    rng, true = np.random.default_rng(0), np.array([-1.0, -2.0, -1.0, -3.0])
+    named = []
+    for i in range(4000):
+        terms = evidence(
+            10 ** rng.uniform(-4, 0), 10 ** rng.uniform(-3, 0), int(rng.integers(1, 3))
+        )
+        right = bool(rng.random() < 1.0 / (1.0 + np.exp(-true @ terms)))
+        named.append(Named(str(i), "spring", terms, right))
+    assert fitted(named) == pytest.approx(true, abs=0.4)
+    assert 0.4 < np.mean([is_of_choice(one.run) for one in named]) < 0.6
