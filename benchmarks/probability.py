@@ -56,7 +56,7 @@ def named_in(files: Sequence[Path]) -> list[Named]:
 
 
 def fitted(named: Sequence[Named]) -> Array:
-    """Coefficients (4,) of largest likelihood; Cox, J. R. Stat. Soc. B 20 (1958) 215."""
+    """Coefficients (3,) of largest likelihood; Cox, J. R. Stat. Soc. B 20 (1958) 215."""
     A, right = np.array([one.terms for one in named]), np.array([one.right for one in named])
 
     def cost(b: Array) -> float:

@@ -234,6 +234,7 @@ def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
         return {
             "verdict": found.trace.verdict,
             "effects": named_in(found.trace),
+            "probability": {e.effect.key: e.probability for e in found.trace.effects},
             "rivals": [one.key for one in found.trace.rivals],
             "depends_on": list(found.trace.unknown.depends_on),
             "drift": [one.name for one in found.trace.drift],

@@ -68,9 +68,22 @@ class LatentForces:
     @property
     def rms(self) -> float:
         """Expected root mean square force while the bodies slide [N]; 0 where none does."""
-        square = [(one.force**2 + one.sd**2)[one.slides] for one in self.logs]
-        every = np.concatenate(square) if square else np.zeros(0)
-        return float(np.sqrt(np.mean(every))) if len(every) else 0.0
+        return float(np.sqrt(sum(self._squares)))
+
+    @property
+    def is_a_bound(self) -> bool:
+        """Whether more of that is the band's width than a force that shows."""
+        seen, width = self._squares
+        return width > seen
+
+    @property
+    def _squares(self) -> tuple[float, float]:
+        """Mean squares of the force and of its deviation while the bodies slide [N^2]."""
+        force, sd = (
+            np.concatenate([getattr(one, name)[one.slides] for one in self.logs])
+            for name in ("force", "sd")
+        )
+        return (float(np.mean(force**2)), float(np.mean(sd**2))) if len(force) else (0.0, 0.0)
 
     def share(self, level: float) -> float | None:
         """`rms` as a share of a Coulomb level [N]; None where no body slides, or nothing rubs."""

@@ -114,9 +114,7 @@ def judgement(
     choice, after, logs = found.choice, found.model, list(rows.logs)
     changed = held.changed
     left = _left(choice, after, chosen) if held.lacking else NOTHING
-    of_other_law = other_law(choice, left, held.share)
-    doubts = list(map(_not_its_law, of_other_law))
-    sure = probability(terms)
+    sure, doubts = probability(terms), list[str]()
     if choice.steps and not is_probable(sure):
         doubts.append(_hardly_probable(choice, sure))
     if held.hides_friction:
@@ -128,7 +126,8 @@ def judgement(
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
         doubts = [how] if levels else doubts
-    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts)
+    of_other_law = map(_not_its_law, other_law(choice, left, held.share))
+    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts, *of_other_law)
     complete = verdict != "unknown" and predicted(held.now, held.noise)
     return Judgement(
         verdict, held.before, held.after,
@@ -139,7 +138,7 @@ def judgement(
 
 def _not_its_law(key: str) -> str:
     """What to say of an effect whose own signals tell of what it leaves."""
-    return f"like {key}, but not its law: what is left depends on the same signals"
+    return f"{key}: what is left depends on the same signals, so its law may be another"
 
 
 def _hardly_probable(choice: Choice, sure: float) -> str:

@@ -2,35 +2,29 @@
 
 A logistic curve (Cox, J. R. Stat. Soc. B 20 (1958) 215) over what a model with the effects leaves:
 
-    log(p / (1 - p)) = b_0 + b_1 log10 r_d + b_2 log10 r_e + b_3 [several effects named]        (1)
+    log(p / (1 - p)) = b_0 + b_1 log10 r + b_2 [several effects are named]                       (1)
 
-r_d: the latent force that is still missing over that which the plain model lacks; r_e: the share of
-the held-out logs' square error beyond noise that is left. A machine's own law leaves next to
-nothing of either. Laws that together take the place of one that the library lacks leave hardly an
-error either, but more of the force, and they are several. The coefficients are those of largest
-likelihood on the machines of `benchmarks/probability.py`; a third of them have an effect that the
-library lacks. Ours: `README.md`, (12).
+r: the latent force that is still missing on the held-out logs, over that which the plain model
+lacks. A machine's own law leaves next to nothing of it. Laws that together take the place of one
+that the library lacks leave hardly an error of the equation, but more of the force, and they are
+several. The coefficients are those of largest likelihood on the machines of
+`benchmarks/probability.py`; a third of them have an effect that the library lacks. Ours:
+`README.md`, (12).
 """
 
 import numpy as np
 
 from identification.thresholds import HALF
 
-COEFFICIENTS = (1.0, -1.0, -0.2, -3.5)  # b_0 to b_3
+COEFFICIENTS = (-0.8, -2.0, -1.4)  # b_0 to b_2
 Evidence = tuple[float, ...]  # the terms of (1)
-LEAST_FORCE_LEFT, LEAST_ERROR_LEFT = 1e-4, 1e-3  # of either share: below, noise decides
+LEAST_LEFT = 1e-4  # of the missing force: below, noise decides
 
 
-def evidence(force_left: float | None, error_left: float, named: int) -> Evidence:
-    """The terms of (1) for effects that leave these shares; force_left: None where no body slides,
-    named: how many effects."""
-    force = error_left if force_left is None else force_left
-    return (
-        1.0,
-        float(np.log10(np.clip(force, LEAST_FORCE_LEFT, 1.0))),
-        float(np.log10(np.clip(error_left, LEAST_ERROR_LEFT, 1.0))),
-        float(named > 1),
-    )
+def evidence(force_left: float, named: int) -> Evidence:
+    """The terms of (1) for so many effects that leave this share of the missing force."""
+    left = float(np.log10(np.clip(force_left, LEAST_LEFT, 1.0)))
+    return 1.0, left, float(named > 1)
 
 
 def probability(terms: Evidence, alike: int = 0) -> float:

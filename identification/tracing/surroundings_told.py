@@ -131,7 +131,7 @@ def _with_named(
     """
     without, with_them = left["test"]
     known, share = surrounding_estimates(around), (with_them / without) ** 2
-    sure = probability(evidence(None, share, len(named)))
+    sure = probability(evidence(with_them / without, len(named)))
     found = tuple(
         FoundEffect(
             one.effect,

@@ -139,7 +139,8 @@ def _traced(
         held = held or held_out(chosen, found, seen, rig)
         lacks = _missing(chosen, found, seen)
         force_left = None if lacks is None else lacks.share_left
-        terms = evidence(force_left, held.share, len(found.choice.steps))
+        left = float(np.sqrt(held.share)) if force_left is None else force_left
+        terms = evidence(left, len(found.choice.steps))
         judged = judgement(chosen, found, held, terms, seen, rig)
         told = _told(chosen, found, judged, terms, halt.not_tried, seen, lacks)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told

@@ -12,7 +12,7 @@ from identification.tracing.result import MissingForce, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, Part, chart_html
 from workbench.report.chart_figure import SHOWN_SHARE
-from workbench.report.trace_words import share_of_friction
+from workbench.report.trace_words import before_and_after
 from workbench.report.view import Section
 
 Which = Literal["training", "test"]
@@ -35,10 +35,7 @@ def missing_over_time(
         " wide there."
     )
     if found.missing is not None:
-        before, after = (share_of_friction(part) for part in found.missing)
-        of_both = f"{before} of friction before, {after} after"
-        named = of_both if found.missing_force.lessened else f"{after} of friction"
-        caption += f" Root mean square while it slides: {named}."
+        caption += f" Root mean square while it slides: {before_and_after(found)}."
     chart = missing_chart(found, found.missing_force, rotary, logs, which)
     return [Section("Force that the model lacks", chart_html(chart, caption))]
 

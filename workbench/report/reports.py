@@ -81,7 +81,9 @@ def identified_view(found: Identified) -> View:
     missing = missing_force(model, [one.log for one in sources])
     level = max(model.karnopp.F_cp, model.karnopp.F_cn)
     share = None if missing is None else missing.share(level)
-    lacks = "" if share is None else f" Force missing: {share_of_friction(share)} of friction."
+    lacks = ""
+    if missing is not None and share is not None:
+        lacks = f" Force missing: {share_of_friction(share, missing)} of friction."
     return View(
         f"Identification of {model.card}",
         summary(model) + lacks,

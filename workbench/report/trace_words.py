@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from identification.estimation.latent_force import LatentForces
+from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Errors, Trace
 from identification.tracing.verdict import listed
 from workbench.cards.readable import force, length, number, shown_unit
@@ -44,16 +46,22 @@ def _of_friction(found: Trace) -> str:
     """The force that is missing on the held-out logs, as a share of friction."""
     if found.missing is None:
         return ""
-    before, after = found.missing
-    if found.missing_force is None or not found.missing_force.lessened:
-        return f" Force missing: {share_of_friction(after)} of friction."
-    was, now = share_of_friction(before), share_of_friction(after)
-    return f" Force missing: {was} of friction before, {now} after."
+    return f" Force missing: {before_and_after(found)}."
 
 
-def share_of_friction(part: float) -> str:
-    """A part of the Coulomb level as text [%]."""
-    return f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
+def before_and_after(found: Trace) -> str:
+    """The force missing with and without the effects, as shares of friction."""
+    assert found.missing is not None and found.missing_force is not None
+    forces = (found.missing_force.before, found.missing_force.after)
+    was, now = map(share_of_friction, found.missing, forces)
+    both = f"{was} of friction before, {now} after"
+    return both if found.missing_force.lessened else f"{now} of friction"
+
+
+def share_of_friction(part: float, of: LatentForces) -> str:
+    """A part of the Coulomb level as text [%]; a bound where the log does not show the force."""
+    said = f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
+    return f"at most {said}" if of.is_a_bound else said
 
 
 def _verdict_sentence(traced: Traced) -> str:
@@ -103,6 +111,11 @@ def _unknown(traced: Traced) -> str:
 def _partly(traced: Traced, names: str, errors: str) -> str:
     """What was found comes before what is still missing."""
     unknown = traced.trace.unknown
+    if not any(is_probable(e.probability) for e in traced.trace.effects):
+        return (
+            f"Unknown: what is missing acts like {names}.{share_explained(traced)}{errors} It is"
+            " rather an effect that the library lacks."
+        )
     rest = _on_signals(unknown) if unknown.depends_on else "depends on none of the signals"
     return (
         f"Found in part: {names}.{errors} What is left {rest}, and no effect of the library"

@@ -218,10 +218,12 @@ def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
 
 
 def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
-    """Samples whose velocity, as the inverse model takes it, lies outside the stick band."""
-    v = differentiate(log["y"], log.h, how.cutoff, how.method).v
-    p = seen_moving(model, log).friction
-    return np.asarray((v > p.dv_p) | (v < p.dv_n))
+    """Samples whose velocity, as the inverse model takes it, lies outside the stick band, and is
+    significant."""
+    motion = differentiate(log["y"], log.h, how.cutoff, how.method)
+    v, p = motion.v, seen_moving(model, log).friction
+    sure = np.abs(v) > SURE_SLIDING * motion.v_noise
+    return np.asarray(((v > p.dv_p) | (v < p.dv_n)) & sure)
 
 
 def default_drive(model: Model, log: Log) -> Drive:

@@ -67,9 +67,7 @@ def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
             rig=tuple(replace(found, value=text) if x is one else x for x in of.rig),
         )  # fmt: skip
     if text == LEAVE_OUT:
-        if key in ("area_p_m2", "area_n_m2", "supply_pressure_pa") and (
-            of.kind == "electro-pneumatic"
-        ):
+        if key in ("area_p_m2", "area_n_m2") and of.kind == "electro-pneumatic":
             raise BadAnswer(f"a rig of two pressures needs {key}; give a number in {one.unit}")
         found = replace(one, value=None)
     elif text:

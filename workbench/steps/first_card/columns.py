@@ -21,6 +21,7 @@ from workbench.steps.first_card.registers import Register, read_register
 MOST_ROWS_READ = 10_000
 MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
+OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
@@ -224,9 +225,7 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
         named = [one for one in columns if "time" in one.header.means]
         found = "no column goes up evenly from row to row"
         if named:
-            step = np.diff(named[0].values)
-            wrong = int(np.flatnonzero(~(step > 0.0))[0]) if np.any(~(step > 0.0)) else 0
-            found = f"column {named[0].shown} does not go up evenly (see data row {wrong + 2})"
+            found = f"column {named[0].shown} {_wrong_with_clock(named[0].values)}"
         elif texts:
             found = f"column {texts[0].shown} holds {texts[0].raw.unusable}"
         raise BadLog(
@@ -246,6 +245,20 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
         )
 
     return max(ticking, key=likely)
+
+
+def _wrong_with_clock(t: Array) -> str:
+    """Why times (n,) are none of a clock, and where."""
+    step = np.diff(t)
+    wrong = np.flatnonzero(~(step > 0.0))
+    row = int(wrong[0]) + 2 if len(wrong) else 2
+    if np.mean(step == 0.0) > OFTEN_REPEATED:
+        return f"repeats its times (data row {row}): they are coarser than the rows"
+    back = np.flatnonzero(step < 0.0)
+    if len(back) == len(wrong) > 0 and len(wrong) < MOST_UNEVEN * len(t):
+        runs = len(back) + 1
+        return f"begins again at data row {row}: {runs} runs in one file, to be split there"
+    return f"does not go up evenly (see data row {row})"
 
 
 def _on_grid(t: Array, x: Array, step: float, size: int) -> Array:

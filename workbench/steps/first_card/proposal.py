@@ -37,6 +37,7 @@ VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
+MOST_OF_AIR = 1.5e6  # Pa, of compressed air; above, pressures are those of oil
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 
@@ -146,10 +147,15 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     roles = known_roles(signals, only)
     if roles is None:
         there = ", ".join(one.shown for one in columns.signals) or "none"
+        left_out = "; ".join(
+            f"left out: column {one.shown}: {why}"
+            for one in columns.read if (why := columns.left_out.get(one.raw.number))
+        )  # fmt: skip
         raise BadLog(
-            f"{path}: no column moves as a body that another one drives (tried: {there}); a"
-            " position is needed that goes both ways, and beside it a force, two pressures or a"
-            " motor's command; or write the card by hand (manual: The card, key by key)"
+            f"{path}: no column moves as a body that another one drives (tried: {there}"
+            f"{'; ' if left_out else ''}{left_out}); a position is needed that goes both ways, and"
+            " beside it a force, two pressures or a motor's command; or write the card by hand"
+            " (manual: The card, key by key)"
         )
     _refuse_resting(columns, roles)
     _refuse_sign_bits(columns, roles)
@@ -199,7 +205,10 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     roles, area = _pressure_beside_force(columns, roles)
     motion = known_motion(roles)
     units = guessed_units(columns, roles, motion)
-    rig = [_kind_guess(roles, other), _motion_guess(motion), *_rig(columns, roles, motion.motion)]
+    rig = [
+        _kind_guess(roles, other), _motion_guess(motion),
+        *_rig(columns, roles, motion.motion, units),
+    ]  # fmt: skip
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
@@ -333,7 +342,9 @@ def _motion_guess(found: MotionGuess) -> RigGuess:
     return RigGuess("motion", found.motion, "", found.sure, found.why, rival)
 
 
-def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
+def _rig(
+    columns: Columns, roles: Roles, motion: Motion, units: Mapping[str, UnitGuess]
+) -> list[RigGuess]:
     """The numbers of the rig that a log can identify, and those that it needs beside the log."""
     out = []
     if roles.kind == "electro-pneumatic":
@@ -343,8 +354,7 @@ def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
         out.append(RigGuess("area_p_m2", 1e-3, "m^2", False, why))
         out.append(RigGuess("area_n_m2", float(f"{1e-3 * roles.area_ratio:.3g}"), "m^2", False,
                             "as area_p_m2: measure bore and rod"))  # fmt: skip
-        out.append(RigGuess("supply_pressure_pa", 6e5, "Pa", False,
-                            "not in any log; it matters where the areas differ"))  # fmt: skip
+        out.append(_around_the_rod(roles, units))
     if roles.kind == "motor":
         force = "N m" if motion == "rotary" else "N"
         out.append(_motor_constant(columns, force))
@@ -352,6 +362,16 @@ def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
         out.append(RigGuess("control_limit_v", limit, "unit of u", False,
                             "the command stops there again and again"))  # fmt: skip
     return out
+
+
+def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
+    """The pressure on the rod's area: the supply's of compressed air, else none."""
+    chambers = [roles.columns[name].values * factor(units[name].unit) for name in ("p_p", "p_n")]
+    low, high = min(map(np.nanmin, chambers)), max(map(np.nanmax, chambers))
+    air = low > 0.0 and high < MOST_OF_AIR
+    why = "not in any log: the pressure around the rod; it matters where the areas differ"
+    gauge = "; leave it out where pressures are measured against the ambient one"
+    return RigGuess("supply_pressure_pa", 6e5 if air else None, "Pa", False, why + gauge)
 
 
 def _motor_constant(columns: Columns, force: str) -> RigGuess:
