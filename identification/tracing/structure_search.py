@@ -8,13 +8,14 @@ from identification.estimation.fit import by_equation_if_surer, finished
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
+from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     equations_explained,
@@ -96,14 +97,30 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
 
 def by_equations(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
     """The model with sliding friction and effects as the equations identify them, where these are
-    explained but the run is not followed, which would bend them and make them unsure."""
-    followed = model.imposed or model.misfit <= ASTRAY
-    if followed or not choice.steps or not equations_explained(choice.base):
+    explained, or all but, and the run is not followed, which would bend them and make them unsure.
+    """
+    if model.imposed or model.misfit <= ADEQUATE or not choice.steps:
+        return model
+    if not (equations_explained(choice.base) or all_but_explained(choice)):
         return model
     told = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
-    names = [name for name, sd in told.prior.items() if name in model.sd and sd > 0.0]
+    followed = model.misfit <= ASTRAY  # then whichever is surer
+    names = [
+        name
+        for name, sd in told.prior.items()
+        if name in model.sd and sd > 0.0 and not (followed and model.sd[name] < sd)
+    ]
     plant = plant_with(model.plant, names, values_of(told.plant, names))
     return replace(model, plant=plant, sd={**model.sd, **{n: told.prior[n] for n in names}})
+
+
+def all_but_explained(choice: Choice) -> bool:
+    """Whether the effects leave next to nothing of what the plain equations lack beyond noise."""
+    return all(
+        mean_square(choice.base[e]) - 1.0 <= OF_ACCOUNT * (mean_square(choice.first[e]) - 1.0)
+        for e in (MECHANICAL, ACTUATOR)
+        if e in choice.base
+    )
 
 
 def without_effects(plain: PlainModel, choice: Choice) -> Choice:

@@ -21,6 +21,7 @@ from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
+from identification.model.surroundings import Surroundings
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
@@ -33,6 +34,7 @@ from identification.tracing.judgement import (
     held_out,
     judgement,
 )
+from identification.tracing.lag_beside import follows_with_lag, lag_beside
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
@@ -104,6 +106,7 @@ def trace(
         if not beside.orders:
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
+    beside, told = _with_lag(beside, told, recorded_as, rig, library, rng, report, halt)
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
     if not beside.none:
@@ -118,6 +121,26 @@ def trace(
         return told
     around = replace(beside, resonance=resonance)
     return replace(told, surroundings=around, missing_force=None)  # which is of one body
+
+
+def _with_lag(
+    beside: Surroundings, told: Trace, recorded_as: tuple[Sequence[Log], Sequence[Log]], rig: Rig,
+    library: Library, rng: np.random.Generator, report: Progress, halt: Halt,
+) -> tuple[Surroundings, Trace]:  # fmt: skip
+    """What acts beside the applied force and the trace, with a lag of the columns that an effect
+    has hidden, where less is left with it."""
+    if told.complete or beside.lag.value or halt.reached():
+        return beside, told
+    lag = lag_beside(told.plant, [beside.taken_out(log) for log in recorded_as[0]], rig)
+    if not lag.value:
+        return beside, told
+    late = replace(beside, lag=lag)
+    train, test = ([late.taken_out(log) for log in logs] for logs in recorded_as)
+    try:
+        again = _traced(train, test, rig, library, rng, report, halt)
+    except NotIdentifiable:
+        return beside, told
+    return (late, again) if follows_with_lag(told, again) else (beside, told)
 
 
 def _traced(

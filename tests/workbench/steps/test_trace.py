@@ -71,7 +71,7 @@ def test_the_document_has_the_keys_of_the_contract() -> None:
         }
     assert found["noise_floor"] == {"force_rms": 0.069}
     (effect,) = found["effects"]
-    assert set(effect) == {"key", "params", "explained", "p_value"}
+    assert set(effect) == {"key", "params", "explained", "p_value", "probability"}
     assert set(effect["params"]) == {"F_s", "v_s", "asymmetry", "delta"}
     assert all(set(number) >= NUMBER for number in effect["params"].values())
     assert list(broken_in(found)) == []
@@ -233,7 +233,7 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
     assert "Force missing: 0.34 % of friction before, " in trace_sentence(traced(shown))
     none = {where: Errors(None, None, None, None) for where in before}
     unseen = replace(found, before=none, missing_force=None)
-    assert trace_sentence(traced(unseen)).endswith("(valve overlap).")
+    assert trace_sentence(traced(unseen)).endswith("(probability 97 %).")
 
 
 def test_rows_of_the_tables() -> None:

@@ -16,7 +16,7 @@ from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
 from workbench.steps.first_card.motion_guess import MotionGuess, known_motion
-from workbench.steps.first_card.remarks import BALANCED, remarks_on
+from workbench.steps.first_card.remarks import BALANCED, ahead_of_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
@@ -403,6 +403,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
     """The card's signals in the usual order."""
     out = []
     found = {"t": columns.clock, **roles.columns}
+    exchanged = {"r": "y", "y": "r"} if ahead_of_reference(roles) else {}
     for name in (name for name in CARD_ORDER if name in found):
         one, unit = found[name], units[name]
         sign = roles.signs.get(name, 1.0)
@@ -414,11 +415,13 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         if sign < 0.0:
             why += "; with this sign friction takes energy" if name != "r" else ""
         why += f"; unit {unit.why}"
-        sure = bool(odds >= SURE and unit.sure)
+        sure = bool(odds >= SURE and unit.sure) and name not in exchanged
+        rival = "" if sure else _rival(name, odds, unit, roles)
+        if name in exchanged:
+            rival = str(found[exchanged[name]].raw.key)
         out.append(
-            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why,
-                        "" if sure else _rival(name, odds, unit, roles))
-        )  # fmt: skip
+            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival)
+        )
     return out
 
 

@@ -34,7 +34,20 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
     if "r" in roles.columns:
         found = lead(roles.columns["r"].x, roles.columns["y"].x)
         late = found.samples * h * columns.grid
-        yield f"the position follows the reference by {1e3 * late:.3g} ms"
+        if ahead_of_reference(roles):
+            yield (
+                f"the position is ahead of the reference by {-1e3 * late:.3g} ms, as no loop makes"
+                " it: the two columns may be the other way round"
+            )
+        else:
+            yield f"the position follows the reference by {1e3 * late:.3g} ms"
+
+
+def ahead_of_reference(roles: Roles) -> bool:
+    """Whether the position comes before its reference, by more than a sample."""
+    if "r" not in roles.columns:
+        return False
+    return lead(roles.columns["r"].x, roles.columns["y"].x).samples < -1.0
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
