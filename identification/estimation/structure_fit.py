@@ -1,6 +1,7 @@
 """A structure with its numbers: from the regression's sizes to a plant refined on its free run."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,6 @@ from identification.estimation.regressed_plant import (
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
@@ -37,7 +37,6 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 
-PIECE_SECONDS = 10.0  # s of each log, in which fewer marginal stops are lost than in the whole
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 
 
@@ -126,37 +125,21 @@ def _refined(
     regressed: RegressedPlant, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
     effort: Effort, before: Refit | None,
 ) -> Refit:  # fmt: skip
-    """The regression's plant refined on the free run, from another band and on a piece first where
-    that leaves more than noise; or one of before, if that is better."""
+    """The regression's plant refined on the free run, from another band too where that leaves more
+    than noise; or one of before, if that is better."""
     plant, prior = regressed.plant, dict(regressed.prior)
     done = refit(plant, logs, drive, band=max(regressed.slow, 1e-4), prior=prior, effort=effort)
     done = done if before is None or done.misfit <= before.misfit else before
-    try:
-        return _rebegun(done, regressed, logs, drive, near, effort)
-    except Halted:
-        return done  # which the next ask halts
-
-
-def _rebegun(
-    done: Refit, regressed: RegressedPlant, logs: Sequence[MotionLog], drive: Drive,
-    near: Karnopp | None, effort: Effort,
-) -> Refit:  # fmt: skip
-    """The better of a refinement and of those from another band and on a piece first."""
-    plant, prior = regressed.plant, dict(regressed.prior)
-    free = loose(plant, drive)
-    if near is not None and not free and done.misfit > COMPLETE:
-        same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
-        beside = replace(plant, friction=replace(plant.friction, **same))
-        other = refit(
-            beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior, effort=effort
-        )
+    if near is None or loose(plant, drive) or done.misfit <= COMPLETE:
+        return done
+    same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
+    beside, band = (
+        replace(plant, friction=replace(plant.friction, **same)),
+        max(near.dv_p, -near.dv_n),
+    )
+    with suppress(Halted):  # which the next ask halts
+        other = refit(beside, logs, drive, band=band, prior=prior, effort=effort)
         done = other if other.misfit < done.misfit else done
-    if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
-        part = [shortened(one, PIECE_SECONDS) for one in logs]
-        begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
-        begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
-        close = refit(begun, logs, drive, prior=prior, effort="near")
-        done = close if close.misfit < done.misfit else done
     return done
 
 

@@ -28,7 +28,7 @@ from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import remaining_structure, strongest
 from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
 from identification.tracing.structure_search import Refinement, Selection, without_effects
-from identification.tracing.verdict import explains_most, other_law, verdict_of
+from identification.tracing.verdict import explains_most, verdict_of
 
 NOTHING = Dependence((), 0.0)
 AS_LARGE_AS_FRICTION = (
@@ -126,19 +126,13 @@ def judgement(
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
         doubts = [how] if levels else doubts
-    of_other_law = map(_not_its_law, other_law(choice, left, held.share))
-    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts, *of_other_law)
+    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts)
     complete = verdict != "unknown" and predicted(held.now, held.noise)
     return Judgement(
         verdict, held.before, held.after,
         left if verdict == "unknown" else NOTHING, changed, said,
         complete=complete, rest=Left(0.0 if complete else held.share, left.depends_on),
     )  # fmt: skip
-
-
-def _not_its_law(key: str) -> str:
-    """What to say of an effect whose own signals tell of what it leaves."""
-    return f"{key}: what is left depends on the same signals, so its law may be another"
 
 
 def _hardly_probable(choice: Choice, sure: float) -> str:

@@ -18,12 +18,12 @@ from identification.thresholds import HALF
 
 COEFFICIENTS = (-0.8, -2.0, -1.4)  # b_0 to b_2
 Evidence = tuple[float, ...]  # the terms of (1)
-LEAST_LEFT = 1e-4  # of the missing force: below, noise decides
+LEAST_MISSING = 1e-4  # of the missing force: below, noise decides
 
 
 def evidence(force_left: float, named: int) -> Evidence:
     """The terms of (1) for so many effects that leave this share of the missing force."""
-    left = float(np.log10(np.clip(force_left, LEAST_LEFT, 1.0)))
+    left = float(np.log10(np.clip(force_left, LEAST_MISSING, 1.0)))
     return 1.0, left, float(named > 1)
 
 

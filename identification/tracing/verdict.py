@@ -17,7 +17,7 @@ from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
-from identification.thresholds import HALF, OF_ACCOUNT
+from identification.thresholds import HALF
 from identification.tracing.model_errors import seen_by
 from identification.tracing.probability import Evidence, probability
 from identification.tracing.regression.candidates import EffectCandidate
@@ -68,18 +68,6 @@ def verdict_of(choice: Choice, drift: Sequence[Change]) -> TraceVerdict:
 def explains_most(share: float) -> bool:
     """Whether effects that leave this share of what was missing explain most of it."""
     return share <= HALF
-
-
-def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]:
-    """Effects whose own signals tell of what is left (`share` of what was missing): their law is
-    not the machine's."""
-    if share * left.explained <= OF_ACCOUNT:
-        return ()
-    return tuple(
-        step.candidate.effect.key
-        for step in choice.steps
-        if set(step.candidate.effect.depends_on) & set(left.depends_on)
-    )
 
 
 def found_effect(

@@ -112,9 +112,8 @@ from identification.tracing.regression.stepwise import (
     material,
     merit,
 )
-from identification.tracing.result import Dependence, Errors
+from identification.tracing.result import Errors
 from identification.tracing.verdict import explains_most as explains_most_of_it
-from identification.tracing.verdict import other_law
 from tests.identification.motor_logs import K_A, NOISE, H, made, plant, seen
 
 N = 100  # rows
@@ -387,14 +386,6 @@ def test_of_account_to_a_run() -> None:
     a run that leaves so little of what it lacked, 40, is not contested."""
     assert 1.0 + 1.6 < decisive(21.0, ()) < 1.0 + 2.5
     assert 1.0 + 3.2 < enough(setting(41.0), choice("spring").steps) < 1.0 + 5.0
-
-
-def test_of_account_to_a_law() -> None:
-    """A rest that depends on an effect's own signals is another law, where it is much of all."""
-    found, own = choice("spring"), Dependence(("y",), 0.5)
-    assert other_law(found, own, 0.16) == ()
-    assert other_law(found, own, 0.25) == ("spring",)
-    assert other_law(found, Dependence(("v",), 0.5), 0.25) == ()
 
 
 def test_twice() -> None:

@@ -10,10 +10,10 @@ from identification.effects._library import built_in
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
-from identification.thresholds import ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.regression.stepwise import Choice, choose
-from identification.tracing.structure_search import by_equations
+from identification.tracing.structure_search import all_but_explained, by_equations
 from tests.identification.motor_logs import K_A, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -41,10 +41,24 @@ def model(misfit: float) -> FittedStructure:
 
 def test_a_run_that_is_followed_has_its_own_numbers() -> None:
     setting, choice = spring()
-    followed = model(0.9 * ASTRAY)
+    followed = model(0.9 * ADEQUATE)
     assert by_equations(choice, followed, setting) is followed
     prescribed = replace(model(90.0), imposed=True)
     assert by_equations(choice, prescribed, setting) is prescribed
+
+
+def test_between_a_run_and_equations_that_are_explained_the_surer_numbers_stand() -> None:
+    setting, choice = spring()
+    between = replace(model(0.9 * ASTRAY), sd={**BENT, "m": 1e-6})
+    found = by_equations(choice, between, setting)
+    assert found.plant.effects[0].values["k"] == pytest.approx(40.0, rel=0.01)
+    assert found.plant.friction.m == between.plant.friction.m and found.sd["m"] == 1e-6
+
+
+def test_all_but_the_whole_equation_is_enough() -> None:
+    _, choice = spring()
+    assert all_but_explained(choice)
+    assert not all_but_explained(replace(choice, base=choice.first))
 
 
 def test_equations_that_are_explained_answer_for_a_run_that_is_not_followed() -> None:
