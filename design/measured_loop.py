@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from identification.arrays import Array, BoolArray
 
 FLIPPED_DEG = 180.0
+CLOSE_TO_MINUS_ONE = 0.35  # distance of L to it, that no loop keeps over an octave
+MOST_OF_AN_OCTAVE = 0.8  # of the points in it
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,20 @@ def measured_margins(f: Array, L: NDArray[np.complex128], seen: BoolArray) -> Me
         gain_at=None if growing is None else float(growing[1]),
         modulus=float(np.min(np.abs(1.0 + L[seen]))) if np.any(seen) else None,
     )
+
+
+def is_minus_one(f: Array, L: NDArray[np.complex128], seen: BoolArray) -> BoolArray:
+    """The points (k,) of an octave over which an open loop stays close to -1.
+
+    There the response from force to position is the controller's inverse: what goes round the loop
+    is noise, or a force at its limit, and no answer to the reference. Source: direct and indirect
+    estimates of a closed loop's spectra, Ljung, System Identification (1999), section 13.4.
+    """
+    near = seen & (np.abs(1.0 + L) < CLOSE_TO_MINUS_ONE)
+    low, high = (np.searchsorted(f, f * 2.0**half) for half in (-0.5, 0.5))
+    counts = [np.concatenate([[0], np.cumsum(one)]) for one in (near, seen)]
+    close, every = (one[high] - one[low] for one in counts)
+    return np.asarray(near & (close >= MOST_OF_AN_OCTAVE * np.maximum(every, 1)))
 
 
 def _crossings(f: Array, y: Array) -> list[float]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from design.margins import margins
-from design.measured_loop import measured_margins
+from design.measured_loop import is_minus_one, measured_margins
 from design.polynomial import ComplexArray, evaluate
 from design.rst import RST
 
@@ -47,3 +47,21 @@ def test_a_loop_that_is_not_stable_has_a_negative_phase_margin() -> None:
     found = measured_margins(F, np.asarray(40.0 * points()), np.ones(len(F), dtype=bool))
     assert found.phase_deg is not None and found.phase_deg < 0.0
     assert found.delay_s is None
+
+
+def test_an_octave_at_minus_one_is_no_loop() -> None:
+    L, seen = points(), np.ones(len(F), dtype=bool)
+    assert not np.any(is_minus_one(F, L, seen))
+    shut = (F > 4.0) & (F < 20.0)
+    noise = 0.1 * np.random.default_rng(0).standard_normal((2, len(F)))
+    found = is_minus_one(F, np.where(shut, -1.0 + noise[0] + 1j * noise[1], L), seen)
+    assert np.mean(found[(F > 5.7) & (F < 14.0)]) > 0.95
+    assert not np.any(found[(F < 2.8) | (F > 28.0)])
+
+
+def test_a_loop_that_only_passes_minus_one_is_one() -> None:
+    L = points()
+    at = measured_margins(F, L, np.ones(len(F), dtype=bool)).crossover
+    assert at is not None
+    near = np.abs(np.log2(F / at)) < 0.2
+    assert not np.any(is_minus_one(F, np.where(near, -1.0, L), np.ones(len(F), dtype=bool)))

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from design.measured_loop import MeasuredMargins, measured_margins
+from design.measured_loop import MeasuredMargins, is_minus_one, measured_margins
 from design.polynomial import evaluate
 from identification.arrays import Array, BoolArray
 from identification.errors import BadModel, NotIdentifiable
@@ -105,6 +105,13 @@ def respond(
         raise NotIdentifiable(_nothing(runs, found))
     curves = None if model is None else curves_of(model, found.f)
     loop = _open_loop(found, curves)
+    shut = np.zeros(len(found.f), dtype=np.bool_)
+    if loop is not None and found.controller is not None:
+        shut = is_minus_one(found.f, loop.H, loop.seen)
+        loop = _unseen(loop, shut)
+        found = replace(
+            found, body=_unseen(found.body, shut), with_friction=_unseen(found.with_friction, shut)
+        )
     return Responded(
         card=card,
         rotary=rig.motion == "rotary",
@@ -116,7 +123,7 @@ def respond(
         curves=curves,
         model=taken,
         left_in=left_in,
-        remarks=(*read, *_remarks(logs, card, found, taken)),
+        remarks=(*read, *_remarks(logs, card, found, taken), *_of_no_loop(found.f[shut])),
     )
 
 
@@ -221,6 +228,22 @@ def _remarks(
     if model is not None and model.card != card:
         out.append(f"the model is of {model.card}, the logs of {card}")
     return out
+
+
+def _unseen(response: Response, where: BoolArray) -> Response:
+    """The response as it is seen elsewhere than at these frequencies (k,)."""
+    return replace(response, coherence=np.where(where, 0.0, response.coherence))
+
+
+def _of_no_loop(f: Array) -> list[str]:
+    """What to say of frequencies (k,) [Hz] at which the open loop that the logs show is -1."""
+    if not len(f):
+        return []
+    return [
+        f"from {f[0]:.3g} to {f[-1]:.3g} Hz the open loop found is -1, which no loop is: noise or a"
+        " force at its limit goes round there, not the reference; no margin is taken from it (lay a"
+        " small multisine on the reference, and keep the command within its limits)"
+    ]
 
 
 def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
