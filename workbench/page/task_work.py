@@ -103,14 +103,14 @@ Made = tuple[Model, dict[str, Any], dict[str, Any], Sequence[Section]]
 def _identified(sources: Sources, course: Course) -> Made:
     found: Identified = identify_sources(sources, on_progress=course.report)
     model = found.model
+    missing = missing_force(model, [one.log for one in found.sources])
     result = {
-        "summary": summary(model),
+        "summary": summary(model, missing),
         "notes": _notes((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
         "errors": None,
         "report": identified_view(found).page(),
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
-    missing = missing_force(model, [one.log for one in found.sources])
     drawn = (fit(model, found.sources, runs), *residual(model, found.sources, runs, missing))
     return model, {"model": model_document(model)}, result, drawn
 

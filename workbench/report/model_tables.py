@@ -4,7 +4,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 from identification.effects._base import Param
+from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
+from identification.thresholds import OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
@@ -12,6 +14,7 @@ from workbench.documents.model import Model, used
 from workbench.documents.velocity import VelocityModel
 from workbench.output import Row
 from workbench.remarks import printed_once
+from workbench.report.trace_words import share_of_friction
 from workbench.report.view import notes
 from workbench.screen import Part, instead, more, tabled
 
@@ -149,14 +152,26 @@ def not_identified(why: str) -> str:
     return why if why.startswith(INSIGNIFICANT) else f"not identifiable: {why}"
 
 
-def summary(model: Model) -> str:
-    """What was found, in one or two sentences."""
+def summary(model: Model, missing: LatentForces | None) -> str:
+    """What was found, in a few sentences; missing: the force that the model lacks on its logs."""
+    share = None if missing is None else missing.share(max(model.karnopp.F_cp, model.karnopp.F_cn))
+    if missing is None or share is None:
+        return _found(model, shows=False)
+    said = share_of_friction(share, missing)
+    shows = share > OF_ACCOUNT and not missing.is_a_bound
+    return f"{_found(model, shows)} Force missing: {said} of friction."
+
+
+def _found(model: Model, shows: bool) -> str:
+    """What was identified and what is left; shows: whether a force of account is missing."""
     known = [name for name, e in model.friction.items() if e.value is not None]
     many = "All nine" if len(known) == len(model.friction) else f"{len(known)} of the nine"
     logs = "one log" if len(model.log) == 1 else f"{len(model.log)} logs"
     text = f"{many} friction parameters identified from {logs}."
     if model.assumed:
         text += f" Not identifiable: {', '.join(model.assumed)}."
+    if model.fit.adequate and shows:
+        return f"{text} The free run leaves nothing but sensor noise, the equation of motion more."
     if model.fit.adequate:
         return f"{text} The model leaves nothing but sensor noise."
     if model.resonance is not None:

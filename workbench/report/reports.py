@@ -44,7 +44,6 @@ from workbench.report.model_tables import (
 from workbench.report.residual import residual
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
-from workbench.report.trace_words import share_of_friction
 from workbench.report.validation_tables import (
     then_of_validation,
     validation_parts,
@@ -79,14 +78,9 @@ def identified_view(found: Identified) -> View:
         )
 
     missing = missing_force(model, [one.log for one in sources])
-    level = max(model.karnopp.F_cp, model.karnopp.F_cn)
-    share = None if missing is None else missing.share(level)
-    lacks = ""
-    if missing is not None and share is not None:
-        lacks = f" Force missing: {share_of_friction(share, missing)} of friction."
     return View(
         f"Identification of {model.card}",
-        summary(model) + lacks,
+        summary(model, missing),
         model_parts(model, found.remarks),
         lambda: model_document(model),
         {"model.json": lambda: model_document(model)},
