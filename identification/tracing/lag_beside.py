@@ -16,6 +16,7 @@ from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.model.size import Size
 from identification.simulation.inverse_dynamics import opposing_force
+from identification.thresholds import WORSE
 from identification.tracing.result import Trace
 
 
@@ -38,6 +39,11 @@ def _without(plant: Plant, effects: tuple[Acting, ...], log: Log, rig: Rig) -> L
 
 
 def follows_with_lag(without: Trace, with_it: Trace) -> bool:
-    """Whether a trace of the logs without their lag leaves clearly less of the held-out force."""
-    was, now = (one.after["test"].force_rms for one in (without, with_it))
-    return was is not None and now is not None and explains(was**2, now**2)
+    """Whether a trace of the logs without their lag leaves clearly less of the held-out force, and
+    no more of the position, which no noise that a loop puts into its force can lessen."""
+    before, after = without.after["test"], with_it.after["test"]
+    if before.force_rms is None or after.force_rms is None:
+        return False
+    off = [one.position_rms for one in (before, after)]
+    worse = off[0] is not None and (off[1] is None or off[1] > WORSE * off[0])
+    return explains(before.force_rms**2, after.force_rms**2) and not worse

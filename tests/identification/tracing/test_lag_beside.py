@@ -53,8 +53,8 @@ def test_the_lag_shows_without_the_spring_and_not_beside_it() -> None:
     assert 0.0 < lag.sd < 0.1 * H
 
 
-def trace(left: float | None) -> Trace:
-    errors = {"test": Errors(left, None, None, None), "train": Errors(left, None, None, None)}
+def trace(left: float | None, off: float | None = None) -> Trace:
+    errors = {name: Errors(left, None, off, None) for name in ("train", "test")}
     nothing = Dependence((), 0.0)
     return Trace(
         "unknown", errors, errors, 1e-6, 0.1, 0.1, None, (), (), nothing, (), "", {}, {},
@@ -66,3 +66,10 @@ def test_a_lag_is_kept_where_clearly_less_is_left() -> None:
     assert follows_with_lag(trace(1.0), trace(0.85))
     assert not follows_with_lag(trace(1.0), trace(0.95))
     assert not follows_with_lag(trace(None), trace(0.5))
+
+
+def test_a_lag_with_which_the_position_is_predicted_worse_is_noise_of_the_loop() -> None:
+    assert follows_with_lag(trace(1.0, 1e-3), trace(0.5, 1e-3))
+    assert not follows_with_lag(trace(1.0, 1e-3), trace(0.5, 1.1e-3))
+    assert not follows_with_lag(trace(1.0, 1e-3), trace(0.5, None))
+    assert follows_with_lag(trace(1.0, None), trace(0.5, 1e-3))
