@@ -64,7 +64,7 @@ DATA: tuple[Right, ...] = (
     Right("laas_odri/rolling*.txt", ("motor",), True,
           _of(("Time", _S), ("Position", "rad"), u=("Iq", "A")), said=("coast", "one direction")),
     Right("laas_odri/speed_test*.txt", ("motor",), True,
-          _of(("Time", _S), ("Position", "rad"), u=("Iq", "A")), said=("one direction",)),
+          _of(("Time", _S), ("Position", "rad"), u=("Iq", "A")), said=("one way",)),
     Right("laas_odri/*.txt", ("motor",), True,
           _of(("Time", _S), ("Position", "rad"), u=("Iq", "A"))),
     Right("odrive_cogging/coggingmap*.npy", refused="clock|rows|no log"),
