@@ -133,12 +133,10 @@ def _refined(
     if near is None or loose(plant, drive) or done.misfit <= COMPLETE:
         return done
     same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
-    beside, band = (
-        replace(plant, friction=replace(plant.friction, **same)),
-        max(near.dv_p, -near.dv_n),
-    )
+    beside = replace(plant, friction=replace(plant.friction, **same))
     with suppress(Halted):  # which the next ask halts
-        other = refit(beside, logs, drive, band=band, prior=prior, effort=effort)
+        widest = max(near.dv_p, -near.dv_n)
+        other = refit(beside, logs, drive, band=widest, prior=prior, effort=effort)
         done = other if other.misfit < done.misfit else done
     return done
 

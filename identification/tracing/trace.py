@@ -161,12 +161,21 @@ def _traced(
     with halt.closing():
         held = held or held_out(chosen, found, seen, rig)
         lacks = _missing(chosen, found, seen)
-        force_left = None if lacks is None else lacks.share_left
-        left = float(np.sqrt(held.share)) if force_left is None else force_left
-        terms = evidence(left, len(found.choice.steps))
+        terms = evidence(_share_left(found, held, lacks), len(found.choice.steps))
         judged = judgement(chosen, found, held, terms, seen, rig)
         told = _told(chosen, found, judged, terms, halt.not_tried, seen, lacks)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
+
+
+def _share_left(found: Refinement, held: HeldOut, lacks: MissingForce | None) -> float:
+    """The share of the missing force that effects leave; by the error of the run where it shows
+    them in starts and stops, of which the force while sliding says little."""
+    of_error = float(np.sqrt(held.share))
+    of_force = None if lacks is None else lacks.share_left
+    if of_force is None:
+        return of_error
+    by_run = any(step.explained is not None for step in found.choice.steps)
+    return min(of_force, of_error) if by_run else of_force
 
 
 def _missing(

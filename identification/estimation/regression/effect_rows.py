@@ -68,7 +68,8 @@ class EffectRows:
     out, and when it is crossed is not seen;
     sliding: friction with its band, once known, by which breakaways are exact; falls:
     their limit falls to that of `sliding` with the first motion;
-    scales: by equation, what its rows' squares are divided by.
+    scales: by equation, what its rows' squares are divided by; borne: forces [N] up and down, up to
+    which a body that is at rest surely stays so, whatever levels an effect leaves to the others.
     """
 
     logs: tuple[MotionLog, ...]
@@ -83,6 +84,7 @@ class EffectRows:
     sliding: Karnopp | None = None
     falls: bool = False
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    borne: tuple[float, float] = (np.inf, np.inf)
 
     @cached_property
     def friction(self) -> Karnopp:
@@ -114,8 +116,13 @@ class EffectRows:
     @cached_property
     def at_rest(self) -> tuple[Rest, ...]:
         """Rows of rest of each log."""
-        up, down = np.maximum(self.theta[1:3], 0.0).tolist()
-        return tuple(rests(one, up, down) for one in self.logs)
+        return tuple(rests(one, *self.surely_borne) for one in self.logs)
+
+    @property
+    def surely_borne(self) -> tuple[float, float]:
+        """`borne`, and no more than these Coulomb levels."""
+        up, down = np.minimum(np.maximum(self.theta[1:3], 0.0), self.borne).tolist()
+        return up, down
 
     @cached_property
     def events(self) -> tuple[Breakaways, ...]:

@@ -404,7 +404,8 @@ def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
     """The stage with the effect in it: its columns join, or the logs' signals are freed of it."""
     effect, values = candidate.effect, candidate.values
     if not effect.place.on_signals:
-        return replace(stage, chosen=(*stage.chosen, (effect, values)))
+        chosen = (*stage.chosen, (effect, values))
+        return replace(stage, chosen=chosen, borne=stage.surely_borne)
     logs = []
     for one in stage.logs:
         if effect.place.shows:
