@@ -168,14 +168,14 @@ def _traced(
 
 
 def _share_left(found: Refinement, held: HeldOut, lacks: MissingForce | None) -> float:
-    """The share of the missing force that effects leave; by the error of the run where it shows
-    them in starts and stops, of which the force while sliding says little."""
+    """The share of the missing force that effects leave; by the error of the run of those that act
+    in stops alone, of which the force while sliding says nothing."""
     of_error = float(np.sqrt(held.share))
     of_force = None if lacks is None else lacks.share_left
     if of_force is None:
         return of_error
-    by_run = any(step.explained is not None for step in found.choice.steps)
-    return min(of_force, of_error) if by_run else of_force
+    in_stops = all(step.candidate.effect.place.in_stops for step in found.choice.steps)
+    return min(of_force, of_error) if in_stops else of_force
 
 
 def _missing(
