@@ -1,42 +1,30 @@
 """Choice on the equations: the next best where the best bends the rest, and bristles by rest."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.outside_rig import EFFECTS, write
 from identification.effects._library import built_in
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, REST
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
-from identification.tracing.regression.candidates import best_of
-from identification.tracing.regression.stepwise import choose, explained_part, gives_way, trusted
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.stepwise import (
+    absorb,
+    choose,
+    explained_part,
+    gives_way,
+    trusted,
+)
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
 from tests.identification.tracing.test_trace import made as pneumatic
 
 
 def quiet(_stage: str, _share: float) -> None:
     """Progress that nobody sees."""
-
-
-def outside_log(folder: Path, effect: str, seed: int) -> Log:
-    """A motor's log of the simulator written apart."""
-    write(folder, "motor", effect, seed, EFFECTS.index(effect))
-    t, y, u = np.loadtxt(folder / "train.csv", delimiter=",", skiprows=1).T
-    return Log(effect, {"t": t, "y": y, "u": u, "F": K_A * u})
-
-
-@pytest.mark.method
-def test_an_effect_that_bends_the_rest_does_not_hide_the_next(tmp_path: Path) -> None:
-    # On this log friction by load gains most, with nine tenths of the force taken by it.
-    one = motion_log(outside_log(tmp_path, "input_delay", 51), held=True, by_command=False)
-    start, first = first_stage([one], False)
-    found = choose(start, first, built_in(), np.random.default_rng(0), quiet)
-    assert [step.candidate.effect.key for step in found.steps] == ["input_delay"]
 
 
 def at_rest(log: Log, moved: float, rng: np.random.Generator) -> EffectRows:
@@ -49,6 +37,17 @@ def at_rest(log: Log, moved: float, rng: np.random.Generator) -> EffectRows:
     joined = {k: np.concatenate([log[k], v]) for k, v in (("t", t), ("y", y), ("F", F))}
     one = seen(Log(log.name, joined | {"u": joined["F"] / K_A}))
     return first_stage([one], False)[0]
+
+
+def test_rows_of_rest_stay_where_an_effect_leaves_higher_levels_to_friction() -> None:
+    stage = at_rest(made(4), 0.0, np.random.default_rng(3))
+    warmup = EffectCandidate(built_in()["warmup"], {"a": -0.3, "b": 0.0, "tau": 5.0}, {}, 0.0)
+    higher = stage.theta * (1.0, 1.4, 1.4, 1.0, 1.0)
+    with_it = replace(absorb(stage, warmup), theta=higher)
+    assert with_it.surely_borne == stage.surely_borne
+    (before,), (after,) = stage.at_rest, with_it.at_rest
+    assert np.array_equal(before.start, after.start) and len(before.start) > 10
+    assert len(replace(stage, theta=higher).at_rest[0].start) > len(before.start)
 
 
 def test_steps_at_rest_are_no_bristle() -> None:
