@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.probability import Named, fitted, is_of_choice, named_in
+from benchmarks.probability import FOLDS, Named, fitted, fold_of, left_out, named_in
 from identification.tracing.probability import evidence
 
 
@@ -39,4 +39,8 @@ def test_the_fit_finds_the_curve_that_made_the_cases() -> None:
         right = bool(rng.random() < 1.0 / (1.0 + np.exp(-true @ terms)))
         named.append(Named(str(i), "spring", terms, right))
     assert fitted(named) == pytest.approx(true, abs=0.4)
-    assert 0.4 < np.mean([is_of_choice(one.run) for one in named]) < 0.6
+    assert {fold_of(one.run) for one in named} == set(range(FOLDS))
+    as_they_are = np.array([one.right for one in named], dtype=np.float64)
+    by_all = 1.0 / (1.0 + np.exp(-np.array([one.terms for one in named]) @ true))
+    errors = [np.mean((said - as_they_are) ** 2) for said in (left_out(named), by_all)]
+    assert errors[0] < 1.02 * errors[1]

@@ -16,7 +16,12 @@ from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
 from workbench.steps.first_card.motion_guess import MotionGuess, known_motion
-from workbench.steps.first_card.remarks import BALANCED, ahead_of_reference, remarks_on
+from workbench.steps.first_card.remarks import (
+    BALANCED,
+    are_exchanged,
+    behind_reference,
+    remarks_on,
+)
 from workbench.steps.first_card.roles import Roles, known_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
@@ -403,7 +408,8 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
     """The card's signals in the usual order."""
     out = []
     found = {"t": columns.clock, **roles.columns}
-    exchanged = {"r": "y", "y": "r"} if ahead_of_reference(roles) else {}
+    behind = behind_reference(roles)
+    exchanged = {"r": "y", "y": "r"} if behind is not None and are_exchanged(behind) else {}
     for name in (name for name in CARD_ORDER if name in found):
         one, unit = found[name], units[name]
         sign = roles.signs.get(name, 1.0)

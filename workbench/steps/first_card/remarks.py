@@ -31,23 +31,27 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
                 f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
                 f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
             )
-    if "r" in roles.columns:
-        found = lead(roles.columns["r"].x, roles.columns["y"].x)
-        late = found.samples * h * columns.grid
-        if ahead_of_reference(roles):
-            yield (
-                f"the position is ahead of the reference by {-1e3 * late:.3g} ms, as no loop makes"
-                " it: the two columns may be the other way round"
-            )
-        else:
-            yield f"the position follows the reference by {1e3 * late:.3g} ms"
+    behind = behind_reference(roles)
+    if behind is not None:
+        late = 1e3 * behind * h * columns.grid
+        yield (
+            f"the position is ahead of the reference by {-late:.3g} ms, as no loop makes it: the"
+            " two columns may be the other way round"
+            if are_exchanged(behind)
+            else f"the position follows the reference by {late:.3g} ms"
+        )
 
 
-def ahead_of_reference(roles: Roles) -> bool:
-    """Whether the position comes before its reference, by more than a sample."""
+def behind_reference(roles: Roles) -> float | None:
+    """Samples of the columns by which the position follows its reference; None without one."""
     if "r" not in roles.columns:
-        return False
-    return lead(roles.columns["r"].x, roles.columns["y"].x).samples < -1.0
+        return None
+    return lead(roles.columns["r"].x, roles.columns["y"].x).samples
+
+
+def are_exchanged(behind: float) -> bool:
+    """Whether a position so many samples behind its reference comes before it."""
+    return behind < -1.0
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
