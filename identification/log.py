@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.arrays import Array, frozen
+from identification.arrays import Array, BoolArray, frozen
 from identification.errors import BadLog
 
 RigKind = Literal["electro-pneumatic", "force", "motor", "velocity"]
@@ -41,12 +41,14 @@ class Log:
 
     `y` position [m], `F` applied force F_e [N], `u` command [V, or the
     rig's command_unit], `r` reference [m]; any further
-    name is a signal that effects may use. Arrays are read-only copies. Raises BadLog where the
+    name is a signal that effects may use. lost (n,): rows that the logger has lost, whose values
+    lie between those of their neighbours. Arrays are read-only copies. Raises BadLog where the
     lengths differ or `t` is missing.
     """
 
     name: str
     signals: Mapping[str, Array]
+    lost: BoolArray | None = None
 
     def __post_init__(self) -> None:
         signals = {key: frozen(values) for key, values in self.signals.items()}
@@ -87,4 +89,5 @@ class Log:
 
     def part(self, start: int, stop: int) -> "Log":
         """Samples `start` to `stop` (exclusive) as a log of its own."""
-        return replace(self, signals={k: v[start:stop] for k, v in self.signals.items()})
+        lost = None if self.lost is None else self.lost[start:stop]
+        return replace(self, signals={k: v[start:stop] for k, v in self.signals.items()}, lost=lost)

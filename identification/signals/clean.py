@@ -10,16 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
+from identification.signals.differentiate import resolution
 from identification.signals.frozen import frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
-from identification.signals.steps import small_spikes, white_noise
+from identification.signals.steps import beside_gaps, small_spikes, white_noise
 
 LONGEST_REPAIR = 3
 """Missing samples in a row that are interpolated; at a longer run the log is cut.
@@ -31,6 +32,7 @@ LONGEST_GAP = 5.0
 """Sampling periods between two samples above which a log is cut in two."""
 
 _EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
+_EVEN_BUT_FOR_LOST = 0.01  # part of a period, of a clock of which rows are lost
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
 _TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
 _LARGE = 0.05  # of a signal's range, from which a spike is no small one
@@ -75,6 +77,10 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     runs = _moving(runs)
     lost = log.duration - sum(run.duration for run in runs)
     text = f"{log.name}: uneven clock, resampled every {1e3 * log.h:.3g} ms"
+    filled = [run.lost for run in runs if run.lost is not None]
+    if filled:
+        share = float(np.mean(np.concatenate(filled)))
+        text = f"{log.name}: {share:.2g} of its rows are lost, interpolated"
     if any(one.done == "cut out" for one in bad) and all(_is_even(run["t"]) for run in runs):
         text = f"{log.name}: cut where samples are bad"
     said = [text]
@@ -142,7 +148,7 @@ def _without_missing(log: Log, first_row: int) -> tuple[Repaired, Mask]:
         long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
         isolated = missing & ~long
         away |= long
-        filled = np.interp(log["t"], log["t"][~missing], values[~missing])
+        filled = _bridged(log["t"], values, missing)
         if np.any(isolated):
             count = int(isolated.sum())
             remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
@@ -222,12 +228,14 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     spiking: Mask = np.zeros(len(log), dtype=bool)
     while np.any(new := spikes(log, name, rotary) & ~spiking):  # one may hide another beside it
         spiking |= new
-        log = log.with_signals(**{name: np.interp(t, t[~spiking], raw[~spiking])})
-    rounds = 0
-    while name in _SMALL and rounds < _ROUNDS and np.any(new := small_spikes(log[name]) & ~spiking):
+        log = log.with_signals(**{name: _bridged(t, raw, spiking)})
+    settled = ~beside_gaps(t)  # over a gap of the clock any motion is a step
+    for _ in range(_ROUNDS if name in _SMALL else 0):
+        new = small_spikes(log[name]) & settled & ~spiking
+        if not np.any(new):
+            break
         spiking |= new
-        rounds += 1
-        log = log.with_signals(**{name: np.interp(t, t[~spiking], raw[~spiking])})
+        log = log.with_signals(**{name: _bridged(t, raw, spiking)})
     if not np.any(spiking):
         return Repaired(log, ())
     rows, height = np.flatnonzero(spiking), np.abs(raw - log[name])
@@ -250,6 +258,20 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
         ),
         tuple(_found(log, name, "spike", spiking, "interpolated", float(np.max(height)))),
     )
+
+
+def _bridged(t: Array, values: Array, bad: Mask) -> Array:
+    """Values (n,) with the bad ones on the line between their neighbours, in whole counts of a
+    sensor that counts."""
+    good, out = values[~bad], values.copy()
+    out[bad] = _in_counts(np.interp(t[bad], t[~bad], good), good)
+    return out
+
+
+def _in_counts(values: Array, logged: Array) -> Array:
+    """Values on the whole counts of the logged ones, as they are where these count nothing."""
+    count = resolution(logged)
+    return logged[0] + count * np.rint((values - logged[0]) / count) if count else values
 
 
 def _shown(name: str, rotary: bool) -> tuple[float, str]:
@@ -285,8 +307,9 @@ def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mas
 def even_clock(log: Log) -> tuple[Log, ...]:
     """The log as runs on an even clock, cut at gaps longer than `LONGEST_GAP` periods.
 
-    A run that is even to 1e-3 of its period is passed on as it is, bit for bit; any other is
-    resampled at the log's median period. The command `u` and two-valued signals are held (the
+    A run that is even to 1e-3 of its period is passed on as it is, bit for bit; one that is but for
+    lost rows gets these between their neighbours, and any other is resampled at the log's median
+    period. The command `u` and two-valued signals are held (the
     last value at the middle of the new period); the rest follows a piecewise cubic that keeps
     monotone stretches monotone, so that a step neither rings nor spreads over more than one
     sample. Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
@@ -299,7 +322,9 @@ def even_clock(log: Log) -> tuple[Log, ...]:
         if stop - start < 2:
             continue
         run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
-        run = run if _is_even(run["t"]) else _resample(run, h)
+        if not _is_even(run["t"]):
+            rows = _row_numbers(run["t"], h)
+            run = _resample(run, h) if rows is None else _with_lost_rows(run, rows)
         if len(run) >= SHORTEST_LOG:
             runs.append(run)
     if not runs:
@@ -323,6 +348,47 @@ def _resample(log: Log, h: float) -> Log:
     return Log(log.name, {"t": grid, **signals})
 
 
+def _row_numbers(t: Array, h: float) -> IntArray | None:
+    """Row of each sample (n,) on an even clock of which rows are lost; None on another clock."""
+    steps = np.rint(np.diff(t) / h).astype(np.int64)
+    if np.min(steps) < 1:
+        return None
+    rows = np.concatenate([[0], np.cumsum(steps)])
+    period = (t[-1] - t[0]) / rows[-1]
+    uneven = np.max(np.abs(t - t[0] - period * rows))
+    return rows if uneven <= _EVEN_BUT_FOR_LOST * period else None
+
+
+def _with_lost_rows(log: Log, rows: IntArray) -> Log:
+    """The log on an even clock, each lost row between its neighbours: of a position on the cubic
+    spline through them all, in whole counts of an encoder; of what may jump on the straight
+    line."""
+    from scipy.interpolate import make_interp_spline
+
+    t, lost = log["t"], np.ones(rows[-1] + 1, dtype=bool)
+    lost[rows] = False
+    grid = t[0] + (t[-1] - t[0]) / rows[-1] * np.arange(len(lost))
+    signals = {"t": grid}
+    for name, values in log.signals.items():
+        if name == "t":
+            continue
+        whole = np.empty(len(lost))
+        whole[rows] = values
+        if name == "y":
+            between = make_interp_spline(rows, values, 3)(np.flatnonzero(lost))
+            whole[lost] = _in_counts(between, values)
+        elif _two_valued(values):
+            whole[lost] = values[np.searchsorted(rows, np.flatnonzero(lost)) - 1]
+        else:
+            whole[lost] = np.interp(np.flatnonzero(lost), rows, values)
+        signals[name] = whole
+    return Log(log.name, signals, lost)
+
+
+def _two_valued(values: Array) -> bool:
+    return bool(np.all((values == values.min()) | (values == values.max())))
+
+
 def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array:
     """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`.
 
@@ -332,7 +398,7 @@ def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array
     """
     from scipy.interpolate import PchipInterpolator
 
-    if name == "u" or np.all((values == values.min()) | (values == values.max())):
+    if name == "u" or _two_valued(values):
         held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
         return values[np.maximum(held, 0)]
     return np.asarray(PchipInterpolator(t, values)(np.clip(grid, t[0], t[-1])))

@@ -131,10 +131,7 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
     """
     if len(y) < 4 * JUMP_NEAR:
         return np.zeros(0, dtype=np.intp)
-    period = np.diff(t)
-    gap = maximum_filter1d(period, 2 * LINE_SIDES[-1] + 1) > WHOLE_PERIODS * float(
-        np.median(period)
-    )
+    gap = _periods_beside_gaps(t)
     found = outstanding(np.where(gap, 0.0, steps_between(y)), FAULT_FROM * white_noise(y))
     # What changes the speed elsewhere within a sample may do so here, from rest to rest.
     change = np.where(gap[1:] | gap[:-1], 0.0, np.abs(np.diff(y, 2)))
@@ -142,6 +139,19 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
         change[max(k - JUMP_NEAR, 0) : k + JUMP_NEAR] = 0.0
     size = np.abs([jump_size(y, int(k)) for k in found])
     return found[size > SUDDEN_SHARE * float(np.max(change))]
+
+
+def beside_gaps(t: Array) -> NDArray[np.bool_]:
+    """Samples (n,) near a gap of the clock, over which any motion is a step."""
+    gap = _periods_beside_gaps(t)
+    return np.asarray(np.append(gap, False) | np.append(False, gap))
+
+
+def _periods_beside_gaps(t: Array) -> NDArray[np.bool_]:
+    """Periods of a clock (n - 1,), one of which near by is a gap."""
+    period = np.diff(t)
+    near = maximum_filter1d(period, 2 * LINE_SIDES[-1] + 1)
+    return np.asarray(near > WHOLE_PERIODS * float(np.median(period)))
 
 
 def outstanding(steps: Array, least: float) -> NDArray[np.intp]:

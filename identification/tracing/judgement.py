@@ -16,6 +16,7 @@ from identification.tracing.model_errors import (
     NoiseFloor,
     OnTest,
     errors_of,
+    follows,
     lacks,
     noise_floor,
     on_test,
@@ -57,7 +58,8 @@ class HeldOut:
 
     now: what the refined one leaves of the test logs; share: of what was missing there, that is
     left; changed: parameters; lacking: whether something of account is missing on the training
-    logs; coulomb [N]: the larger level of the plain model.
+    logs; coulomb [N]: the larger level of the plain model; followed: whether the refined one's run
+    of the test logs leaves their noise alone, where the plain one's leaves more.
     """
 
     before: Mapping[str, Errors]
@@ -68,6 +70,7 @@ class HeldOut:
     changed: tuple[Change, ...]
     lacking: bool
     coulomb: float
+    followed: bool
 
     @property
     def proved(self) -> bool:
@@ -100,7 +103,7 @@ def held_out(chosen: Selection, found: Refinement, seen: Sequence[MotionLog], ri
     coulomb = max(plain.plant.friction.F_cp, plain.plant.friction.F_cn)
     return HeldOut(
         errors_before, errors_after, now, noise, share_left(was, now, noise, coulomb),
-        tuple(changed), lacks(after, errors_after["train"], noise), coulomb,
+        tuple(changed), lacks(after, errors_after["train"], noise), coulomb, follows(was, now),
     )  # fmt: skip
 
 

@@ -104,6 +104,13 @@ def share_left(before: OnTest, after: OnTest, noise: NoiseFloor, coulomb: float 
     return next(known, 0.0)
 
 
+def follows(before: OnTest, after: OnTest) -> bool:
+    """Whether the run leaves nothing but noise of the position, where it had left more."""
+    if before.misfit is None or after.misfit is None:
+        return False
+    return before.misfit > ADEQUATE and after.misfit <= COMPLETE
+
+
 def _equation_share(
     before: OnTest, after: OnTest, noise: NoiseFloor, least: float, beside: float
 ) -> float | None:

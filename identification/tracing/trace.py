@@ -168,8 +168,11 @@ def _traced(
 
 
 def _share_left(found: Refinement, held: HeldOut, lacks: MissingForce | None) -> float:
-    """The share of the missing force that effects leave; by the error of the run of those that act
-    in stops alone, of which the force while sliding says nothing."""
+    """The share of the missing force that effects leave: none where the run leaves nothing but
+    noise; by the error of the run of those that act in stops alone, of which the force while
+    sliding says nothing."""
+    if held.followed:
+        return 0.0
     of_error = float(np.sqrt(held.share))
     of_force = None if lacks is None else lacks.share_left
     if of_force is None:

@@ -321,14 +321,17 @@ def test_twice_the_gain_of_columns() -> None:
 def test_material() -> None:
     """What adds less than this share of the Coulomb level, here 10 N, is not reported."""
 
-    def matters(size: float) -> bool:
+    def matters(size: float, share: float = 1.0) -> bool:
         before = leaving(4.0)
-        less = replace(before.fit, residual=before.fit.residual - size * signs())
+        acts = np.arange(len(signs())) < share * len(signs())
+        less = replace(before.fit, residual=before.fit.residual - size * acts * signs())
         one = candidate("spring", mechanical=replace(before, fit=less))
         return material(one, stage(coulomb=10.0), {MECHANICAL: before})
 
     assert not matters(0.08)
     assert matters(0.125)
+    # What acts at one end of the stroke alone counts as it is there.
+    assert matters(0.125, 0.05) and not matters(0.08, 0.05)
     # Nor does a change by this share of a parameter's value, or what a run leaves beyond the
     # equation where friction would hardly feel it.
     assert not drifted(0.8, 2000, level=100.0) and drifted(1.25, 2000, level=100.0)

@@ -298,7 +298,7 @@ def _bent(
     """
     now = np.maximum(stage.theta if stage.theta_f is None else stage.theta_f, 1e-9)
     level = max(float(np.mean(now[1:3])), SLOPE_STEP * float(np.std(one.log["F"])), 1e-12)
-    pace = level / max(float(np.max(one.speed)), 1e-300)
+    pace = level / max(float(np.max(one.speed, initial=0.0)), 1e-300)
     X, b = rows.X.copy(), rows.b - fixed
     for i, step in ((1, level), (2, level), (3, pace), (4, pace)):
         theta = now + SLOPE_STEP * step * (np.arange(len(now)) == i)

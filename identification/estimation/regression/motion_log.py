@@ -22,7 +22,7 @@ from identification.signals.clock_jitter import position_noise
 from identification.signals.differentiate import Motion, differentiate, resolution
 from identification.signals.force_random_walk import force_random_walk
 from identification.signals.intersample import kinks
-from identification.signals.noise import local_noise, quiet_part
+from identification.signals.noise import local_noise, noise_of_lost_rows, quiet_part
 from identification.signals.weak_form import all_windows, noise_gain, sliding_windows, weights
 
 WINDOW_SECONDS = 0.06  # of a window
@@ -104,8 +104,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
     if begin is None:
         begin = int(np.argmax(one.signals["d"] != 0)) - round(BEFORE_MOTION / one.log.h)
     begin = min(max(begin, 0), len(one.log) - n)
-    cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
-    part = again(one, cut)
+    part = again(one, one.log.part(begin, begin + n))
     own = replace(one.noise, v=part.noise.v)
     return replace(part, noise=own, reference=one.reference)
 
@@ -118,7 +117,11 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNois
     unsteady = position_noise(log["y"], motion.v)
     y = y if unsteady is None else unsteady.at_rest
     y = max(y, EXACT_SHARE * float(np.ptp(log["y"])))
-    F = float(np.hypot(_beside_control(log), between)) if held else local_noise(log["F"])
+    if held:
+        unlogged = 0.0 if log.lost is None else noise_of_lost_rows(log["F"], log.lost)
+        F = float(np.sqrt(_beside_control(log) ** 2 + between**2 + unlogged**2))
+    else:
+        F = local_noise(log["F"])
     return LogNoise(y, 0.0 if unsteady is None else unsteady.jitter, motion.v_noise, F, between)
 
 

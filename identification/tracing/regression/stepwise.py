@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.effects._library import Library
 from identification.estimation.regression.effect_columns import Values, slow_motion
@@ -360,20 +361,27 @@ def rescaled(
     return replace(candidate, outcomes=outcomes, gain=float(gain))
 
 
-def contribution_rms(
+def contribution_size(
     candidate: EffectCandidate, base: Mapping[str, RowFit], equation: str, band: float
 ) -> float:
-    """Root mean square of what the effect changes in an equation, in its unit."""
+    """What the effect changes in an equation where it acts, in its unit: root mean square weighted
+    by its own square, so that an end cushion is not the smaller the longer the log is elsewhere."""
     before, after = base[equation], candidate.outcomes[equation]
     own = after.rows.X.shape[1] - before.rows.X.shape[1]
     if own > 0 and not after.robust:
         # In the band the body takes any force: what an effect does there says nothing.
         fast = after.rows.speed >= max(after.slowest, band)
         moved = (after.rows.X[:, -own:] @ after.fit.theta[-own:])[fast]
-        return float(np.sqrt(np.mean(moved**2))) if len(moved) else 0.0
+        return _where_it_acts(moved)
     keep = after.rows.speed >= max(before.slowest, after.slowest)
     moved = before.fit.residual * before.rows.sd - after.fit.residual * after.rows.sd
-    return float(np.sqrt(np.mean(moved[keep] ** 2))) if np.any(keep) else 0.0
+    return _where_it_acts(moved[keep])
+
+
+def _where_it_acts(moved: Array) -> float:
+    """Root mean square of values, weighted by their squares."""
+    square = float(np.sum(moved**2))
+    return float(np.sqrt(np.sum(moved**4) / square)) if square > 0.0 else 0.0
 
 
 def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
@@ -382,7 +390,7 @@ def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, R
     if candidate.effect.place.shows:
         return any(shift_rms(candidate, stage, one) > SHIFT * one.noise.y for one in stage.logs)
     for equation in candidate.outcomes:
-        size = contribution_rms(candidate, base, equation, stage.band)
+        size = contribution_size(candidate, base, equation, stage.band)
         if equation == MECHANICAL and size > MATERIAL * level:
             return True
         if equation == ACTUATOR and size > MATERIAL * float(np.std(base[equation].rows.b)):

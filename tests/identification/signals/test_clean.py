@@ -10,6 +10,7 @@ from identification.errors import BadLog, BadSpecification
 from identification.log import Log, Rig
 from identification.signals.check import work_share
 from identification.signals.clean import applied_force, check, even_clock, prepare, repair
+from identification.signals.differentiate import resolution
 from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 
 RIG = Rig(kind="force", stroke=(-0.2, 0.2))
@@ -56,6 +57,60 @@ def test_jittered_clock_becomes_even_and_keeps_lines_and_range(
     np.testing.assert_allclose(run["y"], 3.0 * run["t"] - 1.0, atol=1e-9 * h * 300)
     assert values.min() <= run["F"].min()
     assert run["F"].max() <= values.max()
+
+
+def moved(n: int, count: float = 0.0, h: float = 0.002) -> dict[str, Array]:
+    """Signals of a body that swings, every h [s]; its position in whole counts [m], if any."""
+    t = h * np.arange(n, dtype=np.float64)
+    y = 0.1 * np.sin(3.0 * t)
+    return {"t": t, "y": count * np.rint(y / count) if count else y, "F": np.cos(3.0 * t)}
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.02, 0.2), st.sampled_from([0.0, 1e-5]))
+def test_lost_rows_are_put_back_where_they_were(seed: int, share: float, count: float) -> None:
+    whole = moved(600, count)
+    kept = np.random.default_rng(seed).random(600) >= share
+    kept[[0, -1]] = True
+    kept[3::5] = True  # no gap is long enough to cut the log
+    (run,) = even_clock(Log("run", {k: x[kept] for k, x in whole.items()}))
+    assert run.lost is not None and np.array_equal(run.lost, ~kept)
+    np.testing.assert_allclose(run["t"], whole["t"], atol=1e-9)
+    assert np.array_equal(run["F"][kept], whole["F"][kept])
+    np.testing.assert_allclose(run["y"], whole["y"], atol=2e-9 + 1.01 * count)
+    assert resolution(run["y"]) == pytest.approx(count, rel=1e-6)
+
+
+def test_a_clock_that_jitters_has_lost_no_rows() -> None:
+    signals = moved(400)
+    signals["t"] = signals["t"] + 1e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, 400)
+    (run,) = even_clock(Log("run", signals))
+    assert run.lost is None
+
+
+def test_the_share_of_lost_rows_is_told_and_follows_the_log() -> None:
+    kept = np.arange(1000) % 10 != 7
+    log = sliding_log(n=1000)
+    log = Log("run", {k: x[kept] for k, x in log.signals.items()})
+    prepared = prepare(log, Rig("force"))
+    assert any("0.1 of its rows are lost" in one for one in prepared.remarks)
+    lost = prepared.runs[0].part(0, 100).with_signals(F=np.zeros(100)).lost
+    assert lost is not None and np.count_nonzero(lost) == 10
+
+
+def test_no_spike_is_seen_where_rows_are_lost() -> None:
+    whole = moved(2000, 1e-6)
+    kept = np.ones(2000, dtype=bool)
+    kept[[500, 501, 502, 900, 1300, 1301]] = False
+    repaired = repair(Log("run", {k: x[kept] for k, x in whole.items()}))
+    assert not [one for one in repaired.bad if one.kind == "spike"]
+
+
+def test_a_bridged_sample_stays_on_the_counts_of_its_sensor() -> None:
+    signals = moved(2000, 1e-5)
+    signals["y"][[400, 1400]] = np.nan
+    repaired = repair(Log("run", signals))
+    assert resolution(repaired.log["y"]) == pytest.approx(1e-5, rel=1e-6)
 
 
 def test_step_does_not_ring_and_command_is_held() -> None:

@@ -60,6 +60,12 @@ def test_a_position_with_noise_has_no_counts(stuck: float) -> None:
     assert resolution(y) == 0.0
 
 
+def test_rounding_of_the_last_digit_makes_no_new_level() -> None:
+    counts = 1e-5 * np.rint(1e3 * np.sin(np.linspace(0.0, 20.0, 4000)))
+    shaken = counts * (1.0 + 1e-15 * np.random.default_rng(1).standard_normal(4000))
+    assert resolution(shaken) == pytest.approx(resolution(counts), rel=1e-6)
+
+
 def test_cutoff_falls_as_the_noise_rises() -> None:
     y, _, _ = two_sines()
     rng = np.random.default_rng(2)

@@ -8,6 +8,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.tracing.model_errors import (
     NoiseFloor,
     OnTest,
+    follows,
     lacks,
     predicted,
     share_left,
@@ -50,6 +51,16 @@ def test_a_run_that_lacks_much_comes_before_an_equation_that_lacks_little() -> N
     assert share_left(left_of(1.5, None, 21.0), left_of(1.5, None, 6.0), noise) == 0.25
     assert share_left(left_of(2.5, None, 21.0), left_of(2.5, None, 6.0), noise) == 1.0
     assert share_left(left_of(1.5, None, 1.4), left_of(1.5, None, 1.0), noise) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [(21.0, 1.05, True), (21.0, 1.2, False), (1.4, 1.0, False), (None, 1.0, False)],
+)
+def test_a_run_follows_that_leaves_noise_where_more_had_been_left(
+    before: float | None, after: float, expected: bool
+) -> None:
+    assert follows(left_of(1.0, None, before), left_of(1.0, None, after)) == expected
 
 
 @pytest.mark.parametrize(
