@@ -1,7 +1,7 @@
 """What one new log says of a known machine: the fit of that log, begun from the active model."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.parameters import values_of
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Plant
 from identification.thresholds import ADEQUATE, ASTRAY
 
@@ -57,8 +58,18 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
         found = fit_imposed(recorded, rng, "as the active model")
         return _of_fit(found, allowed_misfit(model.chi_square))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    # Without prescribed motion the force equation alone says that its run is not followed.
-    return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
+    if found.imposed:  # the equation has less error, or no run of this structure is followed
+        found = replace(found, chi_square=_left_by_runs(model, found, log, drive))
+    return _of_fit(found, allowed_misfit(model.chi_square))
+
+
+def _left_by_runs(
+    model: ReferenceModel, found: KarnoppFit, log: Log, drive: Drive | None
+) -> float:  # fmt: skip
+    """What a run of the log leaves, of the plant found or of the active one, whichever is less."""
+    recorded = recorded_logs([log], model.rig, drive)
+    own = Plant(found.friction, model.plant.actuator, found.effects)
+    return min(misfit(one, recorded.logs, recorded.drive) for one in (own, model.plant))
 
 
 def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.simulation.free_run import free_run
+from tests.identification import motor_logs
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
 
 FORCE = Rig("force")
@@ -107,6 +108,23 @@ def test_a_spring_that_joined_is_another_structure() -> None:
     assert found.verdict == "structure"
     assert "trace" in found.reason
     assert found.state.logs == 0
+
+
+def shaken(seed: int) -> Log:
+    """A motor whose force is noisier than its command: no run follows such a log to its noise."""
+    rng, u = np.random.default_rng(seed + 1), motor_logs.strokes(10_000, seed)
+    log = motor_logs.made(seed, command=u + 0.03 * rng.standard_normal(len(u)))
+    return log.with_signals(u=u, F=motor_logs.K_A * u)
+
+
+@pytest.mark.slow
+def test_a_run_that_gives_way_to_the_equation_is_no_other_structure() -> None:
+    """The active plant's own run leaves no more of the new log than of the old."""
+    rig = Rig("motor", force_per_command=motor_logs.K_A)
+    known = active(fit_plant([shaken(1)], np.random.default_rng(1), rig=rig), rig, "first", 0.3)
+    found = drift_test(known, shaken(3), np.random.default_rng(2))
+    assert fit_plant([shaken(3)], np.random.default_rng(2), rig=rig, prior=known.plant).imposed
+    assert found.verdict != "structure"
 
 
 def test_a_log_that_stands_still_is_not_judged() -> None:
