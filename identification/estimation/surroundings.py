@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import beside_in, of_effect, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
@@ -334,6 +334,16 @@ def _but(every: BoolArray, k: int) -> BoolArray:
     return np.asarray(every & (np.arange(len(every)) != k))
 
 
+def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
+    """Blocks of time (r,) with as many of the rows inside that go up, and that go down, in each:
+    without any one of them there is motion both ways."""
+    block = np.zeros(len(up), dtype=np.int64)
+    for way in (up & inside, ~up & inside):
+        count = int(np.count_nonzero(way))
+        block[way] = np.arange(count) * BLOCKS // max(count, 1)
+    return block
+
+
 def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | None:
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
@@ -354,8 +364,9 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
         own_lags = lags * (moved[0].log.h / one.log.h)  # lags are in samples of the first log
         B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in own_lags])
         inside = (w.start >= LAG) & (w.start + w.length < len(F) + LEAD) & (plain.speed >= slow)
+        block = _blocks_of_each_way(one.up, inside)
         for k in range(BLOCKS):
-            in_block = inside & (plain.block == k)
+            in_block = inside & (block == k)
             if np.any(in_block):
                 x, b = X[in_block], B[in_block]
                 own.append(x.T @ x)

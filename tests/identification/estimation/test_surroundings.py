@@ -70,6 +70,18 @@ def test_columns_of_two_instants_are_found(samples: float) -> None:
     assert told.low < told.high
 
 
+def test_a_weight_is_found_where_one_stroke_alone_goes_up() -> None:
+    """Without the eighth of the log that has this stroke nothing would go up."""
+    n, each = 10_000, 500
+    push = np.concatenate([1.4 * np.sin(np.pi * np.arange(250) / 250), np.zeros(250)])
+    command = np.tile(-push, n // each)
+    command[1000:1500] = push
+    log = made(3, command=command)
+    pulled = log.with_signals(F=log["F"] + 60.0, u=log["u"] + 60.0 / K_A)
+    found = surroundings([pulled], MOTOR)
+    assert found.force.value == pytest.approx(-60.0, abs=0.5 * abs(NINE.F_cp - NINE.F_cn) + 0.5)
+
+
 @pytest.mark.parametrize("force", [-60.0, 60.0])
 def test_a_weight_larger_than_friction_is_taken_out(force: float) -> None:
     log = made(3)
