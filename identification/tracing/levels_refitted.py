@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.log import Log, Rig
-from identification.model.estimates import Drive
+from identification.model.estimates import NORMAL_95, Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
@@ -39,8 +39,9 @@ def levels_refitted(
     """F_cp and F_cn as they are in the test logs, where these levels alone are another there, and
     what to say of it; reported: the parameters beside which they are reported.
 
-    None where the plant follows the test logs as it does the training logs, or the rest of a test
-    log is not followed as well once the levels are fitted on its begin. Source: Nelder, Mead (1965)
+    None where the plant follows the test logs as it does the training logs, the rest of a test log
+    is not followed as well once the levels are fitted on its begin, or they are within their error
+    of the old ones. Source: Nelder, Mead (1965)
     for the search; the rule is ours: `README.md`, (9).
     """
     usual = _rms(plant, [one.log for one in train], drive)
@@ -53,6 +54,8 @@ def levels_refitted(
     if not explains_the_change(was, now, usual):
         return NO_CHANGE
     sd = np.abs(_fitted(plant, tests, drive) - moved)  # by what the rest of the logs changes
+    if not np.any(np.abs(moved) > NORMAL_95 * sd):
+        return NO_CHANGE
     unit = units_of(rig.motion, rig.command_unit)["F_cp"]
     levels = zip(("F_cp", "F_cn"), (reported.F_cp, reported.F_cn), moved, sd, strict=True)
     said = (
