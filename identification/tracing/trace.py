@@ -70,6 +70,10 @@ ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
 )
+BY_FORCE = (
+    "traced by the measured force: what the command leaves unknown lies between it and the force,"
+    " in the actuator"
+)
 FOR_NOW = "for now, since the trace ended early"
 
 
@@ -106,6 +110,8 @@ def trace(
         if not beside.orders:
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
+    if told.verdict == "unknown" and _commanded(train, rig) and not halt.reached():
+        told = _by_force(told, train, test, rig, library, rng, report, halt)
     beside, told = _with_lag(beside, told, recorded_as, rig, library, rng, report, halt)
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
@@ -121,6 +127,33 @@ def trace(
         return told
     around = replace(beside, resonance=resonance)
     return replace(told, surroundings=around, missing_force=None)  # which is of one body
+
+
+def _commanded(logs: Sequence[Log], rig: Rig) -> bool:
+    """Whether a valve's command is logged, from which the force of an actuator follows."""
+    return rig.kind != "motor" and all("u" in log for log in logs)
+
+
+def _by_force(
+    told: Trace, train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
+    rng: np.random.Generator, report: Progress, halt: Halt,
+) -> Trace:  # fmt: skip
+    """The trace by the measured force, where it knows what that by the command does not: an
+    actuator that is not linear leaves its error in every run by the command."""
+    alone = [[_without_command(log) for log in logs] for logs in (train, test)]
+    try:
+        again = _traced(alone[0], alone[1], rig, library, rng, report, halt)
+    except NotIdentifiable:
+        return told
+    if again.verdict == "unknown":
+        return told
+    like = " and ".join(one.effect.key for one in told.effects)
+    said = f"{BY_FORCE}, which acts like {like}" if like else BY_FORCE
+    return replace(again, remarks=(*again.remarks, said))
+
+
+def _without_command(log: Log) -> Log:
+    return replace(log, signals={key: x for key, x in log.signals.items() if key != "u"})
 
 
 def _with_lag(
