@@ -19,6 +19,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant, units_of
+from identification.signals.differentiate import MIN_SAMPLES
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
 from identification.thresholds import EARNS, TWICE
@@ -44,8 +45,10 @@ def levels_refitted(
     of the old ones. Source: Nelder, Mead (1965)
     for the search; the rule is ours: `README.md`, (9).
     """
-    usual = _rms(plant, [one.log for one in train], drive)
-    tests = [one.log for one in seen]
+    usual = _rms(plant, [one.log for one in train if len(one.log) >= MIN_SAMPLES], drive)
+    tests = [one.log for one in seen if BEGIN * len(one.log) >= MIN_SAMPLES]
+    if not tests:
+        return NO_CHANGE
     begins = [log.part(0, round(BEGIN * len(log))) for log in tests]
     if not follows_worse(_rms(plant, tests, drive, BEGIN), usual):
         return NO_CHANGE

@@ -140,6 +140,20 @@ def test_an_effect_that_the_library_lacks_is_unknown(
     assert found.next_experiment
 
 
+@pytest.mark.method
+def test_what_an_actuator_lacks_is_not_laid_to_friction() -> None:
+    """A valve whose leakage the library does not know: friction is traced by the measured force."""
+    library = {k: e for k, e in built_in().items() if k != "leakage"}
+    leaking = {"leakage": {"leak": 4.0}}
+    found = traced(made(31, leaking), made(32, leaking), library=library)
+    assert found.verdict == "none"
+    assert any("in the actuator" in one for one in found.remarks)
+    for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn"):
+        one = found.parameters_after[name]
+        assert one.low is not None and one.high is not None
+        assert one.low < getattr(PLAIN, name) < one.high
+
+
 @pytest.mark.slow
 def test_other_parameters_are_drift() -> None:
     worn = replace(PLAIN, F_cp=12.0, F_vn=180.0)
