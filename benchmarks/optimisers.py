@@ -5,7 +5,7 @@
 Local: the residual of runs in windows (`estimation/windowed_run/run_errors.judge`) from a plant
 that is 1 to 5 % off, by our Gauss-Newton with differences for slopes and by scipy's least_squares
 ("trf" with the same differences, "lm"); all take the same function of the same unknowns. Global:
-the cost of many plants at once (`estimation/plain_search`) over the search's box, by our
+the cost of many plants at once (`windowed_run/plant_search`) over the search's box, by our
 differential evolution and by scipy's, both vectorised with as many members and generations at most.
 Reached: cost a value, 1 where noise alone is left; time: of ours in the same run.
 """
@@ -22,15 +22,15 @@ from benchmarks.blind_machines import machine, simulated
 from identification.arrays import Array
 from identification.estimation.gauss_newton import WIDE_STEP, gauss_newton
 from identification.estimation.global_search import evolve
-from identification.estimation.plain_search.fitted_runs import total_cost
-from identification.estimation.plain_search.problem import pose
 from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.regressed_plant import first_plant
 from identification.estimation.windowed_run.parameters import (
     names_of,
     plant_with,
     units_in,
     values_of,
 )
+from identification.estimation.windowed_run.plant_search import Box, PlantCost
 from identification.estimation.windowed_run.run_errors import judge, soft
 from identification.log import Log
 from identification.model.plant import Plant
@@ -92,26 +92,27 @@ def wide(seed: int, name: str) -> dict[str, tuple[float, float]]:
     """Cost a value reached and seconds of each search over the box."""
     one = machine(name, seed)
     log: Log = simulated(one, (), seed, "train", SECONDS).log
-    problem = pose([log], recorded_logs([log], one.rig).drive)
-    box, runs, cap = problem.box, problem.runs, problem.cap
+    recorded = recorded_logs([log], one.rig)
+    plant, box = first_plant(recorded), Box.about(recorded.logs)
+    cost_of, count = PlantCost.of(plant, recorded.logs, recorded.drive), len(log)
 
     def cost(z: Array) -> Array:
-        return np.asarray(total_cost(runs, box.rows(z), cap))
+        return cost_of(box.nine(z))
 
-    first = box.around(problem.row, MEMBERS, 0.15, np.random.default_rng(seed))
+    first = box.around(plant.friction.array, MEMBERS, np.random.default_rng(seed))
     search: Any = differential_evolution
     out = {}
     begin = time.perf_counter()
     found = evolve(cost, first, GENERATIONS, np.random.default_rng(seed))
-    out["ours"] = float(found.costs[0]) / problem.count, time.perf_counter() - begin
+    out["ours"] = float(found.costs[0]) / count, time.perf_counter() - begin
     for strategy in ("best1bin", "currenttobest1bin"):
         begin = time.perf_counter()
         theirs = search(
-            lambda z: cost(np.ascontiguousarray(z.T)), [(0.0, 1.0)] * len(box.free), init=first,
+            lambda z: cost(np.ascontiguousarray(z.T)), [(0.0, 1.0)] * len(box.low), init=first,
             strategy=strategy, maxiter=GENERATIONS, vectorized=True, updating="deferred",
             polish=False, rng=np.random.default_rng(seed), tol=1e-4,
         )  # fmt: skip
-        out[f"scipy {strategy}"] = float(theirs.fun) / problem.count, time.perf_counter() - begin
+        out[f"scipy {strategy}"] = float(theirs.fun) / count, time.perf_counter() - begin
     return out
 
 

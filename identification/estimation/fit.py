@@ -35,7 +35,6 @@ from identification.estimation.imposed_motion import (
     without_estimates,
 )
 from identification.estimation.late_position import what_acts_beside
-from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
     RecordedLogs,
     chosen_drive,
@@ -43,6 +42,7 @@ from identification.estimation.recorded_logs import (
     led_by_rig,
     recorded_logs,
 )
+from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.settling import is_adequate, settled
 from identification.estimation.structure_fit import (

@@ -8,16 +8,20 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import AT_REST, Effect
 from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.effect_columns import Values, in_columns
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
+from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.regression.weighted_rows import OVERLAP
-from identification.model.karnopp import Karnopp
+from identification.log import Rig
+from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import TWICE
 
+LEAST_OF_FIRST = 1e-9  # of a first estimate's largest value, that each has at least
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
 SHAPE = 0.03  # relative trust in a searched parameter
@@ -49,8 +53,7 @@ def regressed_plant(
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     sliding = outcomes[MECHANICAL]
     prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
-    logs, rig = recorded.logs, recorded.rig
-    up, down = borne(logs)
+    up, down = borne(recorded.logs)
     stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
     if BREAKAWAY in outcomes:
         found = outcomes[BREAKAWAY].fit.theta
@@ -58,21 +61,35 @@ def regressed_plant(
         stick_n = -float(found[1]) if found[1] > 0 else stick_n
     slow = max(sliding.slowest, float(np.min([5.0 * one.noise.v for one in stage.logs])))
     nine = Karnopp(**five, dv_p=slow, dv_n=-slow, F_sp=stick_p, F_sn=stick_n)
-    drives: Actuator | Motor | None = None
+    drives: Actuator | Motor | None = motor_of(recorded.rig)
     if ACTUATOR in outcomes:
         k1, k2 = (float(x) for x in outcomes[ACTUATOR].fit.theta[:2])
         drives = Actuator(max(k1, 1e-9), max(k2, 0.0))
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
-    elif rig.kind == "motor" and rig.force_per_command is not None:
-        drives = Motor(rig.force_per_command)
     acting, unidentified = [], dict[str, float]()
     for effect, shape in effects:
         values, spreads, none = _of_effect(effect, shape, outcomes)
         acting.append(effect.acting(values))
         prior |= spreads
         unidentified |= dict.fromkeys(none, np.inf)
-    nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
+    nine = replace(nine, m=max(nine.m, least_mass(nine, drives, recorded.logs[0].log.h)))
     return RegressedPlant(Plant(nine, drives, tuple(acting)), prior, unidentified, slow)
+
+
+def first_plant(recorded: RecordedLogs) -> Plant:
+    """The plant of the first estimates, the median over the logs: before any equation's rows."""
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = np.median(found, axis=0)
+    least = LEAST_OF_FIRST * max(float(np.max(np.abs(nine))), 1e-300)
+    signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
+    drives = fit_actuator(recorded.plain).nearest if recorded.by_command else motor_of(recorded.rig)
+    return Plant(Karnopp.from_array(signs * np.maximum(signs * nine, least)), drives)
+
+
+def motor_of(rig: Rig) -> Motor | None:
+    """The motor of a rig, if one drives it."""
+    gives = rig.force_per_command
+    return Motor(gives) if rig.kind == "motor" and gives is not None else None
 
 
 def _of_effect(

@@ -8,11 +8,10 @@ import numpy as np
 
 from identification.effects._base import Effect
 from identification.errors import UserError
-from identification.estimation.plain_search.actuator_fit import fit_actuator
-from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
 from identification.estimation.regressed_plant import (
     RegressedPlant,
+    first_plant,
     inertia_is_lost,
     regressed_plant,
 )
@@ -20,8 +19,8 @@ from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
-from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
+from identification.estimation.windowed_run.plant_search import searched_plant
 from identification.estimation.windowed_run.refinement import (
     Effort,
     HaltedRefit,
@@ -33,7 +32,7 @@ from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.stick_search import stick_search, widest_band
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Plant
 from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 
@@ -179,30 +178,17 @@ def search_is_hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
 def _from_first_estimate(
     stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
 ) -> FittedStructure:
-    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
-    nine = Karnopp.from_array(np.median(found, axis=0))
-    plant = Plant(nine, actuator_of(recorded))
+    plant = first_plant(recorded)
     if led_by_rig(recorded):
         return FittedStructure(stage, first, plant, {}, True)
     done: Refit | None = None
     try:
-        done = refit(
-            plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
-        )  # fmt: skip
+        band = max(plant.friction.dv_p, -plant.friction.dv_n)
+        done = refit(plant, recorded.logs, recorded.drive, prior={}, band=band)
         return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
         return FittedStructure(stage, first, best, {}, False, least)
-
-
-def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
-    """What drives a plant of these logs, by the command's own equation."""
-    if recorded.rig.kind == "motor" and recorded.rig.force_per_command is not None:
-        return Motor(recorded.rig.force_per_command)
-    if not recorded.by_command:
-        return None
-    found = fit_actuator(recorded.plain)
-    return Actuator(max(found.k1, 1e-9), max(found.k2, 0.0))
 
 
 def searched(
@@ -215,15 +201,13 @@ def searched(
     """
     for attempt in range(attempts):
         try:
-            plant = searched_plant(
-                recorded.plain, rng, drive=recorded.drive, report=report, attempt=attempt,
-                halt=recorded.halt,
-            )  # fmt: skip
+            first, (logs, drive) = first_plant(recorded), (recorded.logs, recorded.drive)
+            plant = searched_plant(first, logs, drive, rng, report, attempt)
         except (UserError, Halted):
             return model
         try:
-            found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
-            left_by = misfit(plant, recorded.logs, recorded.drive)
+            found = refit(plant, logs, drive, prior={}, effort="near")
+            left_by = misfit(plant, logs, drive)
             better = found.misfit < left_by
             best, least = (found.plant, found.misfit) if better else (plant, left_by)
             if least < model.misfit:

@@ -14,16 +14,14 @@ import numpy as np
 from identification.effects._base import Acting
 from identification.effects._library import Library
 from identification.errors import UserError
-from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.regressed_plant import first_plant
 from identification.estimation.windowed_run.run_errors import judge
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.experiment.information import Information, information
 from identification.experiment.structures import discriminated, sought
 from identification.model.estimates import NORMAL_95
-from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Plant
 from identification.thresholds import GATE_MARGIN, HALF
 
 # Half intervals over the value, below which nothing is promised: what a fit gives that loses a
@@ -33,7 +31,6 @@ NO_SURER = {
     "m": 0.01, "F_c": 0.005, "F_v": 0.005, "dv_": 0.05, "F_s": 0.01, "k1": 0.002, "k2": 0.002,
 }  # fmt: skip
 NO_SURER_CHAOTIC = {"m": 0.1, "F_c": 0.03, "F_v": 0.04, "dv_": 0.12, "F_s": 0.01}
-LEAST_SHARE_OF_FIRST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
 
 
 @dataclass(frozen=True)
@@ -64,22 +61,6 @@ def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
         name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]]))
         for name, sd in zip(told.names, relative, strict=True)
     }
-
-
-def first_plant(recorded: RecordedLogs) -> Plant:
-    """The plant that equations, breakaways and stops give, the median over the logs."""
-    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
-    nine = np.median(found, axis=0)
-    least = LEAST_SHARE_OF_FIRST * max(float(np.max(np.abs(nine))), 1e-300)
-    signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
-    nine = signs * np.maximum(signs * nine, least)
-    actuator: Actuator | Motor | None = None
-    if recorded.held:
-        actuator = Motor(recorded.rig.force_per_command or 1.0)
-    elif recorded.by_command:
-        drive = fit_actuator(recorded.plain)
-        actuator = Actuator(max(drive.k1, LEAST_SHARE_OF_FIRST), max(drive.k2, 0.0))
-    return Plant(Karnopp.from_array(nine), actuator)
 
 
 def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, float]:

@@ -43,10 +43,10 @@ def compile_fits() -> None:
 
 def are_compiled() -> bool:
     """Whether the cache holds the kernel of a fit's search."""
-    from identification.estimation.plain_search.cost import cost_kernel
+    from identification.estimation.windowed_run.likely_square import square_kernel
 
-    cache = Path(cost_kernel.stats.cache_path)  # type: ignore[attr-defined]
-    return any(cache.glob("cost.cost_kernel-*.nbi"))
+    cache = Path(square_kernel.stats.cache_path)  # type: ignore[attr-defined]
+    return any(cache.glob("likely_square.square_kernel-*.nbi"))
 
 
 @contextmanager

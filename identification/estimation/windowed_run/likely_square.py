@@ -40,7 +40,7 @@ class LikelyLog:
     the run's force is corrected by `gain` of its distance to the measured one. at (k,), begun
     (3, k): where windows begin. seen (2, n): position [m], force [N]; weight (2, n): of a distance
     to these, 0 where it does not count. B (3, 2, n), inverse (k, 3, 3): as in `windows.Freed`;
-    errors and B are in parts of ROBUST_FROM.
+    errors and B are in parts of `far`, from which an error counts less.
     """
 
     h: float
@@ -55,9 +55,12 @@ class LikelyLog:
     weight: Array
     B: Array
     inverse: Array
+    far: float
 
     @classmethod
-    def of(cls, plant: Plant, one: MotionLog, drive: Drive, own: Freed) -> "LikelyLog":
+    def of(
+        cls, plant: Plant, one: MotionLog, drive: Drive, own: Freed, far: float = ROBUST_FROM
+    ) -> "LikelyLog":
         """Of plants with this one's drive, in the windows of `own`."""
         log, motor = driven_by(one, drive), isinstance(plant.actuator, Motor)
         u = np.array(log["u"]) if "u" in log else np.zeros(len(log))
@@ -70,12 +73,12 @@ class LikelyLog:
         signals, share, sd = compared(one, drive)
         rows, seen = len(signals), np.zeros((2, len(log)))
         weight, B = np.zeros_like(seen), np.zeros((START_STATES, *seen.shape))
-        seen[:rows], B[:, :rows] = signals, own.B / ROBUST_FROM
-        weight[:rows] = own.weight * (share / sd / ROBUST_FROM)[:, np.newaxis]
+        seen[:rows], B[:, :rows] = signals, own.B / far
+        weight[:rows] = own.weight * (share / sd / far)[:, np.newaxis]
         return cls(
             log.h, u, force, force_slope(force, log.h, hold=motor or not held), held,
             0.0 if held else one.noise.corrected, own.begun.at, states, seen, weight, B,
-            own.inverse,
+            own.inverse, far,
         )  # fmt: skip
 
     def simulated(self, p: Array) -> Array:
@@ -93,7 +96,7 @@ class LikelyLog:
         square = np.zeros(WIDTH)
         square_kernel(
             p, self.h, self.u, self.force, self.slope, self.held, self.gain, self.at, self.begun,
-            self.seen, self.weight, self.B, self.inverse, out, square,
+            self.seen, self.weight, self.B, self.inverse, self.far, out, square,
         )  # fmt: skip
         return np.where(np.isfinite(square), square, np.inf)
 
@@ -101,7 +104,7 @@ class LikelyLog:
 @compiled
 def square_kernel(
     p: Array, h: float, u: Array, force: Array, slope: Array, held: bool, gain: float,
-    at: IntArray, begun: Array, seen: Array, weight: Array, B: Array, inverse: Array,
+    at: IntArray, begun: Array, seen: Array, weight: Array, B: Array, inverse: Array, far: float,
     out: Array, square: Array,
 ) -> None:  # fmt: skip
     """Robust square sums (WIDTH,) of a block's weighted errors less what is likeliest of the states
@@ -139,12 +142,12 @@ def square_kernel(
             for j in range(START_STATES):
                 state = 0.0
                 for other in range(START_STATES):
-                    state += inverse[w, j, other] * sums[other, i] * ROBUST_FROM * ROBUST_FROM
+                    state += inverse[w, j, other] * sums[other, i] * far * far
                 states[j, i] = state
                 square[i] += state * state
             if not np.isfinite(out[end - begins - 1, 0, i]):
                 square[i] = np.inf
-        _add_robust(out[first - begins : end - begins], B, first, states, square)
+        _add_robust(out[first - begins : end - begins], B, first, states, far, square)
 
 
 @compiled
@@ -166,7 +169,7 @@ def _add_state_sums(
 
 
 @compiled
-def _add_robust(r: Array, B: Array, low: int, states: Array, square: Array) -> None:
+def _add_robust(r: Array, B: Array, low: int, states: Array, far: float, square: Array) -> None:
     """Add robust squares of r - B z, errors r (n, 2, WIDTH) from sample `low` on, z (3, WIDTH)."""
     errors, z, product = r.reshape(-1), states.reshape(-1), np.ones(WIDTH)
     for k in range(len(r)):
@@ -181,7 +184,7 @@ def _add_robust(r: Array, B: Array, low: int, states: Array, square: Array) -> N
             large |= int(factor > LARGE) << i
         if large or k + 1 == len(r):
             for i in range(WIDTH):
-                square[i] += np.log(product[i]) * ROBUST_FROM * ROBUST_FROM
+                square[i] += np.log(product[i]) * far * far
                 product[i] = 1.0
 
 

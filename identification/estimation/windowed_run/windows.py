@@ -229,6 +229,12 @@ class Freed:
     B: Array
     inverse: Array
 
+    @classmethod
+    def of_known(cls, begun: Starts, rows: int, n: int) -> "Freed":
+        """Of windows whose states are taken as they are measured, errors (rows, n)."""
+        inverse = np.tile(np.eye(3), (len(begun.at), 1, 1))
+        return cls(begun, np.ones((rows, n)), np.zeros((3, rows, n)), inverse)
+
     def __call__(self, r: Array) -> Array:
         """Errors (k, n), weighted, less their states' part."""
         out = r * self.weight

@@ -1,1 +1,0 @@
-"""The nine parameters searched on simulated runs of many plants at once (`README.md`)."""
