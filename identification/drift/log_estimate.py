@@ -55,7 +55,7 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
                 " only; trace this log together with those of the model"
             )
         recorded = recorded_logs([log], model.rig, drive)
-        found = fit_imposed(recorded, rng, "as the active model")
+        found = fit_imposed(recorded, "as the active model")
         return _of_fit(found, allowed_misfit(model.chi_square))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
     if found.imposed:  # the equation has less error, or no run of this structure is followed

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.arrays import Array, IntArray
 from identification.effects._base import AT_REST, Acting, Param
@@ -21,7 +20,6 @@ from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_
 from identification.thresholds import AS_GOOD_AS_NONE, EVENTS_NEEDED
 
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
-NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
@@ -116,41 +114,22 @@ def _bound_of(value: float, bounds: tuple[float, float], reach: float) -> float 
 
 
 def estimates(
-    names: Sequence[str],
-    center: Array,
-    samples: Array,
-    events: Events,
-    rig: Rig,
-    log: str,
-) -> Mapping[str, Estimate]:
-    """Estimate of each of `names` from its value (d,) and equally likely samples (k, d)."""
+    values: Mapping[str, float], sd: Mapping[str, float], events: Events, rig: Rig, log: str
+) -> dict[str, Estimate]:
+    """Estimate of each parameter from its value and standard deviation, by name."""
     units = units_of(rig.motion, rig.command_unit)
-    value_of = dict(zip(names, center, strict=True))
     found = {}
-    for column, name in enumerate(names):
-        drawn = samples[:, column]
-        value = float(center[column])
-        sd = float(np.std(drawn))
-        # The spread of finite samples is itself uncertain: never narrower than 1.96 sd.
-        low = min(float(np.quantile(drawn, 0.025)), value - NORMAL_95 * sd)
-        high = max(float(np.quantile(drawn, 0.975)), value + NORMAL_95 * sd)
+    for name, value in values.items():
         reason = silent_reason(name, events, log)
         if reason:
             found[name] = Estimate(None, units[name], reason=reason, assumed=value)
         else:
             bounds = (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf)
-            beside = _beside(name, value_of, events)
             found[name] = reported_estimate(
-                value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside,
+                value, units[name], sd[name], bounds=bounds, beside=_beside(name, values, events),
                 at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
             )  # fmt: skip
     return found
-
-
-def normal_samples(values: Array, sd: Array) -> Array:
-    """Sets (k, d) of a normal spread about the values (d,), each parameter by itself."""
-    quantiles = norm.ppf((np.arange(NORMAL_SETS) + 0.5) / NORMAL_SETS)
-    return np.asarray(values + sd * quantiles[:, np.newaxis])
 
 
 def silent_reason(name: str, events: Events, log: str) -> str | None:

@@ -130,12 +130,12 @@ def fit_beside(
         fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick)
     except NotIdentifiable as refused:
         try:
-            fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
+            fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
         except UserError:
             raise refused from None
     if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
         with suppress(NotIdentifiable):
-            fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
+            fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
     up = way_of(alone, held=rig.kind == "motor")
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
@@ -165,7 +165,7 @@ def _fit(
     recorded = recorded_logs(logs, rig, drive, halt)
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
-        fit = _with_effects(prior, recorded, settle, report)
+        fit = _with_effects(prior, recorded, report)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     near, given = None, recorded
     excluded = Excluded((), tuple(range(len(logs))))
@@ -176,7 +176,7 @@ def _fit(
             recorded, excluded = made.recorded, excluded.and_of(made)
             near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            fit = settled(near.plant, recorded, near.misfit, settle, report)
+            fit = settled(near.plant, recorded, near.misfit, report)
             return excluded.reported(fit, given)
     recorded, found, excluded = _without_bad(recorded, begin, excluded)
     if near is not None and near.misfit < found.misfit:
@@ -288,9 +288,9 @@ def finished(
     by: the drive that was asked for; without one, a run driven by the command that a nonlinear
     actuator spoils is driven by the measured force instead.
     """
-    search, other, settle = rng.spawn(3)
+    search, other, forced_rng = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
-        return fit_imposed(recorded, settle, PRESCRIBED_WHY)
+        return fit_imposed(recorded, PRESCRIBED_WHY)
     if not (quick or needs_no_search(found, recorded)):
         found = searched(found, recorded, search, report, WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
@@ -298,26 +298,26 @@ def finished(
         if said:
             forced = recorded_logs(recorded.plain, recorded.rig, "force", recorded.halt)
             start = plain_structure(forced, other)
-            again = finished(start, forced, settle, report, by="force", quick=quick)
+            again = finished(start, forced, forced_rng, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else "no free run follows these logs"
-        return fit_imposed(recorded, settle, why)
+        return fit_imposed(recorded, why)
     if quick and not is_adequate(found.misfit):
         left = left_by(found.plant.friction, recorded)
         if left is not None and bends_the_equation(left[0], left[1]):
-            fit = _by_equation(recorded, other, FLOOR_WHY)
+            fit = _by_equation(recorded, FLOOR_WHY)
             if fit is not None:
                 return _unless_unexplained(fit, left)
     try:
-        fit = settled(found.plant, recorded, found.misfit, settle, report, quick=quick)
+        fit = settled(found.plant, recorded, found.misfit, report, quick=quick)
     except Halted:
         with recorded.halt.closing():
-            fit = settled(found.plant, recorded, found.misfit, settle, report, quick=True)
-    return on_the_floor(fit, recorded, other)
+            fit = settled(found.plant, recorded, found.misfit, report, quick=True)
+    return on_the_floor(fit, recorded)
 
 
-def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
+def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
     equation than least squares do on held-out stretches: its run is not followed, or only down to a
     noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
@@ -332,11 +332,11 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generat
     if wrong and fit.adequate:
         wrong = is_material(left[0], left[1], level)
     if wrong:
-        other = _by_equation(recorded, rng, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
+        other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
         # A run that is followed to the noise lacks nothing, whichever gives its parameters.
         fit = fit if other is None else replace(other, adequate=fit.adequate)
     elif not fit.adequate:  # of a run that is not followed, windows may identify next to nothing
-        other = _by_equation(recorded, rng, FLOOR_WHY)
+        other = _by_equation(recorded, FLOOR_WHY)
         fit = other if other is not None and _identified(other) > _identified(fit) else fit
     return _unless_unexplained(fit, left)
 
@@ -360,22 +360,20 @@ def _identified(fit: KarnoppFit) -> int:
     return sum(fit.estimates[name].value is not None for name in FIVE)
 
 
-def by_equation_if_surer(
-    plant: Plant, recorded: RecordedLogs, rng: np.random.Generator
-) -> KarnoppFit | None:
+def by_equation_if_surer(plant: Plant, recorded: RecordedLogs) -> KarnoppFit | None:
     """The fit by the equation of motion, where a plant leaves clearly more of it; else None."""
     left = left_by(plant.friction, recorded)
     if left is None or not bends_the_equation(left[0], left[1]):
         return None
-    return _by_equation(recorded, rng, FLOOR_WHY)
+    return _by_equation(recorded, FLOOR_WHY)
 
 
-def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit | None:
+def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
     """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
     with suppress(NotIdentifiable):
-        return fit_imposed(recorded, rng, why)
+        return fit_imposed(recorded, why)
     with suppress(NotIdentifiable):
-        return fit_one_way(recorded, rng, why)
+        return fit_one_way(recorded, why)
     return None
 
 
@@ -394,9 +392,7 @@ def is_no_run(misfit: float) -> bool:
     return misfit > HOPELESS
 
 
-def _with_effects(
-    prior: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
-) -> KarnoppFit:
+def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> KarnoppFit:
     """The fit of a plant with effects, from where it was; once more with its band searched,
     where that leaves more than noise."""
     logs, drive = recorded.logs, recorded.drive
@@ -407,7 +403,7 @@ def _with_effects(
         band = max(p.dv_p, -p.dv_n)
         again = refit(prior, logs, drive, prior=held, band=band)
         best = again if again.misfit < best.misfit else best
-    return settled(best.plant, recorded, best.misfit, rng, report, refined=best)
+    return settled(best.plant, recorded, best.misfit, report, refined=best)
 
 
 def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:

@@ -13,13 +13,12 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import (
-    NORMAL_SETS,
     Events,
     estimates,
-    normal_samples,
     reported_estimate,
 )
 from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regressed_plant import motor_of
 from identification.estimation.regression.equation_rows import (
     FIVE,
     NOTHING_KNOWN,
@@ -41,7 +40,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAMES, Karnopp
-from identification.model.plant import Motor, Plant, units_of
+from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
 from identification.thresholds import HALF
@@ -66,7 +65,7 @@ FALLS_WHY = (
 )
 
 
-def fit_imposed(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
+def fit_imposed(recorded: RecordedLogs, why: str) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
     why: what kept a free run from being fitted; it is the first of the remarks.
@@ -74,12 +73,10 @@ def fit_imposed(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
     Messenger, Bortz (2021), of the inverse dynamic model, Gautier, Khalil, CDC 1988.
     """
     fit, rows = force_fit(recorded)
-    return _made(fit, rows, recorded, rng, why)
+    return _made(fit, rows, recorded, why)
 
 
-def _made(
-    fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, rng: np.random.Generator, why: str
-) -> KarnoppFit:
+def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str) -> KarnoppFit:
     """A fit of the force equation as one of the machine."""
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
@@ -88,20 +85,16 @@ def _made(
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
-    samples = np.tile(center, (NORMAL_SETS, 1))
-    drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
-    samples[:, list(fit.used)] = drawn
     nine = _assumed(center, firsts, _slightest_mass(rows))
     friction = Karnopp.from_array(nine)
-    found = _estimates(fit, nine, samples, rows, recorded)
+    found = _estimates(fit, nine, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
     made = KarnoppFit(
         friction=friction,
-        actuator=_motor(recorded),
+        actuator=motor_of(recorded.rig),
         estimates=found,
         free=names,
         covariance=fit.covariance,
-        samples=drawn,
         drive="command" if recorded.held else "force",
         noise_y=float(np.median([first.motion.noise for first in firsts])),
         noise_F=noise_F,
@@ -150,11 +143,6 @@ def without_estimates(fit: KarnoppFit, share: float) -> KarnoppFit:
     return replace(fit, estimates=found)
 
 
-def _motor(recorded: RecordedLogs) -> Motor | None:
-    gives = recorded.rig.force_per_command
-    return Motor(gives) if recorded.held and gives is not None else None
-
-
 def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     """Sliding friction by the force equation, and the rows that it was fitted on.
 
@@ -178,7 +166,7 @@ def _ways(rows: Sequence[Rows]) -> tuple[int, int]:
     return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
 
 
-def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
+def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
     """The equation of motion of logs that move one way: mass, viscous and Coulomb friction.
 
     Raises NotIdentifiable where they go both ways, or hardly slide. Source: as `fit_imposed`,
@@ -189,7 +177,7 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
-    return _made(fitted(data, ONE_WAY[way]), data, recorded, rng, why)
+    return _made(fitted(data, ONE_WAY[way]), data, recorded, why)
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
@@ -256,14 +244,13 @@ def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> A
 
 
 def _estimates(
-    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Rows], recorded: RecordedLogs
+    fit: ForceFit, nine: Array, data: Sequence[Rows], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
     """The five with intervals, the others with the reason."""
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
-    shown = [i for i in fit.used if i != 0 or fit.share >= INERTIA_SHARE]
-    values = np.array([fit.theta[fit.used.index(i)] for i in shown])
-    names = [FIVE[i] for i in shown]
-    known = _of_sliding(names, values, samples[:, shown], _ways(data), fastest, recorded)
+    sizes = zip(fit.used, fit.theta.tolist(), strict=True)
+    values = {FIVE[i]: x for i, x in sizes if i != 0 or fit.share >= INERTIA_SHARE}
+    known = _of_sliding(values, fit.sd, _ways(data), fastest, recorded)
     return _reasoned(known, nine, fit.share, recorded)
 
 
@@ -298,36 +285,33 @@ def imposed_estimates(
     theta (5,): these as the equations have them, before a plant takes what is negative as 0.
     The same rules as of a fit along a prescribed motion decide which of them are identifiable.
     """
-    names = [name for name in FIVE if name in sd]
-    raw = dict(zip(FIVE, theta.tolist(), strict=True))
-    own = {name: float(getattr(plant.friction, name)) for name in names}
-    values = np.array([own[name] if raw[name] > 0.0 else raw[name] for name in names])
-    samples = normal_samples(values, np.array([sd[name] for name in names]))
+    raw = zip(FIVE, theta.tolist(), strict=True)
+    values = {n: float(getattr(plant.friction, n)) if x > 0.0 else x for n, x in raw if n in sd}
     up = np.concatenate([one.up for one in recorded.logs])
     sliding = (int(np.count_nonzero(up)), int(np.count_nonzero(~up)))
     fastest = float(max(np.max(one.speed, initial=0.0) for one in recorded.logs))
-    known = _of_sliding(names, values, samples, sliding, fastest, recorded)
+    known = _of_sliding(values, sd, sliding, fastest, recorded)
     return _reasoned(known, plant.friction.array, None, recorded)
 
 
 def _of_sliding(
-    names: Sequence[str], values: Array, samples: Array, sliding: tuple[int, int], fastest: float,
+    values: Mapping[str, float], sd: Mapping[str, float], sliding: tuple[int, int], fastest: float,
     recorded: RecordedLogs,
 ) -> Mapping[str, Estimate]:  # fmt: skip
     """Estimates of parameters that need no more than sliding; so many rows in each direction."""
     events = Events((0, 0), (0, 0), sliding, (fastest, fastest))
-    return estimates(names, values, samples, events, recorded.rig, recorded.name)
+    return estimates(values, sd, events, recorded.rig, recorded.name)
 
 
 def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
     """Slopes below 0 with which friction falls with speed: they predict a motion, but would drive a
     body that is simulated."""
     units = units_of(recorded.rig.motion)
-    found = zip(fit.used, fit.theta, np.sqrt(np.diag(fit.covariance)), strict=True)
+    found = zip((FIVE[i] for i in fit.used), fit.theta.tolist(), strict=True)
     return {
-        FIVE[i]: reported_estimate(float(slope), units[FIVE[i]], float(sd))
-        for i, slope, sd in found
-        if FIVE[i] in VISCOUS_NAMES and slope < 0.0
+        name: reported_estimate(slope, units[name], fit.sd[name])
+        for name, slope in found
+        if name in VISCOUS_NAMES and slope < 0.0
     }
 
 

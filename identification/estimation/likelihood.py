@@ -15,9 +15,10 @@ from identification.estimation.contradicted import CORRECTION_ROUNDS, corrected
 from identification.estimation.imposed_motion import force_fit
 from identification.estimation.likely_windows import LikelyWindows
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
-from identification.estimation.settling import BETWEEN
+from identification.estimation.settling import between_samples_sd
 from identification.estimation.windowed_run.parameters import values_of
 from identification.estimation.windowed_run.run_errors import misfit
+from identification.estimation.windowed_run.windows import RUN_WINDOW, longest_window
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES
@@ -65,15 +66,14 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
 def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:
     """Windows of any plant; the fit's own parameters, of which some may be fixed."""
     covariance = np.atleast_2d(fit.covariance)
-    windows = LikelyWindows.of(plant, recorded.logs, recorded.drive, fit.free, covariance)
-    by_force = (
-        1.0 if recorded.drive == "force" else max(one.noise.corrected for one in recorded.logs) ** 2
-    )
+    logs, drive = recorded.logs, recorded.drive
+    seconds = longest_window(plant, logs, drive) if fit.whole else RUN_WINDOW
+    windows = LikelyWindows.of(plant, logs, drive, fit.free, covariance, seconds)
     center = values_of(plant, fit.free)
-    # What the windows are stretched to has that in it already.
-    by_force = by_force if windows.stretch is None else 0.0
-    further = by_force * np.array([BETWEEN.get(name, 0.0) for name in fit.free]) * np.abs(center)
-    way = WHOLE_RUNS if windows.whole else IN_WINDOWS
+    further = between_samples_sd(fit.free, center, recorded)
+    if windows.stretch is not None:  # which has that in it already
+        further = np.zeros(len(center))
+    way = WHOLE_RUNS if fit.whole else IN_WINDOWS
     return Likelihood(fit.free, center, covariance, windows.cost, further, way)
 
 

@@ -24,15 +24,12 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.likely_square import LikelyLog
 from identification.estimation.windowed_run.parameters import (
     kernel_rows,
-    on_bristle,
     plant_with,
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.refinement import longest_window
 from identification.estimation.windowed_run.run_errors import NOISE_LOSS
 from identification.estimation.windowed_run.windows import (
-    RUN_WINDOW,
     Freed,
     freed,
     starts,
@@ -60,7 +57,7 @@ class LikelyWindows:
     found: by log, how its run changes with the windows' states; low, high (d,): bounds; center
     (d,): the plant's own values; stretch (d, d): of what is off them, in cost; factor: of the
     robust square sum; granted: independent samples for which a residual that is no noise counts, 0
-    where it is noise; whole: whether the windows are as long as a run by the command may be.
+    where it is noise.
     """
 
     plant: Plant
@@ -73,41 +70,30 @@ class LikelyWindows:
     stretch: Array | None = None
     factor: float = 1.0
     granted: float = 0.0
-    whole: bool = False
 
     @classmethod
     def of(
         cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, names: Sequence[str],
-        covariance: Array,
+        covariance: Array, seconds: float,
     ) -> "LikelyWindows":  # fmt: skip
-        """The logs in the windows in which a refinement of the plant ends.
+        """The logs in the windows of so many seconds in which the fit has converged.
 
-        Where these are the whole log but the run loses a stop in it, they are shorter. covariance
-        (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed. Source:
-        composite likelihood, Ribatet, Cooley, Davison, Statistica Sinica 22 (2012) 813.
+        covariance (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed.
+        Source: composite likelihood, Ribatet, Cooley, Davison, Statistica Sinica 22 (2012) 813.
         """
-        walking = any(walks(one, drive) for one in logs)
-        steady = drive == "command" and not walking and not on_bristle(plant)
-        low, high = _bounds(plant, names)
-        tried = []
-        for seconds in (longest_window(plant), RUN_WINDOW) if steady else (RUN_WINDOW,):
-            found = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
-            own = tuple(one for one in found if one is not None)
-            if len(own) < len(logs):
-                continue
-            posed = cls(plant, drive, tuple(names), tuple(logs), own, low, high)
-            if walking:
-                factor, stretch = posed.stretched(covariance)
-                return replace(posed, factor=factor, stretch=stretch)
-            left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS
-            if left <= ADEQUATE:
-                return replace(posed, factor=AS_NOISE / left, whole=seconds > RUN_WINDOW)
-            # What the model lacks is correlated over a window.
-            windows = float(sum(len(one.begun.at) for one in own))
-            tried.append((left, replace(posed, granted=windows)))
-        if not tried:
+        found = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
+        own = tuple(one for one in found if one is not None)
+        if len(own) < len(logs):
             raise BadModel(f"{logs[0].log.name}: the fitted plant's run cannot be followed")
-        return min(tried, key=lambda one: one[0])[1]
+        posed = cls(plant, drive, tuple(names), tuple(logs), own, *_bounds(plant, names))
+        if any(walks(one, drive) for one in logs):
+            factor, stretch = posed.stretched(covariance)
+            return replace(posed, factor=factor, stretch=stretch)
+        left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS
+        if left <= ADEQUATE:
+            return replace(posed, factor=AS_NOISE / left)
+        # What the model lacks is correlated over a window.
+        return replace(posed, granted=float(sum(len(one.begun.at) for one in own)))
 
     @property
     def count(self) -> int:

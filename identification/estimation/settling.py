@@ -12,12 +12,10 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.estimates import (
-    NORMAL_SETS,
     Events,
     effect_estimates,
     estimates,
     events_of,
-    normal_samples,
 )
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
@@ -26,15 +24,14 @@ from identification.estimation.windowed_run.parameters import even, names_of, va
 from identification.estimation.windowed_run.refinement import (
     Effort,
     Refit,
-    longest_window,
     refit,
 )
 from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
-    freed,
+    left_in_windows,
+    longest_window,
     starts,
-    window_residual,
     window_run,
 )
 from identification.log import Log
@@ -63,8 +60,8 @@ RESIDUAL_DRIFT_SAID = (
 
 
 def settled(
-    plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
-    report: Progress, *, refined: Refit | None = None, quick: bool = False,
+    plant: Plant, recorded: RecordedLogs, misfit: float, report: Progress, *,
+    refined: Refit | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
     """The fit of a plant that a search or refinement has come to, near its minimum.
 
@@ -79,34 +76,27 @@ def settled(
         near = refit(plant, recorded.logs, recorded.drive, prior=even(plant), effort=effort)
     if near.whole or near.misfit <= misfit:
         plant = near.plant
-    seconds = longest_window(plant) if near.whole else RUN_WINDOW
+    seconds = longest_window(plant, recorded.logs, recorded.drive) if near.whole else RUN_WINDOW
     values, left = values_of(plant, near.names), min(near.misfit, misfit)
     adequate, events = is_adequate(left), _events(plant, recorded, seconds)
     covariance = _covariance(near, recorded, values, events)
-    logs = tuple(_log_fit(plant, one, recorded.drive, near.whole) for one in recorded.logs)
+    logs = tuple(_log_fit(plant, one, recorded.drive, seconds) for one in recorded.logs)
     remarks = _remarks(adequate, near, logs, recorded)
     if near.whole:
-        drift = drift_size(_residuals(plant, recorded, seconds))
+        runs = [left_in_windows(plant, one, recorded.drive, seconds) for one in recorded.logs]
+        drift = drift_size([signal for r in runs if r is not None for signal in r])
         covariance = covariance * (WALLS * widening(drift)) ** 2
         remarks += [RESIDUAL_DRIFT_SAID.format(drift)] if drift else []
-    samples = rng.multivariate_normal(values, covariance, NORMAL_SETS, check_valid="ignore")
-    own = [i for i, name in enumerate(near.names) if "." not in name]
-    sd = dict(zip(near.names, np.std(samples, axis=0).tolist(), strict=True))
-    found = {
-        **estimates(
-            [near.names[i] for i in own], values[own], samples[:, own], events, recorded.rig,
-            recorded.name,
-        ),
-        **effect_estimates(plant.effects, sd),
-    }  # fmt: skip
+    sd = dict(zip(near.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    own = {n: x for n, x in zip(near.names, values.tolist(), strict=True) if "." not in n}
+    found = estimates(own, sd, events, recorded.rig, recorded.name)
     return KarnoppFit(
         friction=plant.friction,
         actuator=plant.actuator,
         effects=plant.effects,
-        estimates=found,
+        estimates={**found, **effect_estimates(plant.effects, sd)},
         free=near.names,
-        covariance=np.atleast_2d(np.cov(samples.T)),
-        samples=samples,
+        covariance=covariance,
         drive=recorded.drive,
         noise_y=noise_of(recorded)[0],
         noise_F=noise_of(recorded)[1],
@@ -116,6 +106,7 @@ def settled(
         breakaways=events.breakaways,
         remarks=tuple(remarks),
         command_period=recorded.command_period,
+        whole=near.whole,
     )
 
 
@@ -123,16 +114,6 @@ def noise_of(recorded: RecordedLogs) -> tuple[float, float]:
     """Noise of the position [m] and of the force [N], medians over the logs."""
     y, F = zip(*((one.noise.y, one.noise.F) for one in recorded.logs), strict=True)
     return float(np.median(y)), float(np.median(F))
-
-
-def _residuals(plant: Plant, recorded: RecordedLogs, seconds: float) -> list[Array]:
-    """What runs of so many seconds leave of position and, where it is measured, force."""
-    out: list[Array] = []
-    for one in recorded.logs:
-        begun = starts(one, recorded.drive, seconds)
-        r = window_residual(plant, one, recorded.drive, freed(plant, one, recorded.drive, begun))
-        out += [] if r is None else list(r)
-    return out
 
 
 def _remarks(
@@ -187,14 +168,17 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     covariance[unknown, unknown] = (
         _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
     )
-    by_force = (
-        1.0 if recorded.drive == "force" else max(one.noise.corrected for one in recorded.logs) ** 2
-    )
-    floor = by_force * np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
-    covariance = covariance + np.diag(floor**2)
+    covariance = covariance + np.diag(between_samples_sd(near.names, values, recorded) ** 2)
     if not np.all(np.isfinite(covariance)):
         covariance = np.diag(np.abs(values) ** 2)
     return np.asarray(covariance)
+
+
+def between_samples_sd(names: Sequence[str], values: Array, recorded: RecordedLogs) -> Array:
+    """Deviations (d,) of values that the force between its samples adds, as far as it drives."""
+    gain = max(one.noise.corrected for one in recorded.logs)
+    part = 1.0 if recorded.drive == "force" else gain**2
+    return np.asarray(part * np.array([BETWEEN.get(name, 0.0) for name in names]) * np.abs(values))
 
 
 def _as_large_as_can_be(plant: Plant, names: Sequence[str], values: Array, events: Events) -> Array:
@@ -207,16 +191,15 @@ def _as_large_as_can_be(plant: Plant, names: Sequence[str], values: Array, event
     return np.maximum(np.abs(values), [largest.get(name, 0.0) for name in names])
 
 
-def _log_fit(plant: Plant, one: MotionLog, drive: Drive, whole: bool) -> LogFit:
+def _log_fit(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> LogFit:
     """What runs leave of a log: of its force too where it is followed whole."""
-    begun = starts(one, drive, longest_window(plant) if whole else RUN_WINDOW)
-    r = window_residual(plant, one, drive, freed(plant, one, drive, begun, even=True))
+    r = left_in_windows(plant, one, drive, seconds, even=True)
     y, *F = [CANNOT_BE_FOLLOWED] if r is None else np.sqrt(np.mean(r**2, axis=1)).tolist()
     return LogFit(
         log=one.log.name,
         start=measured_start(one.log),
         position_rms=y * one.noise.y,
-        force_rms=F[0] * one.noise.F if F and whole else None,
+        force_rms=F[0] * one.noise.F if F and seconds > RUN_WINDOW else None,
         chi_square=y**2,
     )
 
@@ -229,12 +212,11 @@ def structure_estimates(
     The same rules as of a fit decide which of them are identifiable.
     """
     names = [name for name in names_of(plant, recorded.drive) if "." not in name]
-    values = values_of(plant, names)
-    events = _events(plant, recorded, RUN_WINDOW)
-    own = np.array([sd.get(name, 0.0) for name in names])
-    own = np.where(own > 0.0, own, _as_large_as_can_be(plant, names, values, events))
-    samples = normal_samples(values, own)
-    return dict(estimates(names, values, samples, events, recorded.rig, recorded.name))
+    values, events = values_of(plant, names), _events(plant, recorded, RUN_WINDOW)
+    most = _as_large_as_can_be(plant, names, values, events)
+    known = dict(zip(names, values.tolist(), strict=True))
+    own = {n: sd.get(n, 0.0) or x for n, x in zip(names, most.tolist(), strict=True)}
+    return estimates(known, own, events, recorded.rig, recorded.name)
 
 
 def force_of(logs: Sequence[Log]) -> float:

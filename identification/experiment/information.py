@@ -25,9 +25,8 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.refinement import MOTOR_WINDOW
 from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, judge, soft
-from identification.estimation.windowed_run.windows import RUN_WINDOW, WHOLE, walks
+from identification.estimation.windowed_run.windows import RUN_WINDOW, longest_window
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
@@ -139,12 +138,8 @@ def lasting_jacobian(
 def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:
     """Errors of plants like this one along recorded logs, in the windows in which a fit would
     follow them: whole runs where the command alone drives them."""
-    steady = recorded.drive == "command" and not any(
-        walks(one, recorded.drive) for one in recorded.logs
-    )
-    longest = MOTOR_WINDOW if isinstance(plant.actuator, Motor) else WHOLE
-    seconds = longest if steady else RUN_WINDOW
-    return judge(plant, recorded.logs, recorded.drive, seconds)
+    logs, drive = recorded.logs, recorded.drive
+    return judge(plant, logs, drive, longest_window(plant, logs, drive))
 
 
 def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Errors:

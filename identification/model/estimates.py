@@ -64,10 +64,12 @@ class KarnoppFit:
     friction: all nine, those that the logs do not identify at the value assumed for simulation.
     effects: that the plant has beside them. estimates: the nine ("k1", "k2" where the command is
     logged, effects' parameters as key.name) by name.
-    free: names in the order of `covariance` (d, d) and of `samples` (k, d), equally likely sets.
+    free: names in the order of `covariance` (d, d), of their errors.
     noise_y [m], noise_F [N]: of the sensors, one sigma.
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
+    whole: whether its run follows the logs as long as a run by the command may be, and not from one
+    window of 2 s to the next.
     bad: samples of the logs that the run contradicts, which were excluded.
     command_period: time [s] after which the drive gives its next command, None where no log shows
     that it is sooner than the next sample. surroundings: what acts beside the applied force, which
@@ -82,7 +84,6 @@ class KarnoppFit:
     estimates: Mapping[str, Estimate]
     free: tuple[str, ...]
     covariance: Array
-    samples: Array
     drive: Drive
     noise_y: float
     noise_F: float
@@ -96,6 +97,7 @@ class KarnoppFit:
     command_period: float | None = None
     surroundings: Surroundings = NO_SURROUNDINGS
     left: tuple[float, float] | None = None
+    whole: bool = False
     falling: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property

@@ -143,7 +143,7 @@ def settled_plain(
     fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
     if fit is None:  # at least no worse than the equation of motion by itself
         with recorded.halt.closing():
-            fit = by_equation_if_surer(plain.model.plant, recorded, rng)
+            fit = by_equation_if_surer(plain.model.plant, recorded)
     if fit is None:
         return chosen, found
     model = replace(plain.model, fit=fit)

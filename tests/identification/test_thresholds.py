@@ -27,7 +27,7 @@ from identification.effects._library import built_in
 from identification.errors import BadSpecification
 from identification.estimation import contradicted
 from identification.estimation.axis_equation import slides_enough
-from identification.estimation.estimates import Events, estimates, normal_samples
+from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import (
     are_few,
     bends_the_equation,
@@ -438,9 +438,8 @@ def drifted(change: float, n: int, level: float = 10.0) -> bool:
 
 def told(name: str, relative: float, events: int) -> bool:
     """Whether a value is given of this deviation and so many breakaways and crossings."""
-    samples = 10.0 + 10.0 * relative * signs()[:, np.newaxis]
     happened = Events((events, 9), (events, 9), (900, 900), (1.0, 1.0))
-    found = estimates((name,), np.array([10.0]), samples, happened, Rig("force"), "log")
+    found = estimates({name: 10.0}, {name: 10.0 * relative}, happened, Rig("force"), "log")
     return found[name].value is not None
 
 
@@ -660,9 +659,8 @@ def test_as_good_as_none() -> None:
     """A Coulomb level that is next to none of the force is not told, however narrow."""
     happened = Events((9, 9), (9, 9), (900, 900), (1.0, 1.0), force=10.0)
     for level, told in ((1.5e-2, True), (0.7e-2, False)):
-        values = np.array([level])
-        samples = normal_samples(values, 0.01 * values)
-        found = estimates(("F_cp",), values, samples, happened, Rig("force"), "log")
+        values, sd = {"F_cp": level}, {"F_cp": 0.01 * level}
+        found = estimates(values, sd, happened, Rig("force"), "log")
         assert (found["F_cp"].value is not None) is told
     # What is left of the force is a share of friction only where something rubs.
     assert rubs(1.5e-3, 1.0) and not rubs(0.7e-3, 1.0)

@@ -7,9 +7,9 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.log import Log
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.inverse_model import zoh_force
-from identification.model.karnopp import NAMES, Karnopp
+from identification.model.karnopp import Karnopp
 from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
@@ -20,7 +20,6 @@ from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.chart_figure import evenly_spread
 from workbench.report.view import Section
 
-CURVES = 200
 POINTS = 80  # of a branch of the curve
 FRICTION_DOTS = 3000  # of a panel
 SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
@@ -166,16 +165,13 @@ def _slip(v: Array, p: Karnopp) -> Array:
 
 
 def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
-    """95 % interval of the sliding friction at `v` over equally likely parameters."""
-    nine = np.tile(p.array, (min(CURVES, len(fit.samples)), 1))
-    drawn = fit.samples[evenly_spread(len(fit.samples), CURVES)][: len(nine)]
-    for column, name in enumerate(fit.free):
-        if name in NAMES:
-            nine[: len(drawn), NAMES.index(name)] = drawn[:, column]
-    F_cp, F_cn, F_vp, F_vn = (nine[:, NAMES.index(name), None] for name in SLIDING_PARAMETERS)
-    curves = np.where(v > 0, F_cp + F_vp * v, -F_cn + F_vn * v)
-    low, high = np.quantile(curves, [0.025, 0.975], axis=0)
-    return low, high
+    """95 % interval of the sliding friction at `v`, by the covariance of its parameters."""
+    up, at = 1.0 * (v > 0), [fit.free.index(n) for n in SLIDING_PARAMETERS if n in fit.free]
+    change = dict(zip(SLIDING_PARAMETERS, (up, up - 1.0, up * v, (1.0 - up) * v), strict=True))
+    J = np.array([change[fit.free[i]] for i in at])
+    variance = np.einsum("in,ij,jn->n", J, fit.covariance[np.ix_(at, at)], J)
+    half = NORMAL_95 * np.sqrt(np.maximum(variance, 0.0))
+    return _slip(v, p) - half, _slip(v, p) + half
 
 
 def _caption(model: Model) -> str:

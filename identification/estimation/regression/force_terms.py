@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.arx.residual_tests import effective_samples
+from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import Rows, left_unseen, stacked
@@ -36,6 +37,12 @@ class ForceFit:
     relative: float
     share: float
 
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviations of the coefficients by name."""
+        spread = np.sqrt(np.diag(self.covariance)).tolist()
+        return dict(zip((FIVE[i] for i in self.used), spread, strict=True))
+
 
 def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
@@ -54,11 +61,10 @@ def _may_be(fit: ForceFit) -> bool:
     """Whether a body can have these parameters, and each term of speed stands out of its deviation;
     a constant force alone may be confounded with F_c. A slope that may as well be none would leave
     the Coulomb level beside it open."""
-    found = dict(zip(fit.used, fit.theta, strict=True))
-    sd = dict(zip(fit.used, np.sqrt(np.diag(fit.covariance)), strict=True))
-    shown = [(level, v) for level, v in ((1, 3), (2, 4)) if v in found]
+    found, sd = dict(zip((FIVE[i] for i in fit.used), fit.theta, strict=True)), fit.sd
+    shown = [(level, v) for level, v in (("F_cp", "F_vp"), ("F_cn", "F_vn")) if v in found]
     known = all(abs(found[v]) > NORMAL_95 * sd[v] and found[level] >= 0.0 for level, v in shown)
-    return known and not found.get(0, 1.0) < 0.0
+    return known and not found.get("m", 1.0) < 0.0
 
 
 def predicts_as_much(left: float, least: float) -> bool:

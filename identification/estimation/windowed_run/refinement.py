@@ -25,7 +25,6 @@ from identification.estimation.windowed_run.parameters import (
     loose,
     names_of,
     on_bristle,
-    plant_is_motor,
     plant_with,
     units_in,
     values_of,
@@ -40,8 +39,8 @@ from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, st
 from identification.estimation.windowed_run.windows import (
     COARSE,
     RUN_WINDOW,
-    WHOLE,
     freed,
+    longest_window,
     noise_errors,
     starts,
     walks,
@@ -66,7 +65,6 @@ ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
 # At most, of a refinement, of one on a bristle and of a quick one
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
-MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
 FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
@@ -248,9 +246,8 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
     # follows. Elsewhere what it lacks would bias what the equations give.
     hopeless = effort == "rough" and at.mean > HOPELESS
     rounds = [] if quick or hopeless else [RUN_WINDOW]
-    steady = drive == "command" and not any(walks(one, drive) for one in logs)
-    longest = longest_window(plant)
-    if steady and not slow and rounds and effort != "long":
+    longest = longest_window(plant, logs, drive)
+    if longest > RUN_WINDOW and rounds and effort != "long":
         rounds.append(longest)
     for seconds in rounds:
         again = unknowns.refined(at.x, seconds, False)
@@ -263,14 +260,9 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
         left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
-    if effort == "long" and steady and not slow and found <= ADEQUATE:
+    if effort == "long" and longest > RUN_WINDOW and found <= ADEQUATE:
         return _over_long_runs(unknowns, at, found, longest)
     return at, found, False
-
-
-def longest_window(plant: Plant) -> float:
-    """Windows [s] in which a plant driven by an exact command is followed in the end."""
-    return MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
 
 
 def _over_long_runs(

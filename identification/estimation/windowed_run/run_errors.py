@@ -13,6 +13,7 @@ from identification.estimation.windowed_run.windows import (
     WHOLE,
     Freed,
     freed,
+    left_in_windows,
     starts,
     walks,
     window_of,
@@ -98,9 +99,9 @@ def misfit(
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not walks(one, drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
-            begun = starts(one, drive, seconds, bristle)
-            r = window_residual(plant, one, drive, freed(plant, one, drive, begun))
+            r = left_in_windows(plant, one, drive, seconds, bristle)
             if r is not None:
+                begun = starts(one, drive, seconds, bristle)
                 window = window_of(begun, len(one.log)) if free else None
                 moves = one.signals["d"] != 0
                 least = min(least, max(mean_loss(own, window, moves) for own in r))

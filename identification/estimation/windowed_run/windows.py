@@ -18,6 +18,7 @@ from identification.compiled import compiled_fast
 from identification.errors import BadModel
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.standstill import rest_stretches
+from identification.estimation.windowed_run.parameters import on_bristle, plant_is_motor
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.plant import Actuator, Motor, Plant
@@ -37,6 +38,7 @@ AROUND = 8  # samples of a rest whose mean is the position
 WHOLE = np.inf  # seconds of a window that is the whole log
 NOISE_RUNS = 6  # runs by which the drift by a measured force's noise is seen
 RETURNS = 2  # runs until the body's place behind a transducer has converged
+MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
 PLACE_CONVERGED = 1e-3  # of the position's noise, by which that place may still change
 STATE_STEP = 0.3  # of a state's deviation, by which the change with it is taken
 
@@ -373,6 +375,25 @@ def noise_errors(
     return found(window_errors(run, seen, drive) - window_errors(base, one, drive))
 
 
+def longest_window(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float:
+    """Windows [s] in which a run of the plant may be followed in the end: as long as the log where
+    an exact command drives it, a motor's shorter; RUN_WINDOW where it drifts, or errs by itself."""
+    if drive == "force" or on_bristle(plant) or any(walks(one, drive) for one in logs):
+        return RUN_WINDOW
+    return MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
+
+
+def left_in_windows(
+    plant: Plant, one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW,
+    bristle: float = COARSE, *, even: bool = False,
+) -> Array | None:  # fmt: skip
+    """Errors of a plant in its own windows of so many seconds, less their states' part, (k, n);
+    None: not to be followed. bristle, even: as `starts` and `freed` have them. Source: Robinson
+    (1991)."""
+    begun = starts(one, drive, seconds, bristle)
+    return window_residual(plant, one, drive, freed(plant, one, drive, begun, even=even))
+
+
 def window_residual(
     plant: Plant, one: MotionLog, drive: Drive, found: Freed | None
 ) -> Array | None:
@@ -395,5 +416,5 @@ def position_rms(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float
 
 def position_errors(plant: Plant, one: MotionLog, drive: Drive) -> Array | None:
     """The shown position's error in windows [m], (n,); None where it cannot be followed."""
-    r = window_residual(plant, one, drive, freed(plant, one, drive, starts(one, drive), even=True))
+    r = left_in_windows(plant, one, drive, even=True)
     return None if r is None else r[0] * one.noise.y

@@ -246,7 +246,7 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     recorded: Any = SimpleNamespace(plain=[log])
     monkeypatch.setattr(fitting, "left_by", lambda *_: (left, 1.0, 100.0))
     monkeypatch.setattr(fitting, "_by_equation", lambda *_: other)
-    found: Any = fitting.on_the_floor(run, recorded, np.random.default_rng(0))
+    found: Any = fitting.on_the_floor(run, recorded)
     assert (found.name, found.adequate) == (by, adequate)
 
 

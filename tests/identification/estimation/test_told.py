@@ -16,7 +16,6 @@ from identification.estimation.estimates import (
     Events,
     effect_estimates,
     estimates,
-    normal_samples,
     of_effect,
     reported_estimate,
 )
@@ -68,8 +67,9 @@ def test_no_estimate_breaks_the_rule(
 def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> None:
     sign = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
     center = sign * np.array([size for size, _ in drawn])
-    samples = normal_samples(center, np.array([sd for _, sd in drawn]))
-    for one in estimates(NAMES, center, samples, PLENTY, Rig("force"), "log").values():
+    values = dict(zip(NAMES, center.tolist(), strict=True))
+    sd = {name: sd for name, (_, sd) in zip(NAMES, drawn, strict=True)}
+    for one in estimates(values, sd, PLENTY, Rig("force"), "log").values():
         assert broken(one) is None
 
 

@@ -452,7 +452,7 @@ def test_what_an_equation_leaves_is_told_as_it_was_fitted() -> None:
     log = made_log(table(2), seed=1, seconds=8.0)
     shaken = log.with_signals(y=log["y"] + 2e-5 * rng().standard_normal(len(log)))
     rig = Rig("force")
-    fit = fit_imposed(recorded_logs([shaken], rig, "force"), rng(), "why")
+    fit = fit_imposed(recorded_logs([shaken], rig, "force"), "why")
     told = _force_error([shaken], fit, rig)
     by_derivatives = _force_error([shaken], replace(fit, left=None), rig)
     assert told is not None and by_derivatives is not None

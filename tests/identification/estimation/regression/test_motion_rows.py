@@ -92,13 +92,13 @@ def test_rows_within_the_band_of_a_plant_are_known() -> None:
 
 
 def told(log: Log) -> dict[str, float | None]:
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
     return {name: fit.estimates[name].value for name in FIVE}
 
 
 def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction() -> None:
     log = swinging((0.0, 9.0, 5.0, -12.0, 0.0), noise_F=0.1)
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
     up, down = fit.estimates["F_vp"], fit.estimates["F_vn"]
     assert up.value is None and up.assumed == 0.0
     assert fit.falling.keys() == {"F_vp"}
@@ -121,7 +121,7 @@ def test_terms_that_predict_nothing_are_left_out() -> None:
 def test_viscous_friction_takes_no_coulomb_friction_below_nothing() -> None:
     """At speeds alike a steep line through them stands for whatever else varies."""
     log = swinging((0.0, -1.0, -1.0, 30.0, 30.0), noise_F=0.2)
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
     assert fit.estimates["F_vp"].value is None and fit.estimates["F_vn"].value is None
     assert (fit.friction.F_vp, fit.friction.F_vn) == (0.0, 0.0)
     assert min(fit.friction.F_cp, fit.friction.F_cn) > 1.0  # the level at these speeds

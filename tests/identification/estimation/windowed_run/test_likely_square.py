@@ -13,7 +13,7 @@ from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import names_of, plant_with, values_of
 from identification.estimation.windowed_run.run_errors import loss
-from identification.estimation.windowed_run.windows import window_errors, window_run
+from identification.estimation.windowed_run.windows import longest_window, window_errors, window_run
 from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
@@ -39,7 +39,8 @@ def posed(case: str) -> LikelyWindows:
         assert all(0.1 < one.noise.corrected < 0.5 for one in logs)
     names = names_of(plant, recorded.drive)
     size = 0.003 * np.abs(values_of(plant, names))
-    return LikelyWindows.of(plant, logs, recorded.drive, names, np.diag(size**2))
+    seconds = longest_window(plant, logs, recorded.drive)
+    return LikelyWindows.of(plant, logs, recorded.drive, names, np.diag(size**2), seconds)
 
 
 def around(windows: LikelyWindows, size: float) -> Array:
