@@ -15,7 +15,7 @@ from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAW
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
 from identification.estimation.regression.three_step import first_estimate
-from identification.estimation.regression.weighted_rows import OVERLAP
+from identification.estimation.regression.weighted_rows import OVERLAP, inverse_of_gram
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
@@ -164,10 +164,9 @@ def deviations(o: RowFit) -> Array:
     """
     keep = o.rows.speed >= o.slowest
     A = (o.rows.X / o.rows.sd[:, np.newaxis])[keep]
-    size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
-    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-12)
     left = float(np.mean(o.fit.residual[keep] ** 2)) if np.any(keep) else 1.0
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0) * OVERLAP * max(left, 1.0)) / size)
+    square = np.maximum(np.diag(inverse_of_gram(A)), 0.0)
+    return np.asarray(np.sqrt(square * OVERLAP * max(left, 1.0)))
 
 
 def effect_sd(

@@ -25,6 +25,7 @@ from identification.estimation.regression.motion_rows import OF_EQUATION, rows_a
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
     OVERLAP,
+    left_out,
     solve_rows,
     spread_of_left_out,
     stacked,
@@ -79,7 +80,17 @@ class _Squares:
 
     def least(self, used: Sequence[int]) -> float:
         """Square left at the best lag, of all blocks and these columns."""
-        return float(np.min(self.left(np.ones(len(self.force), dtype=bool), used)[0]))
+        return float(np.min(self.left(self.every, used)[0]))
+
+    @property
+    def blocks(self) -> IntArray:
+        """Numbers of the blocks (k,)."""
+        return np.arange(len(self.force))
+
+    @property
+    def every(self) -> BoolArray:
+        """All of them (k,)."""
+        return np.ones(len(self.force), dtype=np.bool_)
 
 
 def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
@@ -244,7 +255,7 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     if found is None:
         raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
     used = GRAVITY if around.sine.value or around.cosine.value else PLAIN
-    left = found.left(np.ones(len(found.force), dtype=bool), used)[0]
+    left = found.left(found.every, used)[0]
     at = (0.0, around.lag.value / logs[0].h)
     without, with_it = (np.sqrt(np.interp(lag, found.lags, left) / found.rows) for lag in at)
     return float(without), float(with_it)
@@ -289,8 +300,7 @@ def apart(lag: float) -> bool:
 
 def _lag(found: _Squares, used: Sequence[int]) -> Size:
     """The lag in samples, nothing where none shows beyond doubt."""
-    every = np.ones(len(found.force), dtype=bool)
-    left, theta = found.left(every, used)
+    left, theta = found.left(found.every, used)
     best = int(np.argmin(left))
     none = int(np.argmin(np.abs(found.lags)))
     without = float(left[none])
@@ -301,12 +311,14 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     lag = _lowest(found.lags, left)
     if not apart(lag) or not explains(without, float(left[best])):
         return NOT_SHOWN
-    each = [_lowest(found.lags, found.left(_but(every, k), used)[0]) for k in range(len(every))]
+    each = left_out(
+        found.blocks, lambda kept: np.asarray(_lowest(found.lags, found.left(kept, used)[0]))
+    )
     # By blocks, and by how sharp the minimum is: windows share samples, and with them their noise.
     i = int(np.clip(best, 1, len(left) - 2))
     bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / LAG_STEP**2, 1e-300)
     by_likelihood = float(np.sqrt(2.0 * left[best] / (bend * found.rows / OVERLAP)))
-    sd = max(float(spread_of_left_out(np.array(each))), by_likelihood)
+    sd = max(float(spread_of_left_out(each)), by_likelihood)
     return Size(lag, sd) if stands_out(lag, sd) else NOT_SHOWN
 
 
@@ -320,18 +332,12 @@ def _lowest(lags: Array, left: Array) -> float:
 
 def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Array, Array]:
     """Coefficients (c,) at a lag in samples, and their deviations by leaving out blocks."""
-    every = np.ones(len(found.force), dtype=bool)
 
     def of(kept: BoolArray) -> Array:
         theta = found.left(kept, used)[1]
         return np.array([np.interp(lag, found.lags, one) for one in theta])
 
-    return of(every), spread_of_left_out(np.array([of(_but(every, k)) for k in range(len(every))]))
-
-
-def _but(every: BoolArray, k: int) -> BoolArray:
-    """All blocks but one."""
-    return np.asarray(every & (np.arange(len(every)) != k))
+    return of(found.every), spread_of_left_out(left_out(found.blocks, of))
 
 
 def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:

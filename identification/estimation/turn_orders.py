@@ -23,7 +23,12 @@ from identification.estimation.regression.motion_log import (
     WINDOW_SECONDS,
     motion_log,
 )
-from identification.estimation.regression.weighted_rows import BLOCKS, spread_of_left_out
+from identification.estimation.regression.weighted_rows import (
+    BLOCKS,
+    least_squares,
+    left_out,
+    spread_of_left_out,
+)
 from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Order, Surroundings
@@ -63,7 +68,7 @@ class _Turning:
     def without_outliers(self, chosen: Sequence[int]) -> "_Turning":
         """The rows that a model of these orders does not leave far outside."""
         columns = np.column_stack([self.X, *(self.pair(n) for n in chosen)])
-        rest = np.abs(self.b - columns @ np.linalg.lstsq(columns, self.b, rcond=1e-10)[0])
+        rest = np.abs(self.b - columns @ least_squares(columns, self.b))
         kept = rest <= OUTLYING_ROW * float(np.median(rest))
         counts = self.counts.copy()
         counts[counts] = kept
@@ -166,7 +171,7 @@ def _explained(pair: Array, base: Array, left: Array) -> float:
 
 def _left(X: Array, b: Array) -> float:
     """Square that least squares leave."""
-    rest = b - X @ np.linalg.lstsq(X, b, rcond=1e-10)[0]
+    rest = b - X @ least_squares(X, b)
     return float(rest @ rest)
 
 
@@ -177,12 +182,8 @@ def _kept(X: Array) -> Array:
 
 def _with_spread(X: Array, found: _Turning) -> tuple[Array, Array]:
     """Coefficients (c,) and their deviations by leaving out blocks of time."""
-    theta = np.linalg.lstsq(X, found.b, rcond=1e-10)[0]
-    each = []
-    for k in np.unique(found.block):
-        kept: BoolArray = np.asarray(found.block != k)
-        each.append(np.linalg.lstsq(X[kept], found.b[kept], rcond=1e-10)[0])
-    return np.asarray(theta), spread_of_left_out(np.array(each))
+    each = left_out(found.block, lambda kept: least_squares(X[kept], found.b[kept]))
+    return least_squares(X, found.b), spread_of_left_out(each)
 
 
 def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:

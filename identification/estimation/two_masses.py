@@ -17,14 +17,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy import optimize
 from scipy.signal import cont2discrete, lfilter
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.weighted_rows import spread_of_left_out
+from identification.estimation.regression.weighted_rows import (
+    least_squares,
+    left_out,
+    spread_of_left_out,
+)
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.plant import units_of
@@ -75,13 +79,8 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
         for ratio in APART_TRIED
     ]
     starts = sorted(tried, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))[:SEARCHES_RUN]
-    found = min(
-        (
-            least_squares(_left_of, p, method="lm", max_nfev=EACH_SEARCH * 4, args=(cut, h))
-            for p in starts
-        ),
-        key=lambda one: float(one.cost),
-    )
+    every = [_nearest(p, cut, h, 4 * EACH_SEARCH) for p in starts]
+    found = min(every, key=lambda one: float(one.cost))
     w_a, w_r, damping = (float(x) for x in np.exp(found.x))
     inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
     if not inside or not are_two(float(one_body @ one_body), float(found.fun @ found.fun)):
@@ -124,16 +123,20 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
     return {name: reported_estimate(one.value, unit, one.sd) for name, (one, unit) in sizes.items()}
 
 
+def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
+    """The nearest minimum of what two masses leave (Levenberg 1944, Marquardt 1963)."""
+    return optimize.least_squares(_left_of, p, method="lm", max_nfev=runs, args=(cut, h))
+
+
 def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
     """The resonance with its deviations, by leaving out a tenth of the windows in turn."""
     whole = _numbers(p, cut, h)
-    groups = np.arange(len(cut)) % min(10, len(cut))
-    each = []
-    for k in np.unique(groups):
-        kept = [one for one, group in zip(cut, groups, strict=True) if group != k]
-        again = least_squares(_left_of, p, method="lm", max_nfev=EACH_SEARCH, args=(kept, h))
-        each.append(_numbers(again.x, kept, h))
-    sd = spread_of_left_out(np.array(each))
+
+    def without(kept: BoolArray) -> Array:
+        some = [one for one, stays in zip(cut, kept, strict=True) if stays]
+        return _numbers(_nearest(p, some, h, EACH_SEARCH).x, some, h)
+
+    sd = spread_of_left_out(left_out(np.arange(len(cut)) % min(10, len(cut)), without))
     sizes = [Size(float(value), float(s)) for value, s in zip(whole, sd, strict=True)]
     made = Resonance(*sizes)
     sure = all(one.value > BEYOND_CHANCE * one.sd for one in (made.frequency, made.m_1, made.m_2))
@@ -193,10 +196,8 @@ def _left(
         columns.append(x - q @ (q.T @ x))
         y.append(one.y - q @ (q.T @ one.y))
     X, b = np.vstack(columns), np.concatenate(y)
-    size = np.linalg.norm(X, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    theta = np.linalg.lstsq(X / size, b, rcond=1e-12)[0] / size
-    return np.asarray(b - X @ theta), np.asarray(theta)
+    theta = least_squares(X, b)
+    return np.asarray(b - X @ theta), theta
 
 
 def _windows(logs: Sequence[Log], *, held: bool, length: int) -> list[_Window]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimation.regression.equation_rows import integral
+from identification.estimation.regression.weighted_rows import least_squares
 from identification.log import Log
 from identification.model.plant import Actuator
 from identification.thresholds import FAR_LESS
@@ -44,8 +45,7 @@ def fit_actuator(logs: Sequence[Log]) -> ActuatorFit:
     lengths = [len(log) for log in logs]
     constants = np.repeat(np.eye(len(logs)), lengths, axis=0)  # one a log
     X, force = np.hstack([columns, constants]), np.concatenate([log["F"] for log in logs])
-    size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    theta = np.linalg.lstsq(X / size, force, rcond=None)[0] / size
+    theta = least_squares(X, force)
     left = float(np.std(force - X @ theta))
     share = left / max(float(np.std(force)), 1e-300)
     return ActuatorFit(float(theta[0]), float(theta[1]), left, share)

@@ -13,7 +13,13 @@ from identification.arx.residual_tests import effective_samples
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.row_fit import rms
-from identification.estimation.regression.weighted_rows import Rows, left_unseen, stacked
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    inverse_of_gram,
+    least_squares,
+    left_unseen,
+    stacked,
+)
 from identification.model.estimates import NORMAL_95
 from identification.thresholds import WORSE
 
@@ -83,19 +89,17 @@ def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     force = np.concatenate([part.b for part in data])
     weight = np.median(noise) / noise
     chosen = columns * weight[:, np.newaxis]
-    size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
-    theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
+    theta = least_squares(chosen, weight * force)
     residual = force - columns @ theta
     parts = tuple(np.split(residual, np.cumsum([len(part.b) for part in data])[:-1]))
     independent = effective_samples([part for part in parts if len(part) > 8])
-    inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
     square = float(np.mean((weight * residual) ** 2))
     variance = square * len(residual) / max(independent - len(used), 1.0)
     inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / max(np.std(force), 1e-300)
     return ForceFit(
         used=used,
         theta=theta,
-        covariance=inverse * variance + np.diag((OF_EQUATION * theta) ** 2),
+        covariance=inverse_of_gram(chosen) * variance + np.diag((OF_EQUATION * theta) ** 2),
         residuals=parts,
         rms=rms(residual),
         relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),

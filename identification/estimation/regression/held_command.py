@@ -9,12 +9,18 @@ loop adds from period to period (its encoder's counts) no log shows: it is noise
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.regression.weighted_rows import Rows, spread_of_left_out
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    solve_rows,
+    spread_of_left_out,
+    without_each_block,
+)
 from identification.log import Log
 from identification.model.estimates import NORMAL_95
 from identification.thresholds import BEYOND_CHANCE, MATERIAL
@@ -33,16 +39,12 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
     missing it may be confounded with the command's rate, and that is no share. Ours: `README.md`,
     (13).
     """
-    by_motor = logs[0].held
+    by_motor, keep = logs[0].held, np.asarray(rows.speed >= slowest)
     rate = np.concatenate([_rate_column(one) for one in logs])
-    keep = rows.speed >= slowest
-    blocks = rows.block[keep]
-    X = (np.column_stack([rows.X, rate]) / rows.sd[:, np.newaxis])[keep]
-    b = (rows.b / rows.sd)[keep]
-    if len(b) < 4 * X.shape[1]:
+    with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
+    if len(with_rate.b) < 4 * with_rate.X.shape[1]:
         return 0.0
-    theta, left = _least_squares(X, b)
-    without = _least_squares(X[:, :-1], b)[1]
+    found, without = solve_rows(with_rate), solve_rows(rows.at(keep)).cost
     if without <= 0.0:
         return 0.0
 
@@ -50,10 +52,9 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
         # A motor's force stands on the left; an actuator's command is in the first column.
         return float(-theta[-1] if by_motor else theta[-1] / (theta[0] or np.inf))
 
-    each = np.unique(blocks)
-    apart = np.array([share_of(_least_squares(X[blocks != k], b[blocks != k])[0]) for k in each])
-    sd = float(spread_of_left_out(apart))
-    return significant_share(share_of(theta), sd, 1.0 - left / without)
+    apart = [share_of(theta) for theta in without_each_block(with_rate)]
+    sd = float(spread_of_left_out(np.array(apart)))
+    return significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
 
 
 def _rate_column(one: MotionLog) -> Array:
@@ -137,10 +138,3 @@ def unseen(log: Log, share: float) -> float:
 def _steps(x: Array) -> Array:
     """Step from each sample to the next, (n,)."""
     return np.append(np.diff(np.asarray(x, dtype=np.float64)), 0.0)
-
-
-def _least_squares(X: Array, b: Array) -> tuple[Array, float]:
-    """Coefficients (k,) of b (r,) by X (r, k), and the square left."""
-    size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    theta = np.linalg.lstsq(X / size, b, rcond=1e-12)[0] / size
-    return theta, float(np.sum((b - X @ theta) ** 2))

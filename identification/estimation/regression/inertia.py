@@ -6,6 +6,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
+from identification.estimation.regression.weighted_rows import least_squares
 
 # Of the force's quick changes, that inertia explains of a body that is free
 SHOWN_BY_INERTIA = 0.15
@@ -42,8 +43,7 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
     X, b = np.concatenate(columns), np.concatenate(forces)
     if len(b) < LEAST_PAIRS:
         return False
-    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
-    theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
+    theta = least_squares(X, b)
     others = b - X[:, 1:] @ theta[1:]
     left = float(np.sum((others - X[:, 0] * theta[0]) ** 2))
 

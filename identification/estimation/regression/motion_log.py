@@ -16,7 +16,7 @@ from identification.estimation.regression.equation_rows import (
     integral,
     mechanical,
 )
-from identification.estimation.regression.weighted_rows import solve_rows
+from identification.estimation.regression.weighted_rows import least_squares, solve_rows
 from identification.log import Log
 from identification.signals.clock_jitter import position_noise
 from identification.signals.differentiate import Motion, differentiate, resolution
@@ -173,11 +173,9 @@ def _beside_control(log: Log) -> float:
         for i in range(CONTROL_LAGS)
     ]
     X, b = np.column_stack(columns), third["F"][CONTROL_LAGS:]
-    X = X / np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
     # Kinks of the command (limits, steps of the reference) are few and large.
     quiet = np.abs(b) <= np.quantile(np.abs(b), CALM_SHARE)
-    theta = np.linalg.lstsq(X[quiet], b[quiet], rcond=1e-10)[0]
-    noise = quiet_part(b - X @ theta)
+    noise = quiet_part(b - X @ least_squares(X[quiet], b[quiet]))
     least = max(OF_FILTER * quiet_part(third["F"]), OF_FORCE * float(np.std(log["F"])))
     return noise if noise > least else 0.0
 
@@ -191,7 +189,7 @@ def _left_of_force(one: MotionLog) -> float:
     rows = mechanical(one, NOTHING_KNOWN)
     if len(rows.b) < FEWEST_LEFT:
         return np.inf
-    rest = rows.b - rows.X @ np.linalg.lstsq(rows.X, rows.b, rcond=1e-12)[0]
+    rest = rows.b - rows.X @ least_squares(rows.X, rows.b)
     mean = weights(one.sliding.length, one.log.h)[0]
     return float(np.sqrt(np.mean(rest**2) / noise_gain(mean)))
 

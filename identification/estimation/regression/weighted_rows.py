@@ -1,6 +1,6 @@
 """Weighted rows of a regression, and their least squares."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,11 +62,24 @@ def solve_rows(rows: Rows, keep: BoolArray | None = None) -> Fitted:
     """
     A, c = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
     mask = np.ones(len(c), dtype=bool) if keep is None else keep
-    scale = of_column(A)
-
-    theta = np.linalg.lstsq(A[mask] / scale, c[mask], rcond=1e-10)[0] / scale
+    theta = least_squares(A[mask], c[mask])
     residual = c - A @ theta
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
+
+
+def least_squares(A: Array, b: Array) -> Array:
+    """Coefficients (k,) of b (r,) by the columns of A (r, k), whatever their units; 0 of one that
+    is nothing."""
+    scale = of_column(A)
+    return np.asarray(np.linalg.lstsq(A / scale, b, rcond=1e-10)[0] / scale)
+
+
+def inverse_of_gram(A: Array) -> Array:
+    """Covariance (k, k) of least squares by the columns of A (r, k) of unit noise, whatever their
+    units. Source: Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42."""
+    size = of_column(A) * len(A) ** 0.5
+    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-12, hermitian=True)
+    return np.asarray(inverse / np.outer(size, size))
 
 
 def left_unseen(rows: Rows) -> Array:
@@ -86,8 +99,15 @@ def without_each_block(rows: Rows) -> Array:
 
     Source: for the jackknife, Tukey, Annals of Mathematical Statistics 29 (1958) 614.
     """
-    blocks = np.unique(rows.block)
-    return np.array([solve_rows(rows, np.asarray(rows.block != k)).theta for k in blocks])
+    return left_out(rows.block, lambda kept: solve_rows(rows, kept).theta)
+
+
+def left_out(block: IntArray, of: Callable[[BoolArray], Array]) -> Array:
+    """What is made of all rows but each block in turn, (blocks, ...); of: of a mask (r,) of them.
+
+    Source: for the jackknife, Tukey, Annals of Mathematical Statistics 29 (1958) 614.
+    """
+    return np.array([of(np.asarray(block != k)) for k in np.unique(block)])
 
 
 def spread_of_left_out(each: Array) -> Array:

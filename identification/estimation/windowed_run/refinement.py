@@ -160,10 +160,6 @@ class _Unknowns:
         """The plant of the unknowns (d,)."""
         return plant_with(self.plant, self.names, self.full(x))
 
-    def of_plant(self, plant: Plant) -> Array:
-        """The unknowns (d,) of another plant."""
-        return np.asarray(values_of(plant, self.names)[self.at] / self.unit[self.at])
-
     def misfit(self, x: Array, bristle: float = COARSE) -> float:
         """What the free run of the unknowns (d,) leaves."""
         return misfit(self.plant_at(x), self.logs, self.drive, bristle)
