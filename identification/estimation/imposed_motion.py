@@ -18,7 +18,7 @@ from identification.estimation.estimates import (
     reported_estimate,
 )
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regressed_plant import motor_of
+from identification.estimation.regressed_plant import first_plant, motor_of
 from identification.estimation.regression.equation_rows import (
     FIVE,
     NOTHING_KNOWN,
@@ -26,15 +26,13 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     mechanical,
 )
-from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted
+from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted, ways_of
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import motion_rows, rows_and_windows
+from identification.estimation.regression.motion_rows import rows_and_windows, settled_rows
 from identification.estimation.regression.row_fit import rms
-from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.estimation.regression.weighted_rows import (
     Rows,
     left_unseen,
-    solve_rows,
     stacked,
 )
 from identification.log import Log, Rig
@@ -50,7 +48,6 @@ FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_COMPARED = 48  # windows of sliding, by which a fit is compared with the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
-ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, converges
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
     "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
@@ -78,14 +75,12 @@ def fit_imposed(recorded: RecordedLogs, why: str) -> KarnoppFit:
 
 def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str) -> KarnoppFit:
     """A fit of the force equation as one of the machine."""
-    logs = recorded.plain
-    firsts = [first_estimate(log, held=recorded.held) for log in logs]
-    noise_F = float(np.median([one.noise.F for one in recorded.logs]))
+    logs, (noise_y, noise_F) = recorded.plain, recorded.noise
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
-    nine = _assumed(center, firsts, _slightest_mass(rows))
+    nine = _assumed(center, recorded, _slightest_mass(rows))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -96,7 +91,7 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
         free=names,
         covariance=fit.covariance,
         drive="command" if recorded.held else "force",
-        noise_y=float(np.median([first.motion.noise for first in firsts])),
+        noise_y=noise_y,
         noise_F=noise_F,
         chi_square=(fit.rms / noise_F) ** 2,
         adequate=False,
@@ -149,8 +144,9 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    rows = _rows(recorded)
-    up, down = _ways(rows)
+    moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
+    rows = [one.rows for one in settled_rows(moved)]
+    up, down = ways_of(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
             f"{recorded.name}: {up} windows of sliding in positive and {down} in negative"
@@ -158,12 +154,6 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
             " directions"
         )
     return fewest_terms(rows), rows
-
-
-def _ways(rows: Sequence[Rows]) -> tuple[int, int]:
-    """Windows in which the body mostly moves up, and down."""
-    up = sum(int(np.count_nonzero(part.X[:, 1] > 0.5)) for part in rows)
-    return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
@@ -213,15 +203,6 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
     return replace(fit, estimates={**fit.estimates, name: both})
 
 
-def _rows(recorded: RecordedLogs) -> list[Rows]:
-    """The equation of motion of each log."""
-    moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
-    theta = NOTHING_KNOWN
-    for _ in range(ROUNDS):
-        theta = solve_rows(stacked(motion_rows(moved, theta))).theta
-    return motion_rows(moved, theta)
-
-
 def _slightest_mass(data: Sequence[Rows]) -> float:
     """A mass [kg] whose inertia is next to nothing of the force."""
     rows = stacked(data)
@@ -229,16 +210,16 @@ def _slightest_mass(data: Sequence[Rows]) -> float:
     return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
 
 
-def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> Array:
+def _assumed(center: Array, recorded: RecordedLogs, slight: float) -> Array:
     """All nine for simulation: the five of sliding of their signs, stick just above slip;
     slight: a mass [kg] that the equation does without."""
-    nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
+    first = first_plant(recorded).friction
     m = center[0] if center[0] > 0 else slight
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
-    fastest = float(np.median([float(np.max(np.abs(f.motion.v))) for f in firsts]))
-    edge = np.minimum(nine[5:7], WIDEST_ASSUMED * fastest)
+    fastest = float(np.median([np.max(np.abs(one.signals["v"])) for one in recorded.logs]))
+    edge = np.minimum([first.dv_p, -first.dv_n], WIDEST_ASSUMED * fastest)
     stick = coulomb + viscous * edge
     return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 
@@ -250,7 +231,7 @@ def _estimates(
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
     sizes = zip(fit.used, fit.theta.tolist(), strict=True)
     values = {FIVE[i]: x for i, x in sizes if i != 0 or fit.share >= INERTIA_SHARE}
-    known = _of_sliding(values, fit.sd, _ways(data), fastest, recorded)
+    known = _of_sliding(values, fit.sd, ways_of(data), fastest, recorded)
     return _reasoned(known, nine, fit.share, recorded)
 
 

@@ -71,6 +71,12 @@ class RecordedLogs:
         return self.logs[0].log.name if len(self.logs) == 1 else f"{len(self.logs)} logs"
 
     @property
+    def noise(self) -> tuple[float, float]:
+        """Noise of the position [m] and of the force [N], medians over the logs."""
+        y, F = zip(*((one.noise.y, one.noise.F) for one in self.logs), strict=True)
+        return float(np.median(y)), float(np.median(F))
+
+    @property
     def plain(self) -> tuple[Log, ...]:
         """The logs without their motion."""
         return tuple(one.log for one in self.logs)

@@ -98,8 +98,8 @@ def settled(
         free=near.names,
         covariance=covariance,
         drive=recorded.drive,
-        noise_y=noise_of(recorded)[0],
-        noise_F=noise_of(recorded)[1],
+        noise_y=recorded.noise[0],
+        noise_F=recorded.noise[1],
         chi_square=left,
         adequate=adequate,
         logs=logs,
@@ -108,12 +108,6 @@ def settled(
         command_period=recorded.command_period,
         whole=near.whole,
     )
-
-
-def noise_of(recorded: RecordedLogs) -> tuple[float, float]:
-    """Noise of the position [m] and of the force [N], medians over the logs."""
-    y, F = zip(*((one.noise.y, one.noise.F) for one in recorded.logs), strict=True)
-    return float(np.median(y)), float(np.median(F))
 
 
 def _remarks(
@@ -125,7 +119,7 @@ def _remarks(
         out: list[str] = [
             MinorRemark(
                 f"the run has an error of {off:.3g} {unit} rms in position (sensor's noise"
-                f" {factor * noise_of(recorded)[0]:.2g} {unit}): an effect is missing, or the"
+                f" {factor * recorded.noise[0]:.2g} {unit}): an effect is missing, or the"
                 " structure is wrong; run 'workbench trace' to find it; intervals are widened for"
                 " it"
             )

@@ -50,6 +50,12 @@ class ForceFit:
         return dict(zip((FIVE[i] for i in self.used), spread, strict=True))
 
 
+def ways_of(rows: Sequence[Rows]) -> tuple[int, int]:
+    """Windows in which the body mostly moves up, and down."""
+    up = sum(int(np.count_nonzero(part.X[:, 1] > 0.5)) for part in rows)
+    return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
+
+
 def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction

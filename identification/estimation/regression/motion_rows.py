@@ -14,7 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.estimation.regression.equation_rows import FIVE, OF_FORCE, MotionLog
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    NOTHING_KNOWN,
+    OF_FORCE,
+    MotionLog,
+)
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.estimation.regression.weighted_rows import BLOCKS, Rows, solve_rows, stacked
 from identification.model.karnopp import Karnopp
@@ -34,6 +39,7 @@ FAST_SPEEDS = 0.95  # quantile of speed
 WITHIN_BAND = 1e-3  # share of a window, in which it may be within the band of a plant
 UNSURE_IN_WINDOW = 0.02  # share of a window in which the body may be at rest
 FEWEST_IN_MOTION = 30
+NOISE_ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, converges
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +57,12 @@ class MotionRows:
         return np.asarray(self.windows.mean @ (1.0 * within) < WITHIN_BAND)
 
 
-def motion_rows(logs: Sequence[MotionLog], theta: Array) -> list[Rows]:
+def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows]:
     """The equation's rows of each log, in the windows that suit all of them best.
 
     theta: a first estimate of m, F_cp, F_cn, F_vp, F_vn, for the rows' noise. None of them where
-    too little slides. Sources: weak form, Messenger, Bortz (2021); Fuller (1987) for their width.
-    """
-    return [one.rows for one in rows_and_windows(logs, theta)]
-
-
-def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows]:
-    """The same with their windows.
-
-    Source of what a width costs the mass: Fuller (1987), 1.1.1; the choice is ours.
+    too little slides. Sources: weak form, Messenger, Bortz (2021); what a width costs the mass,
+    Fuller (1987), 1.1.1; the choice is ours.
     """
     shortest = min(len(one.log) for one in logs)
     tried = [
@@ -79,6 +78,17 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
     least = min(one.share for one in fits)
     enough = max(NEARLY_LEAST * least, least + AS_WELL_LEFT)
     return next(one.made for one in fits if one.share <= enough)
+
+
+def settled_rows(logs: Sequence[MotionLog]) -> list[MotionRows]:
+    """The same, their noise that of the mass and damping that they show themselves.
+
+    Source: iterated weighted least squares (Aitken 1936).
+    """
+    theta = NOTHING_KNOWN
+    for _ in range(NOISE_ROUNDS):
+        theta = solve_rows(stacked([one.rows for one in rows_and_windows(logs, theta)])).theta
+    return rows_and_windows(logs, theta)
 
 
 def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:

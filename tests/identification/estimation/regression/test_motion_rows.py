@@ -12,11 +12,10 @@ from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
     HALF_WIDTHS,
-    motion_rows,
     rows_and_windows,
     rows_of_width,
 )
-from identification.estimation.regression.weighted_rows import solve_rows, stacked
+from identification.estimation.regression.weighted_rows import solve_rows
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 
@@ -46,7 +45,7 @@ def moved(log: Log) -> MotionLog:
 
 
 def by_least_squares(log: Log) -> Array:
-    return solve_rows(stacked(motion_rows([moved(log)], NONE))).theta
+    return solve_rows(rows_and_windows([moved(log)], NONE)[0].rows).theta
 
 
 @settings(max_examples=12, deadline=None)
