@@ -6,8 +6,8 @@ force, or along a prescribed motion; from nothing, or from the model that was ac
 1. The equations in weak form give a start (or the active model does).
 2. The free run in windows from measured states, the states' uncertainty taken out, refines it.
 3. Where more than noise is left, a search for the plain plant finds another start.
-4. The last step (`settling`): whole runs where they are followed, windows elsewhere; the equation
-   of motion where it is more informative. Events and spread decide what is identifiable.
+4. The last step (`run_or_equation`): whole runs where they are followed, windows elsewhere; the
+   equation of motion where it is more informative. Events and spread decide what is identifiable.
 
 The equations, with symbols, units and sources: `README.md` here and in each room below.
 """
@@ -28,11 +28,8 @@ from identification.estimation.contradicted import (
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
-    is_unexplained,
-    left_by,
     of_one_way,
     way_of,
-    without_estimates,
 )
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import (
@@ -43,8 +40,9 @@ from identification.estimation.recorded_logs import (
     recorded_logs,
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
-from identification.estimation.regression.equation_rows import FIVE, MotionLog
-from identification.estimation.settling import is_adequate, settled
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.run_or_equation import answered
+from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
@@ -69,20 +67,10 @@ from identification.thresholds import (
     HOPELESS,
     MATERIAL,
     PLACES_EXCLUDED,
-    WORSE,
 )
 
 PRESCRIBED_WHY = "prescribed motion: inertia is negligible in the force"
-LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
-FLOOR_WHY = (
-    "the free run does not follow the logs, which biases mass and friction; stick limits and band"
-    " are not identifiable"
-)
-LESS_ERROR_WHY = (
-    "the equation of motion gives mass and friction with less error than the free run, because of"
-    " a noisy clock or command; stick limits and band are not identifiable"
-)
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
@@ -180,7 +168,7 @@ def _fit(
             return excluded.reported(fit, given)
     recorded, found, excluded = _without_bad(recorded, begin, excluded)
     if near is not None and near.misfit < found.misfit:
-        found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
+        found = found.refined(near)
     fit = finished(found, recorded, settle, report, by=drive, quick=quick)
     fit = _with_actuator(fit, recorded)
     return excluded.reported(fit, given)
@@ -260,9 +248,7 @@ def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStru
         near = refit(found.plant, recorded.logs, recorded.drive, prior={}, effort="long")
     except Halted:
         return found
-    if near.misfit > found.misfit:
-        return found
-    return replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit)
+    return found if near.misfit > found.misfit else found.refined(near)
 
 
 def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
@@ -300,52 +286,7 @@ def finished(
             start = plain_structure(forced, other)
             again = finished(start, forced, forced_rng, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
-    if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
-        why = LOST_WHY if found.imposed else "no free run follows these logs"
-        return fit_imposed(recorded, why)
-    if quick and not is_adequate(found.misfit):
-        left = left_by(found.plant.friction, recorded)
-        if left is not None and bends_the_equation(left[0], left[1]):
-            fit = _by_equation(recorded, FLOOR_WHY)
-            if fit is not None:
-                return _unless_unexplained(fit, left)
-    try:
-        fit = settled(found.plant, recorded, found.misfit, report, quick=quick)
-    except Halted:
-        with recorded.halt.closing():
-            fit = settled(found.plant, recorded, found.misfit, report, quick=True)
-    return on_the_floor(fit, recorded)
-
-
-def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
-    """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
-    equation than least squares do on held-out stretches: its run is not followed, or only down to a
-    noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
-    (1974) 111; the comparison is ours."""
-    if fit.effects:
-        return fit
-    left = left_by(fit.friction, recorded)
-    if left is None:
-        return fit
-    level = max(fit.friction.F_cp, fit.friction.F_cn)
-    wrong = bends_the_equation(left[0], left[1])
-    if wrong and fit.adequate:
-        wrong = is_material(left[0], left[1], level)
-    if wrong:
-        other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
-        # A run that is followed to the noise lacks nothing, whichever gives its parameters.
-        fit = fit if other is None else replace(other, adequate=fit.adequate)
-    elif not fit.adequate:  # of a run that is not followed, windows may identify next to nothing
-        other = _by_equation(recorded, FLOOR_WHY)
-        fit = other if other is not None and _identified(other) > _identified(fit) else fit
-    return _unless_unexplained(fit, left)
-
-
-def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> KarnoppFit:
-    """The fit, nothing reported where it and the equation leave most of the force; left: as
-    `left_by` has it."""
-    share = min(left[0], left[1]) / left[2]
-    return without_estimates(fit, share) if is_unexplained(share) else fit
+    return answered(found, recorded, report, quick=quick)
 
 
 def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
@@ -353,43 +294,6 @@ def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
     stops are searched already, or a search is hopeless."""
     open_to_more = found.imposed or found.misfit > COMPLETE
     return recorded.held or not open_to_more or search_is_hopeless(found, recorded)
-
-
-def _identified(fit: KarnoppFit) -> int:
-    """How many of mass and sliding friction a fit identifies."""
-    return sum(fit.estimates[name].value is not None for name in FIVE)
-
-
-def by_equation_if_surer(plant: Plant, recorded: RecordedLogs) -> KarnoppFit | None:
-    """The fit by the equation of motion, where a plant leaves clearly more of it; else None."""
-    left = left_by(plant.friction, recorded)
-    if left is None or not bends_the_equation(left[0], left[1]):
-        return None
-    return _by_equation(recorded, FLOOR_WHY)
-
-
-def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
-    """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
-    with suppress(NotIdentifiable):
-        return fit_imposed(recorded, why)
-    with suppress(NotIdentifiable):
-        return fit_one_way(recorded, why)
-    return None
-
-
-def bends_the_equation(left: float, by_equation: float) -> bool:
-    """Whether a fit leaves clearly more force than the equation of motion does by itself."""
-    return left > WORSE * by_equation
-
-
-def is_material(left: float, by_equation: float, coulomb: float) -> bool:
-    """Whether what a fit leaves beyond the equation of motion is of account beside friction."""
-    return left**2 - by_equation**2 > (MATERIAL * coulomb) ** 2
-
-
-def is_no_run(misfit: float) -> bool:
-    """Whether a run by the measured force that leaves so much is not the body's own motion."""
-    return misfit > HOPELESS
 
 
 def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> KarnoppFit:

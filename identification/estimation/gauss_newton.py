@@ -3,9 +3,8 @@
 Levenberg, Q. Appl. Math. 2 (1944) 164; Marquardt, SIAM J. 11 (1963) 431.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +16,11 @@ from identification.thresholds import ADEQUATE
 WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
 # Near it: the scale common to masses and forces shows in a small difference of large columns.
 FINE_STEP = 1e-7
-DAMPING_TRIES = 6  # of the damping in one step
-# Of a descent: dampings tried at once, steps at most, fall of the cost that ends it
-TRIED_AT_ONCE, DESCENT_STEPS, LEAST_FALL = 15, 30, 0.05
+ROUGH_STEP = 1e-5  # with which a descent begins
+TRIED_IN_TURN = tuple((10.0**i,) for i in range(6))  # factors on the damping in one step
+# Of a descent over what is rough: those tried at once, steps at most, fall of the cost that ends it
+POWERS = ((0.0, *(10.0 ** (i - 3) for i in range(1, 15))),)
+DESCENT_STEPS, LEAST_FALL = 30, 0.05
 SPAN, NARROWEST_SPAN, WIDEST_SPAN = 0.3, 1e-9, 1e-3  # of a conditional deviation, and bounds in x
 ALIKE = 0.5  # of a derivative, by which those to either side may differ
 LAST_STEP = 1e-5  # share of the cost below which a step is the last
@@ -39,60 +40,70 @@ class Minimum:
         """Whether hardly more than noise is left."""
         return self.mean < ADEQUATE
 
-    def covariance(self, cluster: IntArray | None = None) -> Array:
-        """Of x, (k, k), for residuals that are noise of this mean square.
+    def covariance(self, cluster: IntArray | None = None, noise: Array | None = None) -> Array:
+        """Of x, (k, k): the sandwich (J'J)^-1 S (J'J)^-1, S the covariance of the scores J'r.
 
-        cluster (n,): stretches of the first n residuals within which they are correlated; the
-        stretches are independent, and the scatter of their scores gives the deviation of x (cluster
-        sandwich; Liang, Zeger, Biometrika 73 (1986) 13).
+        Of residuals that are white noise of this mean square S is mean J'J. cluster (n,): stretches
+        of the first n residuals within which they are correlated; the stretches are independent,
+        and the scatter of their scores gives S (Liang, Zeger, Biometrika 73 (1986) 13). noise
+        (draws, n): draws of the first n residuals' noise, whose scores do (Huber, Robust Statistics
+        (1981)).
         """
         J = smooth_jacobian(self.fun, self.x)
         inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
+        if noise is not None:
+            moved = noise @ J[: noise.shape[1]] @ inverse
+            return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
         if cluster is None:
             return np.asarray(inverse * self.mean)
         pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
-        sums = np.array([np.bincount(cluster, column) for column in pull.T])
-        count = sums.shape[1]
+        moved = np.column_stack([np.bincount(cluster, column) for column in pull.T]) @ inverse
+        count = len(moved)
         spare = count / max(count - len(self.x), 1)
-        wider = spare * inverse @ (sums @ sums.T) @ inverse
+        wider = spare * moved.T @ moved
         # With few stretches for many unknowns the sums all but vanish at the minimum.
         if count <= 2 * len(self.x):
             wider = spare**2 * (wider + inverse * self.mean)
         return np.asarray(wider, dtype=np.float64)
 
-    def covariance_by(self, noise: Array) -> Array:
-        """Of x, (k, k), where draws of the first n residuals' noise are known: noise (draws, n).
-
-        The sandwich (J'J)^-1 J'SJ (J'J)^-1, S their covariance; Huber, Robust Statistics (1981).
-        """
-        J = smooth_jacobian(self.fun, self.x)
-        inverse = np.linalg.pinv(J.T @ J)
-        moved = noise @ J[: noise.shape[1]] @ inverse
-        return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
-
 
 def gauss_newton(
-    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = WIDE_STEP,
-    reach: Array | float = np.inf, little: float = 0.0,
+    fun: Callable[[Array], Array], x: Array, steps: int = DESCENT_STEPS,
+    step_by: float = WIDE_STEP, reach: Array | float = np.inf, little: float = 0.0, *,
+    rough: bool = False,
 ) -> Minimum:  # fmt: skip
     """Minimum of the square sum of `fun` near x, within this reach of it (k,).
 
-    Damping of Levenberg (1944) and Marquardt (1963), differences for the Jacobian, at most so many
-    steps; little: share of the cost below which a step is the last in any case. Halted, it gives
-    the x reached.
+    Damping of Levenberg (1944) and Marquardt (1963), differences by `step_by` for the Jacobian, at
+    most so many steps; little: share of the cost below which a step is the last in any case.
+    Halted, it gives the x reached.
+
+    rough: down to where no damping leads further, of errors that are noise at the minimum, but with
+    a step wherever a stop comes or goes. Of many dampings tried at once the best crosses what is
+    coarse, and differences over a third of a conditional deviation pass what is finer; ours.
     """
-    low, high = x - reach, x + reach
+    bounds = x - reach, x + reach
     r = fun(x)
-    cost, damping = float(r @ r), 1e-3
+    cost, damping, span = float(r @ r), 1e-3, np.full(len(x), step_by)
     for _ in range(steps):
         try:
-            found = _step(fun, x, r, (cost, damping, step_by), (low, high))
+            J = jacobian(fun, x, r, span)
+            found = _lower(fun, x, r, J, damping, bounds, POWERS if rough else TRIED_IN_TURN)
         except Halted:
             break
         if found is None:
             break
-        x, r, gained, damping = found
-        cost -= gained
+        x, r, power = found
+        gained, cost = cost - float(r @ r), float(r @ r)
+        if rough:
+            damping = float(np.clip(damping * max(power, 1e-3), 1e-9, 1e3))
+            size = np.sum(J**2, axis=0)
+            by = np.clip(SPAN / np.sqrt(np.maximum(size, 1e-30)), NARROWEST_SPAN, WIDEST_SPAN)
+            span = np.where(size > 0.0, by, span)
+            if gained < LEAST_FALL:
+                break
+            continue
+        damping *= 0.1 * power
         # What is left of much more than noise need not be known to its last digits.
         ends = LAST_STEP if cost < ADEQUATE * len(r) else LITTLE
         if gained < max(ends, little) * cost:
@@ -100,79 +111,41 @@ def gauss_newton(
     return Minimum(fun, x, cost / len(r))
 
 
-def descended(fun: Callable[[Array], Array], x: Array) -> Minimum:
-    """Minimum of the square sum of `fun` below x (k,), down to where no damping leads further.
+def _lower(
+    fun: Callable[[Array], Array], x: Array, r: Array, J: Array, damping: float,
+    bounds: tuple[Array, Array], powers: Sequence[Sequence[float]],
+) -> tuple[Array, Array, float] | None:  # fmt: skip
+    """An x at which the square sum is less than at this one, `fun` there, and by what the damping
+    was multiplied for it; None without one.
 
-    For errors that are noise at the minimum, but rough: every stop that comes or goes is a step
-    in them. Differences over a third of a conditional deviation pass what is finer, and of many
-    dampings tried at once the best crosses what is coarser. Halted, it gives the x reached.
-    Sources: Levenberg (1944), Marquardt (1963); spans of the differences are ours.
+    r, J: `fun` and its derivatives at x; powers: factors on the damping, those together tried at
+    once, one such set after the other.
     """
-    r = fun(x)
-    cost, damping, span = float(r @ r), 1e-3, np.full(len(x), 1e-5)
-    powers = damping_powers()
-    with ThreadPoolExecutor(2) as pool, suppress(Halted):
-        for _ in range(DESCENT_STEPS):
-            moved = list(pool.map(fun, x + np.diag(span)))
-            J = np.column_stack([(one - r) / by for one, by in zip(moved, span, strict=True)])
-            A, g = J.T @ J, J.T @ r
-            if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
-                break
-            size = np.diag(A)
-            tried = [x - np.linalg.lstsq(A + np.diag(damping * one * size), g, rcond=1e-14)[0]
-                     for one in powers]  # fmt: skip
-            after = list(pool.map(fun, tried))
-            costs = [float(one @ one) for one in after]
-            best = int(np.argmin(costs))
-            gained = cost - costs[best]
-            if not gained > 0.0:
-                break
-            x, r, cost = tried[best], after[best], costs[best]
-            damping = float(np.clip(damping * max(powers[best], 1e-3), 1e-9, 1e3))
-            by = SPAN / np.sqrt(np.maximum(size, 1e-30))
-            span = np.where(size > 0.0, np.clip(by, NARROWEST_SPAN, WIDEST_SPAN), span)
-            if gained < LEAST_FALL:
-                break
-    return Minimum(fun, x, cost / len(r))
-
-
-def damping_powers() -> list[float]:
-    """None, and powers of ten about the damping that served last."""
-    return [0.0, *(10.0 ** (i - 3) for i in range(1, TRIED_AT_ONCE))]
-
-
-def _step(
-    fun: Callable[[Array], Array], x: Array, r: Array, at: tuple[float, float, float],
-    bounds: tuple[Array, Array],
-) -> tuple[Array, Array, float, float] | None:  # fmt: skip
-    """The next x, `fun` there, by how much the cost falls, and the next damping; None without one.
-
-    r: `fun` at x; at: cost there, damping, and the step of the differences.
-    """
-    cost, damping, step_by = at
-    J = jacobian(fun, x, r, step_by)
     A, g = J.T @ J, J.T @ r
     if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
         return None  # beyond what can be computed with: no direction is known
     size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
-    for _ in range(DAMPING_TRIES):
-        step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
-        step = np.clip(x + step, *bounds) - x
-        after = fun(x + step)
-        gained = cost - float(after @ after)
-        if gained > 0:
-            return x + step, after, gained, damping * 0.1
-        damping *= 10.0
+    for together in powers:
+        damped = (A + np.diag(damping * power * size) for power in together)
+        steps = [np.linalg.lstsq(one, -g, rcond=1e-14)[0] for one in damped]
+        tried = [x + (np.clip(x + step, *bounds) - x) for step in steps]
+        with ThreadPoolExecutor(2) as pool:
+            after = list(pool.map(fun, tried))
+        costs = [float(one @ one) for one in after]
+        best = int(np.argmin(costs))
+        if costs[best] < float(r @ r):
+            return tried[best], after[best], together[best]
     return None
 
 
-def jacobian(fun: Callable[[Array], Array], x: Array, r: Array, step: float = WIDE_STEP) -> Array:
+def jacobian(fun: Callable[[Array], Array], x: Array, r: Array, step: Array | float) -> Array:
     """Derivatives of `fun` (n, k) by forward differences from its value r (n,) at x (k,)."""
+    steps = np.broadcast_to(step, x.shape)
 
     def column(i: int) -> Array:
         up = x.copy()
-        up[i] += step
-        return (fun(up) - r) / step
+        up[i] += steps[i]
+        return np.asarray((fun(up) - r) / steps[i])
 
     with ThreadPoolExecutor(2) as pool:
         return np.column_stack(list(pool.map(column, range(len(x)))))

@@ -28,11 +28,9 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted, ways_of
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import rows_and_windows, settled_rows
-from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.motion_rows import settled_rows
 from identification.estimation.regression.weighted_rows import (
     Rows,
-    left_unseen,
     stacked,
 )
 from identification.log import Log, Rig
@@ -144,8 +142,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
-    rows = [one.rows for one in settled_rows(moved)]
+    rows = [one.rows for one in settled_rows(recorded.logs)]
     up, down = ways_of(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
@@ -233,29 +230,6 @@ def _estimates(
     values = {FIVE[i]: x for i, x in sizes if i != 0 or fit.share >= INERTIA_SHARE}
     known = _of_sliding(values, fit.sd, ways_of(data), fastest, recorded)
     return _reasoned(known, nine, fit.share, recorded)
-
-
-def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | None:
-    """Force [N] that a plant leaves of the equation of motion while sliding, that the equation's
-    own least squares leave on held-out stretches (cross-validation, Stone 1974), and the force
-    itself; root mean squares.
-
-    None where too little slides. Of rows faster than the plant's band, in which it says something
-    else of friction; where hardly any are, of all of a body driven by the measured force, whose run
-    begins anew in every window, so that a band may take the sliding and still be followed.
-    """
-    logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
-    theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
-    made = rows_and_windows(logs, theta)
-    rows = stacked([one.rows for one in made])
-    fast = np.concatenate([one.outside(p) for one in made])
-    if np.count_nonzero(fast) < FEWEST_COMPARED:
-        if recorded.drive == "command" or len(fast) < FEWEST_COMPARED:
-            return None
-        fast = np.ones(len(fast), dtype=np.bool_)
-    rows = rows.at(fast)
-    own = rows.b - rows.X @ theta
-    return rms(own), rms(left_unseen(rows)), rms(rows.b)
 
 
 def imposed_estimates(

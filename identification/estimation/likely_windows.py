@@ -33,7 +33,6 @@ from identification.estimation.windowed_run.windows import (
     Freed,
     freed,
     starts,
-    walks,
     window_errors,
     window_run,
 )
@@ -86,7 +85,7 @@ class LikelyWindows:
         if len(own) < len(logs):
             raise BadModel(f"{logs[0].log.name}: the fitted plant's run cannot be followed")
         posed = cls(plant, drive, tuple(names), tuple(logs), own, *_bounds(plant, names))
-        if any(walks(one, drive) for one in logs):
+        if any(one.walks(drive) for one in logs):
             factor, stretch = posed.stretched(covariance)
             return replace(posed, factor=factor, stretch=stretch)
         left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS

@@ -55,6 +55,10 @@ class FittedStructure:
     misfit: float = np.inf
     fit: KarnoppFit | None = None
 
+    def refined(self, done: Refit) -> "FittedStructure":
+        """The same with the plant that a refinement has come to."""
+        return replace(self, plant=done.plant, sd=done.sd, misfit=done.misfit, imposed=False)
+
 
 def fitted_structure(
     stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
@@ -70,8 +74,11 @@ def fitted_structure(
     logs, drive = recorded.logs, recorded.drive
     regressed = regressed_plant(stage, outcomes, effects, recorded)
     plant, prior = regressed.plant, dict(regressed.prior)
-    if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
-        return FittedStructure(stage, outcomes, plant, {**prior, **regressed.unidentified}, True)
+    lost = drive == "force" and inertia_is_lost(outcomes[MECHANICAL])
+    spreads = {**prior, **regressed.unidentified}
+    model = FittedStructure(stage, outcomes, plant, spreads, lost)
+    if lost:
+        return model
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
     # follows the velocity as the log shows it, so even of the right effect more than noise is left.
     remembers = any(effect.evolve and effect.place.rubs for effect, _ in effects)
@@ -84,17 +91,16 @@ def fitted_structure(
         if free and not (missing or on_bristle(plant)):
             done = _stops_searched(regressed, recorded, rng)
             if done.misfit <= followed:
-                return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+                return model.refined(done)
         done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
         if smooth and done.misfit > COMPLETE and not hopeless:
             again = replace(onward(done.plant, logs, drive), prior=prior)
             done = again if again.misfit < done.misfit else done
-        return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+        return model.refined(done)
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
-        spreads = {**prior, **regressed.unidentified}
-        return FittedStructure(stage, outcomes, best, spreads, False, least)
+        return replace(model, plant=best, misfit=least)
 
 
 def _best_so_far(
@@ -179,16 +185,15 @@ def _from_first_estimate(
     stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
 ) -> FittedStructure:
     plant = first_plant(recorded)
-    if led_by_rig(recorded):
-        return FittedStructure(stage, first, plant, {}, True)
-    done: Refit | None = None
+    model = FittedStructure(stage, first, plant, {}, led_by_rig(recorded))
+    if model.imposed:
+        return model
     try:
         band = max(plant.friction.dv_p, -plant.friction.dv_n)
-        done = refit(plant, recorded.logs, recorded.drive, prior={}, band=band)
-        return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
+        return model.refined(refit(plant, recorded.logs, recorded.drive, prior={}, band=band))
     except Halted as halted:
-        best, least = _best_so_far(plant, done, halted, recorded)
-        return FittedStructure(stage, first, best, {}, False, least)
+        best, least = _best_so_far(plant, None, halted, recorded)
+        return replace(model, plant=best, misfit=least)
 
 
 def searched(

@@ -4,11 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.fit import by_equation_if_surer, finished
+from identification.estimation.fit import finished
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
 from identification.estimation.regression.row_fit import mean_square
+from identification.estimation.run_or_equation import by_equation_if_surer
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
@@ -143,7 +144,7 @@ def settled_plain(
     fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
     if fit is None:  # at least no worse than the equation of motion by itself
         with recorded.halt.closing():
-            fit = by_equation_if_surer(plain.model.plant, recorded)
+            fit = by_equation_if_surer(plain.model.plant.friction, recorded)
     if fit is None:
         return chosen, found
     model = replace(plain.model, fit=fit)

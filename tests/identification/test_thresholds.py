@@ -28,13 +28,7 @@ from identification.errors import BadSpecification
 from identification.estimation import contradicted
 from identification.estimation.axis_equation import slides_enough
 from identification.estimation.estimates import Events, estimates
-from identification.estimation.fit import (
-    are_few,
-    bends_the_equation,
-    is_material,
-    is_no_run,
-    leaves_much,
-)
+from identification.estimation.fit import are_few, leaves_much
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.imposed_motion import is_unexplained
 from identification.estimation.latent_force import rubs
@@ -53,6 +47,7 @@ from identification.estimation.regression.held_command import significant_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
 from identification.estimation.residual_drift import drift_size
+from identification.estimation.run_or_equation import LeftOfEquation, is_no_run
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.surroundings import (
@@ -335,7 +330,8 @@ def test_material() -> None:
     # Nor does a change by this share of a parameter's value, or what a run leaves beyond the
     # equation where friction would hardly feel it.
     assert not drifted(0.8, 2000, level=100.0) and drifted(1.25, 2000, level=100.0)
-    assert is_material(0.015, 0.009, 1.0) and not is_material(0.015, 0.0128, 1.0)
+    assert LeftOfEquation(0.015, 0.009, 1.0).is_material(1.0)
+    assert not LeftOfEquation(0.015, 0.0128, 1.0).is_material(1.0)
     # Nor is a share of the command's step that explains next to nothing.
     assert (
         significant_share(0.3, 0.01, 0.008) == 0.0 and significant_share(0.3, 0.01, 0.0125) == 0.3
@@ -405,8 +401,8 @@ def test_worse_by_hardly_anything() -> None:
 def test_worse() -> None:
     """So many times the error of the equation of motion, or of the plain model, is clearly worse;
     and so many times less is clearly better."""
-    assert not bends_the_equation(1.04, 1.0) and not bends_the_equation(0.6, 1.0)
-    assert bends_the_equation(1.06, 1.0)
+    assert not LeftOfEquation(1.04, 1.0, 9.0).surer and not LeftOfEquation(0.6, 1.0, 9.0).surer
+    assert LeftOfEquation(1.06, 1.0, 9.0).surer
     assert not is_worse(10.0, 10.3) and is_worse(10.0, 10.8)
     assert not is_worse(1.0, 1.4)  # both are noise
     assert is_trusted(0.94, 0.0) and not is_trusted(0.97, 0.0)

@@ -12,7 +12,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.standstill import (
-    LEAST_BREAKAWAY,
     MEAN,
     RATE,
     Breakaways,
@@ -40,17 +39,9 @@ def breakaway_limits(one: MotionLog, friction: Karnopp, falls: bool = False) -> 
     the limit falls to that of `friction`, so it is no less. Source: stick limits of the paper's eq.
     (1) (Karnopp 1985); their estimate is ours.
     """
-    found = []
-    for low, high in rest_stretches(one, 3 * samples(MEAN, one.log.h)):
-        event = _event(one, friction, falls, low, high)
-        if event is not None:
-            found.append(event)
-    k = np.array(found).reshape(-1, 5)
-    for way in (1.0, -1.0):  # a body that is pushed on at the start of a log has not broken away
-        own = k[:, 1] == way
-        if np.any(own):
-            k = k[~own | (way * k[:, 3] > LEAST_BREAKAWAY * np.median(way * k[own, 3]))]
-    return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
+    stretches = rest_stretches(one, 3 * samples(MEAN, one.log.h))
+    events = (_event(one, friction, falls, low, high) for low, high in stretches)
+    return Breakaways.of([event for event in events if event is not None])
 
 
 def _event(

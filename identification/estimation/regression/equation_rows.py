@@ -16,6 +16,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.regression.weighted_rows import BLOCKS, Rows
 from identification.log import Log
+from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.progress import Halt
 from identification.signals.force_random_walk import corrected_share
@@ -79,6 +80,14 @@ class MotionLog:
     imposed: bool = False
     reference: Karnopp | None = None
     halt: Halt = field(default_factory=Halt)
+
+    def is_forced(self, drive: Drive) -> bool:
+        """Whether a force drives its runs: the measured one, or a motor's, that of its command."""
+        return drive == "force" or self.held
+
+    def walks(self, drive: Drive) -> bool:
+        """Whether a run drifts off with the noise of the force that drives or corrects it."""
+        return (self.is_forced(drive) or self.noise.walk > 0.0) and self.noise.F > 0.0
 
     @cached_property
     def position_sd(self) -> Array:

@@ -45,6 +45,18 @@ class Breakaways:
     force: Array
     rate: Array
 
+    @classmethod
+    def of(cls, found: Sequence[tuple[float, float, float, float, float]]) -> "Breakaways":
+        """Events as they were found, but for those far below the others of their direction: a body
+        that is pushed on at the start of a log has not broken away."""
+        k = np.array(found).reshape(-1, 5)
+        for way in (1.0, -1.0):
+            own = k[:, 1] == way
+            if np.any(own):
+                middle = np.median(way * k[own, 3])
+                k = k[~own | (way * k[:, 3] > LEAST_BREAKAWAY * middle)]
+        return cls(k[:, 0].astype(np.int64), *k[:, 1:].T)
+
 
 def rest_stretches(one: MotionLog, shortest: int) -> list[tuple[int, int]]:
     """Stretches of samples (low, high) in which the body does not move significantly."""
@@ -152,13 +164,7 @@ def breakaways(one: MotionLog, m: float) -> Breakaways:
             / ((min(of_rate, low + at) + 1) * h)
         )
         found.append((float(low + at), way, onset * h, force, rate))
-    k = np.array(found).reshape(-1, 5)
-    for way in (1.0, -1.0):  # a body that is pushed on at the start of a log has not broken away
-        own = k[:, 1] == way
-        if np.any(own):
-            middle = np.median(way * k[own, 3])
-            k = k[~own | (way * k[:, 3] > LEAST_BREAKAWAY * middle)]
-    return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
+    return Breakaways.of(found)
 
 
 def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None:

@@ -62,10 +62,10 @@ class LikelyLog:
         cls, plant: Plant, one: MotionLog, drive: Drive, own: Freed, far: float = ROBUST_FROM
     ) -> "LikelyLog":
         """Of plants with this one's drive, in the windows of `own`."""
-        log, motor = driven_by(one, drive), isinstance(plant.actuator, Motor)
+        log, held = driven_by(one, drive), one.is_forced(drive)
         u = np.array(log["u"]) if "u" in log else np.zeros(len(log))
-        force, held = np.array(log["F"]), motor or drive == "force"
-        if isinstance(plant.actuator, Motor) and drive == "command":
+        force = np.array(log["F"])
+        if isinstance(plant.actuator, Motor):
             force = plant.actuator.k_a * u
         states = np.array([own.begun.y, own.begun.v, own.begun.F])
         if held:
@@ -76,7 +76,7 @@ class LikelyLog:
         seen[:rows], B[:, :rows] = signals, own.B / far
         weight[:rows] = own.weight * (share / sd / far)[:, np.newaxis]
         return cls(
-            log.h, u, force, force_slope(force, log.h, hold=motor or not held), held,
+            log.h, u, force, force_slope(force, log.h, hold=one.held or not held), held,
             0.0 if held else one.noise.corrected, own.begun.at, states, seen, weight, B,
             own.inverse, far,
         )  # fmt: skip

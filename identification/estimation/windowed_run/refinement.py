@@ -15,8 +15,8 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.estimation.gauss_newton import (
     FINE_STEP,
+    ROUGH_STEP,
     Minimum,
-    descended,
     gauss_newton,
 )
 from identification.estimation.regression.equation_rows import MotionLog
@@ -43,7 +43,6 @@ from identification.estimation.windowed_run.windows import (
     longest_window,
     noise_errors,
     starts,
-    walks,
     window_of,
 )
 from identification.model.estimates import Drive
@@ -219,14 +218,11 @@ def refit(
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
         factor = RUN_WINDOW / logs[0].log.h if found > ADEQUATE else 1.0
-        scale = np.outer(unit[free], unit[free])
-        if not any(walks(one, drive) for one in logs):
-            return factor * at.covariance() * scale
-        if found <= COMPLETE:
+        drifts, noise = any(one.walks(drive) for one in logs), None
+        if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
-            if noise is not None:
-                return at.covariance_by(noise) * scale
-        return factor * at.covariance(_windows(logs, drive)) * scale
+        cluster = _windows(logs, drive) if drifts else None
+        return factor * at.covariance(cluster, noise) * np.outer(unit[free], unit[free])
 
     names = tuple(unknowns.names[i] for i in free)
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)
@@ -269,8 +265,12 @@ def _over_long_runs(
     While a stop comes late, what is far off must pull: so by plain least squares first.
     """
     errors_of = judge(unknowns.plant_at(at.x), unknowns.logs, unknowns.drive, longest)
-    first = descended(lambda x: errors_of(unknowns.plant_at(x)), at.x)
-    whole = descended(lambda x: soft(errors_of(unknowns.plant_at(x))), first.x)
+    plain = gauss_newton(
+        lambda x: errors_of(unknowns.plant_at(x)), at.x, step_by=ROUGH_STEP, rough=True
+    )
+    whole = gauss_newton(
+        lambda x: soft(errors_of(unknowns.plant_at(x))), plain.x, step_by=ROUGH_STEP, rough=True
+    )
     left_by = unknowns.misfit(whole.x)
     if whole.followed and left_by <= max(found, COMPLETE):
         return whole, left_by, True

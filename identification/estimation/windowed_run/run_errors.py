@@ -15,7 +15,6 @@ from identification.estimation.windowed_run.windows import (
     freed,
     left_in_windows,
     starts,
-    walks,
     window_of,
     window_residual,
 )
@@ -39,7 +38,7 @@ def judge(
     sub-step of one. Sources: windows, Bock (1983); states, Robinson (1991): `README.md`, (1), (2).
     """
     free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
-    sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
+    sizes = [len(one.log) * (1 if one.is_forced(drive) else 2) for one in logs]
     lost = [_lost(plant, one, drive, own) for one, own in zip(logs, free, strict=True)]
 
     def errors_of(tried: Plant) -> Array:
@@ -97,7 +96,7 @@ def misfit(
     free = loose(plant, drive) and not every
     for one in logs:
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
-        whole = drive == "command" and not walks(one, drive)
+        whole = drive == "command" and not one.walks(drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
             r = left_in_windows(plant, one, drive, seconds, bristle)
             if r is not None:

@@ -86,7 +86,7 @@ def starts(
     # A body at rest on one count of its encoder is anywhere within it, however long.
     counted = np.array([float(np.std(x)) < ON_ONE_COUNT * one.noise.y for x in near])
     level_sd = np.where(counted, one.noise.y, one.noise.y / np.sqrt(around))
-    sd_F = 0.0 if one.held or drive == "force" else one.noise.F
+    sd_F = 0.0 if one.is_forced(drive) else one.noise.F
     sd = np.array(
         [
             np.where(rest, level_sd, one.position_sd[index]),
@@ -162,7 +162,7 @@ def compared(one: MotionLog, drive: Drive) -> tuple[tuple[Array, ...], Array, Ar
 
     Source of the share: steady gain of a local level, Harvey (1989); `README.md`, (3).
     """
-    if drive != "command" or one.held:
+    if one.is_forced(drive):
         return (one.log["y"],), np.ones(1), np.array([one.noise.y])
     # Beside the sensor's noise, that of the force before it was corrected.
     share = np.array([1.0, np.sqrt(1.0 - one.noise.corrected)])
@@ -307,7 +307,7 @@ def _weights(
     what a jittering clock shows of it is uncertain in fast motion.
     """
     square = np.zeros(r.shape)
-    if walks(one, drive):
+    if one.walks(drive):
         square[0] = _least_drift(plant, one, drive, begun, base)
     square[0] += (one.noise.jitter * one.signals["v"] / one.noise.y) ** 2
     return np.asarray(1.0 / np.sqrt(1.0 + square))
@@ -322,11 +322,6 @@ def _least_drift(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base
         if run is not None:
             square = np.minimum(square, _drift_variance(plain, one, drive, begun, run))
     return square
-
-
-def walks(one: MotionLog, drive: Drive) -> bool:
-    """Whether a run drifts off with the noise of the force that drives or corrects it."""
-    return (drive == "force" or one.held or one.noise.walk > 0.0) and one.noise.F > 0.0
 
 
 def _drift_variance(
@@ -378,7 +373,7 @@ def noise_errors(
 def longest_window(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float:
     """Windows [s] in which a run of the plant may be followed in the end: as long as the log where
     an exact command drives it, a motor's shorter; RUN_WINDOW where it drifts, or errs by itself."""
-    if drive == "force" or on_bristle(plant) or any(walks(one, drive) for one in logs):
+    if drive == "force" or on_bristle(plant) or any(one.walks(drive) for one in logs):
         return RUN_WINDOW
     return MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
 

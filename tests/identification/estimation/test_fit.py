@@ -10,9 +10,10 @@ import pytest
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation import fit as fitting
+from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import left_by
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
+from identification.estimation.run_or_equation import LeftOfEquation, left_by
 from identification.estimation.structure_fit import FittedStructure, plain_structure
 from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Log, Rig
@@ -244,9 +245,9 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     run: Any = Told(table(1), adequate, "run", (near,))
     other = replace(run, adequate=False, name="equation")
     recorded: Any = SimpleNamespace(plain=[log])
-    monkeypatch.setattr(fitting, "left_by", lambda *_: (left, 1.0, 100.0))
-    monkeypatch.setattr(fitting, "_by_equation", lambda *_: other)
-    found: Any = fitting.on_the_floor(run, recorded)
+    monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
+    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)
+    found: Any = run_or_equation.on_the_floor(run, recorded)
     assert (found.name, found.adequate) == (by, adequate)
 
 
@@ -255,7 +256,7 @@ def test_a_band_that_takes_the_sliding_does_not_hide_what_a_plant_leaves() -> No
     own = left_by(NINE, by_force)
     swollen = replace(NINE, dv_p=10.0, dv_n=-10.0, F_cp=2.0 * NINE.F_cp)
     wide = left_by(swollen, by_force)
-    assert own is not None and own[0] < 2.0 * own[1]
-    assert wide is not None and wide[0] > 3.0 * wide[1]
+    assert own is not None and own.by_plant < 2.0 * own.by_equation
+    assert wide is not None and wide.by_plant > 3.0 * wide.by_equation
     # A run by the command is followed as a whole, with its stops.
     assert left_by(swollen, recorded_logs([made(3)], Rig("motor", force_per_command=K_A))) is None

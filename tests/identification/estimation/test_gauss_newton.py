@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.estimation.gauss_newton import (
     FINE_STEP,
     Minimum,
-    descended,
+    gauss_newton,
     jacobian,
     smooth_jacobian,
 )
@@ -44,7 +44,7 @@ def test_the_covariance_is_that_of_noise(fun: Callable[[Array], Array]) -> None:
     expected = np.linalg.inv(X.T @ X)
     found = Minimum(fun, AT, 1.0)
     np.testing.assert_allclose(found.covariance(), expected, rtol=1e-4, atol=1e-8)
-    spread = np.sqrt(np.diag(found.covariance_by(noise)))
+    spread = np.sqrt(np.diag(found.covariance(noise=noise)))
     np.testing.assert_allclose(spread, np.sqrt(np.diag(expected)), rtol=0.1)
 
 
@@ -59,9 +59,9 @@ def test_a_descent_comes_down_from_far_and_halted_keeps_what_it_has() -> None:
         return errors_at(t, x)
 
     begun = np.array([3.0, 5.0])
-    assert np.allclose(descended(errors, begun).x, [1.0, 2.0], atol=1e-6)
+    assert np.allclose(gauss_newton(errors, begun, rough=True).x, [1.0, 2.0], atol=1e-6)
     left[0] = 40
-    halted = descended(errors, begun)
+    halted = gauss_newton(errors, begun, rough=True)
     assert 0.0 < halted.mean < float(np.mean(errors_at(t, begun) ** 2))
 
 

@@ -16,7 +16,7 @@ from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.estimation.structure_fit import fitted_structure
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.estimation.windowed_run.windows import starts, walks
+from identification.estimation.windowed_run.windows import starts
 from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.signals.differentiate import resolution
@@ -80,7 +80,7 @@ def test_noise_of_a_logged_command_is_told_from_what_a_controller_passes() -> No
     noise = 0.3 * rng.standard_normal(len(log))
     noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
     assert pytest.approx(0.3, rel=0.15) == seen(noisy).noise.F
-    assert walks(seen(noisy), "command") and not walks(seen(log), "command")
+    assert seen(noisy).walks("command") and not seen(log).walks("command")
     filtered = np.convolve(log["y"], [400.0, -300.0, -100.0])[: len(log)]
     passed = log.with_signals(F=log["F"] + filtered, u=log["u"] + filtered / K_A)
     assert seen(passed).noise.F < 0.02
