@@ -1,9 +1,9 @@
 """An axis by its equation of motion alone, in a second: what a maintenance engineer asks of a log.
 
-Mass, friction and breakaway of each direction, and friction along the travel, by the rows and terms
-of the force equation (`regression/force_terms`); no free run, no search. Deviations are the
-jackknife's over stretches of the log, so they hold what varies in it, and 0.4 % of a value by which
-the equation errs itself.
+Mass, friction and breakaway of each direction, and friction along the travel, by least squares of
+the equation in weak form, with the terms that a fit of it has; no free run, no search. Deviations
+are the jackknife's over stretches of the log, so they hold what varies in it, and 0.4 % of a value
+by which the equation errs itself.
 """
 
 from dataclasses import dataclass, replace
@@ -12,12 +12,13 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.regression.force_terms import fewest_terms, ways_of
+from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
+from identification.estimation.regression.force_terms import fewest_terms
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
+from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.standstill import breakaways
 from identification.estimation.regression.weighted_rows import (
+    Rows,
     solve_rows,
     spread_of_left_out,
     without_each_block,
@@ -25,7 +26,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Log
 from identification.thresholds import EVENTS_NEEDED, MANY_OF_A_KIND
 
-COULOMB_LEVELS = ("F_cp", "F_cn")
+AXIS_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, converges
 SLOW_QUARTER = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
@@ -61,13 +62,13 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     jackknife, Tukey (1958); deviation of a median, Huber, Robust Statistics (1981).
     """
     one = motion_log(log, held=held, by_command=False)
-    (made,) = settled_rows([one])
-    rows, (up, down) = made.rows, ways_of([made.rows])
+    up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
     if not slides_enough(up, down):
         raise NotIdentifiable(
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
+    rows = _converged(one)
     used = list(fewest_terms([rows]).used)
     some = replace(rows, X=rows.X[:, used])
     theta, each = solve_rows(some).theta, without_each_block(some)
@@ -75,24 +76,31 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
     names = [rows.names[k] for k in used]
     values = dict(zip(names, theta.tolist(), strict=True))
     sd = dict(zip(names, spread.tolist(), strict=True))
-    levels = [names.index(name) for name in COULOMB_LEVELS]
-    offset = spread_of_left_out(0.5 * (each[:, levels[1]] - each[:, levels[0]]))
+    up_at, down_at = names.index("F_cp"), names.index("F_cn")
+    offset = spread_of_left_out(0.5 * (each[:, [down_at]] - each[:, [up_at]]))
     bias = 0.5 * OF_EQUATION * float(np.hypot(values["F_cp"], values["F_cn"]))
     limits, limit_sd, count = _breakaway(one, values.get("m", 0.0))
-    left = rows.b - some.X @ theta
-    moves_up = np.asarray(rows.X[:, 1] > -rows.X[:, 2], dtype=np.bool_)
-    level = np.where(moves_up, 1.0, -1.0) * (left + some.X[:, levels] @ theta[levels])
+    left, levels = rows.b - some.X @ theta, [up_at, down_at]
+    level = left + some.X[:, levels] @ theta[levels]
     return AxisEquation(
         {**values, **limits}, {**sd, **limit_sd},
-        (0.5 * (values["F_cn"] - values["F_cp"]), float(np.hypot(offset, bias))), count,
+        (0.5 * (values["F_cn"] - values["F_cp"]), float(np.hypot(offset[0], bias))), count,
         float(np.linalg.norm(left) / max(float(np.linalg.norm(rows.b)), 1e-300)),
-        np.asarray(log["y"])[made.windows.middle], level, moves_up,
+        np.asarray(log["y"])[one.sliding.middle], level * np.where(one.up, 1.0, -1.0), one.up,
     )  # fmt: skip
 
 
 def slides_enough(up: int, down: int) -> bool:
     """Whether so many windows of sliding in either direction identify its friction."""
     return min(up, down) >= MANY_OF_A_KIND
+
+
+def _converged(one: MotionLog) -> Rows:
+    """The rows, their noise that of the mass and damping that they show."""
+    theta = NOTHING_KNOWN
+    for _ in range(AXIS_ROUNDS):
+        theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
+    return mechanical(one, np.maximum(theta, 0.0))
 
 
 def _breakaway(
