@@ -71,7 +71,7 @@ from identification.thresholds import (
 
 PRESCRIBED_WHY = "prescribed motion: inertia is negligible in the force"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
-WIDER_SEARCHES = 2  # for the plain plant, ever wider
+SEARCHES = 2  # for the plain plant
 
 
 def fit_plant(
@@ -278,7 +278,7 @@ def finished(
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, PRESCRIBED_WHY)
     if not (quick or needs_no_search(found, recorded)):
-        found = searched(found, recorded, search, report, WIDER_SEARCHES)
+        found = searched(found, recorded, search, report, SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:

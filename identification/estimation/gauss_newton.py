@@ -19,7 +19,7 @@ FINE_STEP = 1e-7
 ROUGH_STEP = 1e-5  # with which a descent begins
 TRIED_IN_TURN = tuple((10.0**i,) for i in range(6))  # factors on the damping in one step
 # Of a descent over what is rough: those tried at once, steps at most, fall of the cost that ends it
-POWERS = ((0.0, *(10.0 ** (i - 3) for i in range(1, 15))),)
+TRIED_AT_ONCE = ((0.0, *(10.0 ** (i - 3) for i in range(1, 15))),)
 DESCENT_STEPS, LEAST_FALL = 30, 0.05
 SPAN, NARROWEST_SPAN, WIDEST_SPAN = 0.3, 1e-9, 1e-3  # of a conditional deviation, and bounds in x
 ALIKE = 0.5  # of a derivative, by which those to either side may differ
@@ -88,7 +88,7 @@ def gauss_newton(
     for _ in range(steps):
         try:
             J = jacobian(fun, x, r, span)
-            found = _lower(fun, x, r, J, damping, bounds, POWERS if rough else TRIED_IN_TURN)
+            found = _lower(fun, x, r, J, damping, bounds, TRIED_AT_ONCE if rough else TRIED_IN_TURN)
         except Halted:
             break
         if found is None:
@@ -129,8 +129,7 @@ def _lower(
         damped = (A + np.diag(damping * power * size) for power in together)
         steps = [np.linalg.lstsq(one, -g, rcond=1e-14)[0] for one in damped]
         tried = [x + (np.clip(x + step, *bounds) - x) for step in steps]
-        with ThreadPoolExecutor(2) as pool:
-            after = list(pool.map(fun, tried))
+        after = _each(fun, tried)
         costs = [float(one @ one) for one in after]
         best = int(np.argmin(costs))
         if costs[best] < float(r @ r):
@@ -141,14 +140,16 @@ def _lower(
 def jacobian(fun: Callable[[Array], Array], x: Array, r: Array, step: Array | float) -> Array:
     """Derivatives of `fun` (n, k) by forward differences from its value r (n,) at x (k,)."""
     steps = np.broadcast_to(step, x.shape)
+    after = _each(fun, list(x + np.diag(steps)))
+    return np.column_stack([(one - r) / by for one, by in zip(after, steps, strict=True)])
 
-    def column(i: int) -> Array:
-        up = x.copy()
-        up[i] += steps[i]
-        return np.asarray((fun(up) - r) / steps[i])
 
+def _each(fun: Callable[[Array], Array], every: Sequence[Array]) -> list[Array]:
+    """`fun` at each x, on two cores."""
+    if len(every) == 1:
+        return [fun(every[0])]
     with ThreadPoolExecutor(2) as pool:
-        return np.column_stack(list(pool.map(column, range(len(x)))))
+        return list(pool.map(fun, every))
 
 
 def smooth_jacobian(fun: Callable[[Array], Array], x: Array) -> Array:

@@ -19,11 +19,10 @@ CONVERGED = 1e-4  # relative spread of the costs at which the population has met
 
 @dataclass(frozen=True)
 class Population:
-    """Members (k, d) in the unit cube, best first, their costs (k,), and evaluations spent."""
+    """Members (k, d) in the unit cube, best first, and their costs (k,)."""
 
     members: Array
     costs: Array
-    evaluations: int
 
 
 def evolve(
@@ -43,7 +42,6 @@ def evolve(
     z = np.array(first, dtype=np.float64)
     k = len(z)
     costs = _finite(cost(z))
-    spent = k
     for generation in range(generations):
         leaders = z[np.argsort(costs)[:LEADERS]]
         one, two = _pairs(k, rng)
@@ -52,7 +50,6 @@ def evolve(
         trial = np.where(rng.random(z.shape) < CROSSOVER, trial, z)
         trial = _reflected(trial)
         found = _finite(cost(trial))
-        spent += k
         better = found < costs
         z[better], costs[better] = trial[better], found[better]
         if on_progress:
@@ -60,7 +57,7 @@ def evolve(
         if np.median(costs) <= costs.min() * (1 + CONVERGED):
             break
     order = np.argsort(costs)
-    return Population(z[order], costs[order], spent)
+    return Population(z[order], costs[order])
 
 
 def _pairs(k: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

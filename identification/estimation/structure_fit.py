@@ -198,27 +198,18 @@ def _from_first_estimate(
 
 def searched(
     model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
-    report: Progress = quiet, attempts: int = 1,
+    report: Progress = quiet, searches: int = 1,
 ) -> FittedStructure:  # fmt: skip
     """The plain model from global searches, where one of these follows the logs better.
 
     Halted, it is the best so far.
     """
-    for attempt in range(attempts):
-        try:
-            first, (logs, drive) = first_plant(recorded), (recorded.logs, recorded.drive)
-            plant = searched_plant(first, logs, drive, rng, report, attempt)
-        except (UserError, Halted):
-            return model
-        try:
+    logs, drive = recorded.logs, recorded.drive
+    with suppress(UserError, Halted):
+        for _ in range(searches):
+            plant = searched_plant(first_plant(recorded), logs, drive, rng, report)
             found = refit(plant, logs, drive, prior={}, effort="near")
-            left_by = misfit(plant, logs, drive)
-            better = found.misfit < left_by
-            best, least = (found.plant, found.misfit) if better else (plant, left_by)
-            if least < model.misfit:
-                model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
-        except Halted:
-            return model
-        if model.misfit <= COMPLETE:
-            break
+            model = model.refined(found) if found.misfit < model.misfit else model
+            if model.misfit <= COMPLETE:
+                break
     return model

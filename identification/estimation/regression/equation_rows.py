@@ -123,16 +123,19 @@ def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float =
     if k1 != 0.0:
         impulse = k1 * integral(one.log["u"], one.log.h)
         b = b + w.kinked @ impulse - w.mean @ impulse
+    sd = sliding_sd(one, w, up, theta)
+    return Rows(b, X, sd, blocks_of(w, len(one.log)), one.speed, FIVE)
+
+
+def sliding_sd(one: MotionLog, w: WeakWindows, up: BoolArray, theta: Array) -> Array:
+    """Noise [N] of rows of sliding in these windows, each up or down (r,); theta: a first estimate
+    of the five. Source: `README.md`, (7) (Messenger, Bortz 2021)."""
     mean, first, second, *_ = weights(w.length, one.log.h)
-    spread = [
-        one.noise.F**2 * noise_gain(mean)
-        + one.position_sd[w.middle] ** 2 * noise_gain(theta[0] * second + viscous * first)
-        for viscous in (theta[3], theta[4])
-    ]
+    by_position = [noise_gain(theta[0] * second + viscous * first) for viscous in theta[3:5]]
+    square = one.position_sd[w.middle] ** 2 * np.where(up, *by_position)
     # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
     least = OF_FORCE * float(np.std(one.log["F"]))
-    sd = np.maximum(np.sqrt(np.where(up, spread[0], spread[1])), least)
-    return Rows(b, X, sd, _blocks(w, len(one.log)), one.speed, FIVE)
+    return np.maximum(np.sqrt(one.noise.F**2 * noise_gain(mean) + square), least)
 
 
 def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | None = None) -> Rows:
@@ -155,7 +158,7 @@ def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | No
     sd = np.where(sd > 0.0, sd, OF_FORCE * float(np.std(one.log["F"])))
     r = len(w.start)
     return Rows(
-        w.first @ one.log["F"], X, sd, _blocks(w, len(one.log)), np.full(r, np.inf),
+        w.first @ one.log["F"], X, sd, blocks_of(w, len(one.log)), np.full(r, np.inf),
         ("k1", "k2", "offset"),
     )  # fmt: skip
 
@@ -184,5 +187,6 @@ def integral(u: Array, h: float) -> Array:
     return h * np.concatenate([[0.0], np.cumsum(u)[:-1]])
 
 
-def _blocks(w: WeakWindows, n: int) -> IntArray:
+def blocks_of(w: WeakWindows, n: int) -> IntArray:
+    """Stretch of a log of n samples that each window is in, (r,)."""
     return (w.middle * BLOCKS // n).astype(np.int64)

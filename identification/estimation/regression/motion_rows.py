@@ -17,11 +17,12 @@ from identification.arrays import Array, BoolArray
 from identification.estimation.regression.equation_rows import (
     FIVE,
     NOTHING_KNOWN,
-    OF_FORCE,
     MotionLog,
+    blocks_of,
+    sliding_sd,
 )
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
-from identification.estimation.regression.weighted_rows import BLOCKS, Rows, solve_rows, stacked
+from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
 
@@ -99,7 +100,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     n, h, y = len(one.log), one.log.h, np.asarray(one.log["y"])
     length = min(2 * half, n - 1)
     every = all_windows(n, length, h)
-    mean, first, second, *_ = weights(length, h)
+    first = weights(length, h)[1]
     fine = weights(max(FINEST_WINDOW, 2 * (half // FINER_WINDOW)), h)[1]
     padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
     v = np.correlate(padded, fine, "valid")[:n]
@@ -113,13 +114,8 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
          w.mean @ (v * down)]
     )  # fmt: skip
     b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
-    viscous = np.where(over > 0.0, theta[3], theta[4])[:, np.newaxis]
-    by_position = np.sum((theta[0] * second + viscous * first) ** 2, axis=1)
-    variance = one.noise.F**2 * noise_gain(mean) + one.position_sd[w.middle] ** 2 * by_position
-    # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
-    sd = np.maximum(np.sqrt(variance), OF_FORCE * float(np.std(one.log["F"])))
-    block = (w.middle * BLOCKS // n).astype(np.int64)
-    return MotionRows(Rows(b, X, sd, block, np.abs(over), FIVE), w, v)
+    sd = sliding_sd(one, w, over > 0.0, theta)
+    return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), FIVE), w, v)
 
 
 @dataclass(frozen=True, eq=False)

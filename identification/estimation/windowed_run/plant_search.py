@@ -28,8 +28,6 @@ POPULATION, GENERATIONS = 64, 150
 BEGUN_APART = 0.15  # of the box, between the members that begin near the plant
 # Errors count in full within so many deviations of the noise, and such a share of the motion's
 FULL_WITHIN, SHARE_WITHIN = 30.0, 0.02
-# Factors on that bound and on the search's box, of each attempt after the first
-LOOSER, WIDER_BOX = 5.0, 3.0
 SIGN = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
 LOGARITHMIC = np.isin(NAMES, ("m", "dv_p", "dv_n"))
 
@@ -42,11 +40,11 @@ class Box:
     high: Array
 
     @classmethod
-    def about(cls, logs: Sequence[MotionLog], factor: float = 1.0) -> "Box":
-        """That which holds every log's range about its first estimate, moved out by a factor."""
+    def about(cls, logs: Sequence[MotionLog]) -> "Box":
+        """That which holds every log's range about its first estimate."""
         firsts = [first_estimate(one.log, held=one.held) for one in logs]
-        ends = np.array([np.min([first.low for first in firsts], axis=0) / factor,
-                         np.max([first.high for first in firsts], axis=0) * factor])  # fmt: skip
+        ends = np.array([np.min([first.low for first in firsts], axis=0),
+                         np.max([first.high for first in firsts], axis=0)])  # fmt: skip
         ends[:, LOGARITHMIC] = np.log(np.maximum(ends[:, LOGARITHMIC], 1e-300))
         return cls(*ends)
 
@@ -76,16 +74,14 @@ class PlantCost:
     logs: tuple[LikelyLog, ...]
 
     @classmethod
-    def of(
-        cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, looser: float = 1.0
-    ) -> "PlantCost":
-        """For plants with this one's actuator; looser: factor on the errors that count in full."""
+    def of(cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> "PlantCost":
+        """For plants with this one's actuator."""
         posed = []
         for one in logs:
             rows = len(compared(one, drive)[0])
             own = Freed.of_known(starts(one, drive, SHORT_WINDOW), rows, len(one.log))
             far = max(FULL_WITHIN, SHARE_WITHIN * float(np.std(one.log["y"])) / one.noise.y)
-            posed.append(LikelyLog.of(plant, one, drive, own, looser * far))
+            posed.append(LikelyLog.of(plant, one, drive, own, far))
         return cls(plant, drive, tuple(posed))
 
     def __call__(self, nine: Array) -> Array:
@@ -101,16 +97,14 @@ class PlantCost:
 
 def searched_plant(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
-    report: Progress, attempt: int = 0,
+    report: Progress,
 ) -> Plant:  # fmt: skip
     """The plant of one global search for the nine parameters, without intervals.
 
-    plant: the first one, whose actuator stays; attempt: how many have failed before, perhaps around
-    a bad first estimate. Raises Halted where the logs' `halt` says so. Source: differential
-    evolution, Storn, Price (1997), of the paper's plant.
+    plant: the first one, whose actuator stays. Raises Halted where the logs' `halt` says so.
+    Source: differential evolution, Storn, Price (1997), of the paper's plant.
     """
-    box = Box.about(logs, WIDER_BOX**attempt)
-    cost_of = PlantCost.of(plant, logs, drive, LOOSER**attempt)
+    box, cost_of = Box.about(logs), PlantCost.of(plant, logs, drive)
 
     def cost(z: Array) -> Array:
         logs[0].halt.ask()

@@ -27,13 +27,6 @@ def test_the_box_holds_the_truth_and_every_point_of_it_is_a_plant() -> None:
         Karnopp.from_array(nine)  # which refuses a wrong sign
 
 
-def test_a_wider_box_holds_the_one_before() -> None:
-    logs = recorded_logs([made_log(table(1), seed=1, seconds=3.0)], RIG).logs
-    near, wide = Box.about(logs), Box.about(logs, 3.0)
-    assert np.all(wide.low <= near.low)
-    assert np.all(wide.high > near.high)
-
-
 @pytest.mark.parametrize("drive", ["command", "force"])
 def test_the_truth_costs_least(drive: Drive) -> None:
     recorded = recorded_logs([made_log(table(2), seed=3)], RIG, drive)

@@ -6,8 +6,8 @@ import numpy as np
 
 from identification.estimation.windowed_run import windows as module
 from identification.estimation.windowed_run.run_errors import judge, mean_loss, misfit
+from identification.estimation.windowed_run.window_places import FAST_SHARE
 from identification.estimation.windowed_run.windows import (
-    FAST_SHARE,
     RUN_WINDOW,
     WHOLE,
     position_rms,
