@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import norm
 
 from benchmarks.calibration import drawn
-from identification.estimation import likely_windows
+from identification.estimation import likelihood
 from identification.model.karnopp import NAMES
 
 SECONDS = 2.5  # of a log
@@ -36,5 +36,5 @@ def test_with_the_noise_of_the_logs_ranks_are_uniform() -> None:
 def test_a_wrong_noise_is_seen(
     monkeypatch: pytest.MonkeyPatch, factor: float, low: float, high: float
 ) -> None:
-    monkeypatch.setattr(likely_windows, "AS_NOISE", factor**2 * likely_windows.AS_NOISE)
+    monkeypatch.setattr(likelihood, "AS_NOISE", factor**2 * likelihood.AS_NOISE)
     assert low < mean_square(range(700, 703)) < high

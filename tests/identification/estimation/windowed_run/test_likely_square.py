@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.estimation.likely_windows import LikelyWindows
+from identification.estimation.likelihood import LikelyWindows
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import names_of, plant_with, values_of
@@ -89,7 +89,7 @@ def test_runs_from_outside_are_as_likely_as_those_of_the_lanes(
         return None if here else window_run(tried, one, *others)  # type: ignore[arg-type]
 
     for log, own, likely in zip(windows.logs, windows.found, windows.likely, strict=True):
-        monkeypatch.setattr("identification.estimation.likely_windows.window_run", run_of)
+        monkeypatch.setattr("identification.estimation.likelihood.window_run", run_of)
         shown = likely.shown(windows._runs(members[:16], log, own))
     assert shown[2] == np.inf
     kept = np.arange(16) != 2
