@@ -14,10 +14,16 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from identification.arrays import Array, BoolArray, IntArray
+from identification.estimation.gauss_newton import gauss_newton
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import again
-from identification.estimation.windowed_run.run_errors import NOISE_LOSS, loss
+from identification.estimation.windowed_run.run_errors import (
+    CANNOT_BE_FOLLOWED,
+    NOISE_LOSS,
+    loss,
+    soft,
+)
 from identification.estimation.windowed_run.windows import (
     Freed,
     Starts,
@@ -55,7 +61,7 @@ MOST_CANDIDATES = 16  # samples of a drive that are tried without
 SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
 DRIFTS_OVER = 0.17  # s, over which what a command's noise adds up to passes for one bad sample
 SHIFT_STEPS = 3  # to the likeliest value in place of a bad one
-FARTHEST_SHIFT = 20.0  # times the drive's roughness, the longest of these steps
+FARTHEST_SHIFT = 60.0  # times the drive's roughness, that it is away at most
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
 BENT, KICK_FROM = (30, 90), 4.0  # samples a side, deviations by which lines through errors bend
 MOST_KICKS, KICK_GAINS = 6, 2.0  # tried; times the gain of a sample that stands out by itself
@@ -259,24 +265,16 @@ class _Driven:
 
         What was given there is not known but by what the run makes of it. rough: first step.
         """
-        cost = self.cost(x)
-        for _ in range(SHIFT_STEPS):
-            shift = np.zeros(len(x))
-            shift[own] = rough
-            low, high = self.cost(x - shift), self.cost(x + shift)
-            curved = low + high - 2.0 * cost
-            if not curved > 0.0:
-                break
-            moved = (
-                x
-                + float(np.clip(0.5 * (low - high) / curved, -FARTHEST_SHIFT, FARTHEST_SHIFT))
-                * shift
-            )
-            left = self.cost(moved)
-            if left >= cost:
-                break
-            x, cost = moved, left
-        return x, cost
+        off = np.zeros(len(x))
+        off[own] = rough
+
+        def errors_at(shift: Array) -> Array:
+            r = self.errors(x + shift * off)
+            lost = np.full(self.states.weight.size, CANNOT_BE_FOLLOWED)
+            return lost if r is None else soft(r.ravel())
+
+        found = gauss_newton(errors_at, np.zeros(1), SHIFT_STEPS, 1.0, FARTHEST_SHIFT)
+        return x + found.x * off, found.mean * self.states.weight.size
 
 
 def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadSamples]]:
