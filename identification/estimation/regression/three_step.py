@@ -29,16 +29,12 @@ FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
 
 @dataclass(frozen=True)
 class FirstEstimate:
-    """Nine values in the order of karnopp.NAMES, the search's range around them, and the motion.
-
-    low, high (9,): bounds for the magnitudes; rest (n,): whether the body stands still.
-    """
+    """Nine values in the order of karnopp.NAMES; low, high (9,): range of their sizes in which a
+    search looks."""
 
     nine: Array
     low: Array
     high: Array
-    motion: Motion
-    rest: NDArray[np.bool_]
 
 
 def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
@@ -72,20 +68,11 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     # A motor's force has no ramps that would show a narrow band: do not search one.
     narrow = fastest / (500 if held else 3000)
     low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
+    steepest = 2 * max(viscous_p, viscous_n, 0.1 * scale / fastest)
     high = np.array(
-        [
-            m * SEARCH_FACTOR,
-            2 * scale,
-            2 * scale,
-            2 * max(viscous_p, viscous_n, 0.1 * scale / fastest),
-            2 * max(viscous_p, viscous_n, 0.1 * scale / fastest),
-            fastest / 2,
-            fastest / 2,
-            3 * scale,
-            3 * scale,
-        ]
+        [m * SEARCH_FACTOR, *[2 * scale] * 2, *[steepest] * 2, *[fastest / 2] * 2, *[3 * scale] * 2]
     )
-    return FirstEstimate(nine, low, high, motion, rest)
+    return FirstEstimate(nine, low, high)
 
 
 def usable_cutoffs(log: Log) -> list[float | None]:

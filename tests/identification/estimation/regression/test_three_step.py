@@ -24,13 +24,6 @@ def test_sliding_and_breakaway_are_near(number: int) -> None:
     assert np.all(magnitudes < first.high)
 
 
-def test_rest_is_told_from_motion() -> None:
-    log = made_log(table(2), seed=1)
-    first = first_estimate(log)
-    assert 0.02 < np.mean(first.rest) < 0.98
-    assert np.max(np.abs(np.diff(log["y"])[first.rest[:-1] & first.rest[1:]])) < 1e-4
-
-
 def test_a_still_log_is_refused() -> None:
     log = made_log(table(2), seconds=2.0)
     y = 1e-5 * np.random.default_rng(0).standard_normal(len(log))
