@@ -8,7 +8,7 @@ tested, corrected and reported, and the plant is fitted anew.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
@@ -33,7 +33,7 @@ from identification.estimation.windowed_run.windows import (
     window_run,
 )
 from identification.log import Log
-from identification.model.estimates import Drive
+from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples, Kind
 from identification.signals.steps import (
@@ -70,35 +70,65 @@ LEAST_SPREAD = 1e-3  # of a run's errors in noise units: a simulated log may hav
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
-    """Logs without what the run contradicts, and what that was.
+    """Logs without the samples that runs have contradicted, and what these were.
 
-    owner: for each log the number of the one that it is a piece of.
+    owner: for each log the number of the given one that it is a piece of.
     """
 
     recorded: RecordedLogs
     bad: tuple[BadSamples, ...]
     owner: tuple[int, ...]
 
+    @classmethod
+    def of_nothing(cls, recorded: RecordedLogs) -> "Corrected":
+        """The logs as they are given."""
+        return cls(recorded, (), tuple(range(len(recorded.logs))))
 
-def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
-    """The logs with their contradicted samples put right, as the run of this plant has them.
+    def by(self, plant: Plant, misfit: float) -> "Corrected":
+        """The same without what the run of this plant contradicts too; itself if that is nothing.
 
-    Where the command was logged wrong, the log is cut: what the machine was given is not known; so
-    it is at a jump, whose size is known within its noise only.
-    misfit: what the plant leaves; of a run that is not followed at all nothing is searched. Ours.
-    """
-    if misfit > HOPELESS:
-        return Corrected(recorded, (), tuple(range(len(recorded.logs))))
-    logs, bad, owner = list[Log](), list[BadSamples](), list[int]()
-    for i, one in enumerate(recorded.logs):
-        log, found = _of_log(plant, one, recorded.drive, misfit)
-        pieces = _pieces(log, one, found)
-        logs += pieces
-        owner += [i] * len(pieces)
-        bad += found
-    if not bad:
-        return Corrected(recorded, (), tuple(range(len(recorded.logs))))
-    return Corrected(recorded.of(logs), tuple(bad), tuple(owner))
+        Where the command was logged wrong, the log is cut: what the machine was given is not known;
+        so it is at a jump, whose size is known within its noise only. misfit: what the plant
+        leaves; of a run that is not followed at all nothing is searched. Ours.
+        """
+        if misfit > HOPELESS:
+            return self
+        logs, bad, owner = list[Log](), list[BadSamples](), list[int]()
+        with self.recorded.halt.closing():
+            for one, of in zip(self.recorded.logs, self.owner, strict=True):
+                log, found = _of_log(plant, one, self.recorded.drive, misfit)
+                pieces = _pieces(log, one, found)
+                logs += pieces
+                owner += [of] * len(pieces)
+                bad += found
+        if not bad:
+            return self
+        return Corrected(self.recorded.of(logs), (*self.bad, *bad), tuple(owner))
+
+    def reported(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
+        """The fit of all pieces as one of the given logs, that says what became of them."""
+        fit = replace(fit, remarks=(*given.remarks, *fit.remarks))
+        if not self.bad:
+            return fit
+        logs = []
+        for i in range(len(given.logs)):
+            own = [one for one, of in zip(fit.logs, self.owner, strict=True) if of == i]
+            logs.append(
+                replace(
+                    own[0],
+                    position_rms=_together([one.position_rms for one in own]),
+                    force_rms=None if own[0].force_rms is None
+                    else _together([one.force_rms or 0.0 for one in own]),
+                    chi_square=float(np.mean([one.chi_square for one in own])),
+                )
+            )  # fmt: skip
+        said = (*(f"{one.line}, since the run contradicts it" for one in self.bad), *fit.remarks)
+        return replace(fit, bad=self.bad, remarks=said, logs=tuple(logs))
+
+
+def _together(rms: Sequence[float]) -> float:
+    """Root mean square over pieces, of that of each."""
+    return float(np.sqrt(np.mean(np.square(rms))))
 
 
 def _pieces(log: Log, one: MotionLog, found: Sequence[BadSamples]) -> list[Log]:
@@ -352,8 +382,3 @@ def _candidates(x: Array, seen_from: float, least: float = 0.0) -> list[tuple[in
                 rough = float(np.maximum(own[k], usual))
                 found.append((float(share[k]) * length**0.5, k, length, rough))
     return [one[1:] for one in sorted(found, reverse=True)[:MOST_CANDIDATES]]
-
-
-def lines_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:
-    """A line for each finding of a fit."""
-    return tuple(f"{one.line}, since the run contradicts it" for one in fit_bad)

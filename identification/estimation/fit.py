@@ -14,17 +14,12 @@ The equations, with symbols, units and sources: `README.md` here and in each roo
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.contradicted import (
-    CORRECTION_ROUNDS,
-    Corrected,
-    corrected,
-    lines_of,
-)
+from identification.estimation.contradicted import CORRECTION_ROUNDS, Corrected
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
@@ -155,91 +150,49 @@ def _fit(
     if prior is not None and prior.effects:
         fit = _with_effects(prior, recorded, report)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
-    near, given = None, recorded
-    excluded = Excluded((), tuple(range(len(logs))))
+    near, left = None, Corrected.of_nothing(recorded)
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
-        made = corrected(near.plant, recorded, near.misfit)
-        if made.bad:
-            recorded, excluded = made.recorded, excluded.and_of(made)
-            near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
+        left = left.by(near.plant, near.misfit)
+        if left.bad:
+            near = refit(near.plant, left.recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            fit = settled(near.plant, recorded, near.misfit, report)
-            return excluded.reported(fit, given)
-    recorded, found, excluded = _without_bad(recorded, begin, excluded)
+            fit = settled(near.plant, left.recorded, near.misfit, report)
+            return left.reported(fit, recorded)
+    left, found = _without_bad(left, begin, recorded)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
-    fit = finished(found, recorded, settle, report, by=drive, quick=quick)
-    fit = _with_actuator(fit, recorded)
-    return excluded.reported(fit, given)
-
-
-@dataclass(frozen=True)
-class Excluded:
-    """Samples that were excluded, and for each log the number of the given one that it is of."""
-
-    bad: tuple[BadSamples, ...]
-    owner: tuple[int, ...]
-
-    def and_of(self, made: Corrected) -> "Excluded":
-        """With what was found next, in these logs."""
-        return Excluded((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
-
-    def reported(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
-        """The fit of all pieces as one of the given logs, that says what became of them."""
-        fit = replace(fit, remarks=(*given.remarks, *fit.remarks))
-        if not self.bad:
-            return fit
-        logs = []
-        for i in range(len(given.logs)):
-            own = [one for one, of in zip(fit.logs, self.owner, strict=True) if of == i]
-            logs.append(
-                replace(
-                    own[0],
-                    position_rms=_together([one.position_rms for one in own]),
-                    force_rms=None if own[0].force_rms is None
-                    else _together([one.force_rms or 0.0 for one in own]),
-                    chi_square=float(np.mean([one.chi_square for one in own])),
-                )
-            )  # fmt: skip
-        said = (*lines_of(self.bad), *fit.remarks)
-        return replace(fit, bad=self.bad, remarks=said, logs=tuple(logs))
-
-
-def _together(rms: Sequence[float]) -> float:
-    """Root mean square over pieces, of that of each."""
-    return float(np.sqrt(np.mean(np.square(rms))))
+    fit = finished(found, left.recorded, settle, report, by=drive, quick=quick)
+    return left.reported(_with_actuator(fit, left.recorded), recorded)
 
 
 def _without_bad(
-    recorded: RecordedLogs, rng: np.random.Generator, excluded: Excluded
-) -> tuple[RecordedLogs, FittedStructure, Excluded]:
-    """The logs without the samples that the plain plant contradicts, that plant, and those samples.
+    begun: Corrected, rng: np.random.Generator, given: RecordedLogs
+) -> tuple[Corrected, FittedStructure]:
+    """The logs without the samples that the plain plant contradicts, and that plant.
 
     Searched where the plant follows the logs but for a few places; again from the plant without
     what was found. A run that contradicts a log in more than a handful of places is a wrong model,
     and nothing is excluded for it.
     """
-    given, none = recorded, excluded
-    found = first = plain_structure(recorded, rng)
+    left, found = begun, plain_structure(begun.recorded, rng)
+    first = found
     for seed in rng.spawn(CORRECTION_ROUNDS):
-        if found.imposed or recorded.halt.reached():
+        if found.imposed or given.halt.reached():
             break
-        with recorded.halt.closing():
-            made = corrected(found.plant, recorded, found.misfit)
-        if made.bad:  # or the run is not at its minimum yet
-            found = over_long_runs(found, recorded)
-            with recorded.halt.closing():
-                made = corrected(found.plant, recorded, found.misfit)
-        if not made.bad:
+        made = left.by(found.plant, found.misfit)
+        if made is not left:  # or the run is not at its minimum yet
+            found = over_long_runs(found, left.recorded)
+            made = left.by(found.plant, found.misfit)
+        if made is left:
             break
-        if not are_few((*excluded.bad, *made.bad), given.logs):
-            return given, first, none
+        if not are_few(made.bad, given.logs):
+            return begun, first
         again = plain_structure(made.recorded, seed)
         if again.misfit > max(found.misfit, COMPLETE):
             break
-        recorded, found, excluded = made.recorded, again, excluded.and_of(made)
-    return recorded, found, excluded
+        left, found = made, again
+    return left, found
 
 
 def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStructure:

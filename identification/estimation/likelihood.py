@@ -21,7 +21,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadModel
-from identification.estimation.contradicted import CORRECTION_ROUNDS, corrected
+from identification.estimation.contradicted import CORRECTION_ROUNDS, Corrected
 from identification.estimation.gauss_newton import smooth_jacobian
 from identification.estimation.imposed_motion import force_fit
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
@@ -88,12 +88,10 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
     recorded = recorded_logs(logs, rig, fit.drive)
     if fit.imposed:
         return _by_force(recorded)
-    plant = Plant(fit.friction, fit.actuator, fit.effects)
-    left = misfit(plant, recorded.logs, recorded.drive)
+    plant, left = Plant(fit.friction, fit.actuator, fit.effects), Corrected.of_nothing(recorded)
     for _ in range(CORRECTION_ROUNDS if fit.bad else 0):
-        recorded = corrected(plant, recorded, left).recorded
-        left = misfit(plant, recorded.logs, recorded.drive)
-    return _over_windows(fit, plant, recorded)
+        left = left.by(plant, misfit(plant, left.recorded.logs, recorded.drive))
+    return _over_windows(fit, plant, left.recorded)
 
 
 def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:
