@@ -15,19 +15,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray, IntArray
+from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.equation_rows import (
+    NOTHING_KNOWN,
+    MotionLog,
+    mechanical,
+)
 from identification.estimation.regression.motion_log import (
     LEAST_SAMPLES,
     WINDOW_SECONDS,
     motion_log,
 )
 from identification.estimation.regression.weighted_rows import (
-    BLOCKS,
+    Rows,
     least_squares,
     left_out,
     spread_of_left_out,
+    stacked,
 )
 from identification.log import Log, Rig
 from identification.model.size import Size
@@ -46,13 +51,11 @@ BESIDE_ORDER = np.array([-0.5, -0.25, 0.25, 0.5])  # where no order may fit bett
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
-    """Rows of the equation of all logs: force b (r,), columns X (r, 7) of friction, inertia and
-    gravity; windows and angles [rad] of each log, and which of their rows count; highest order
-    that they show."""
+    """Rows of the equation of all logs, with gravity's columns beside inertia's and friction's;
+    windows and angles [rad] of each log, and which of their rows count; highest order that they
+    show."""
 
-    b: Array
-    X: Array
-    block: IntArray
+    rows: Rows
     angles: tuple[tuple[WeakWindows, Array], ...]
     counts: BoolArray
     highest: int
@@ -67,14 +70,16 @@ class _Turning:
 
     def without_outliers(self, chosen: Sequence[int]) -> "_Turning":
         """The rows that a model of these orders does not leave far outside."""
-        columns = np.column_stack([self.X, *(self.pair(n) for n in chosen)])
-        rest = np.abs(self.b - columns @ least_squares(columns, self.b))
-        kept = rest <= OUTLYING_ROW * float(np.median(rest))
+        columns, b = self.with_pairs(chosen), self.rows.b
+        rest = np.abs(b - columns @ least_squares(columns, b))
+        kept: BoolArray = rest <= OUTLYING_ROW * float(np.median(rest))
         counts = self.counts.copy()
         counts[counts] = kept
-        return replace(
-            self, b=self.b[kept], X=self.X[kept], block=self.block[kept], counts=counts
-        )  # fmt: skip
+        return replace(self, rows=self.rows.at(kept), counts=counts)
+
+    def with_pairs(self, chosen: Sequence[int]) -> Array:
+        """All columns with those of these orders."""
+        return np.column_stack([self.rows.X, *(self.pair(n) for n in chosen)])
 
 
 def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
@@ -94,10 +99,12 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     chosen = _chosen(found)
     if not chosen:
         return ()
-    columns = np.column_stack([found.X, *(found.pair(n) for n in chosen)])
-    if not are_most(_left(found.X, found.b), _left(columns, found.b)):
+    columns, b = found.with_pairs(chosen), found.rows.b
+    if not are_most(_left(found.rows.X, b), _left(columns, b)):
         return ()
-    theta, sd = _with_spread(columns, found)
+    theta = least_squares(columns, b)
+    each = left_out(found.rows.block, lambda kept: least_squares(columns[kept], b[kept]))
+    sd = spread_of_left_out(each)
     sizes = [
         Size(-float(value), float(s))
         for value, s in zip(theta[PLAIN_COLUMNS:], sd[PLAIN_COLUMNS:], strict=True)
@@ -122,7 +129,9 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
         raise NotIdentifiable(
             f"{logs[0].name}: fewer than {FEWEST_WINDOWS_OF_A_TURN} windows of sliding"
         )
-    before, after = (float(np.sqrt(_left(one.X, one.b) / len(one.b))) for one in (without, left))
+    before, after = (
+        float(np.sqrt(_left(one.rows.X, one.rows.b) / len(one.rows.b))) for one in (without, left)
+    )
     return before, after
 
 
@@ -145,10 +154,10 @@ def _chosen(found: _Turning) -> tuple[int, ...]:
     """Orders in the order in which they join, each with most of what the others leave."""
     orders = np.arange(2, found.highest + 1)
     pairs = np.stack([found.pair(float(n)) for n in orders])  # (orders, r, 2)
-    base, left = np.linalg.qr(_kept(found.X))[0], found.b
+    base, b = np.linalg.qr(_kept(found.rows.X))[0], found.rows.b
     chosen: list[int] = []
     while len(chosen) < MOST_ORDERS:
-        left = found.b - base @ (base.T @ found.b)
+        left = b - base @ (base.T @ b)
         explained = np.array([_explained(pair, base, left) for pair in pairs])
         best, before = int(np.argmax(explained)), float(left @ left)
         n = int(orders[best])
@@ -180,12 +189,6 @@ def _kept(X: Array) -> Array:
     return np.asarray(X[:, np.any(X != 0.0, axis=0)])
 
 
-def _with_spread(X: Array, found: _Turning) -> tuple[Array, Array]:
-    """Coefficients (c,) and their deviations by leaving out blocks of time."""
-    each = left_out(found.block, lambda kept: least_squares(X[kept], found.b[kept]))
-    return least_squares(X, found.b), spread_of_left_out(each)
-
-
 def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     """Rows of the equation, thinned to so many; None where too few slide."""
     moved: list[MotionLog] = []
@@ -203,25 +206,21 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     rows = sum(len(w.start) for _, w in made)
     if rows < FEWEST_WINDOWS_OF_A_TURN:
         return None
-    X, b, block, angles = [], [], [], []
-    for i, (one, every) in enumerate(made):
-        w = every.every(max(1, rows // THINNED_TO))
-        y, up = np.asarray(one.log["y"]), one.signals["d"][w.middle] > 0
-        rate = w.first @ y
-        friction = (1.0 * up, -1.0 * ~up, rate * up, rate * ~up)
+    parts, angles = [], []
+    for one, every in made:
+        w, y = every.every(max(1, rows // THINNED_TO)), np.asarray(one.log["y"])
+        up = np.asarray(one.signals["d"][w.middle] > 0)
+        own = replace(one, sliding=w, up=up, speed=np.abs(w.first @ y))
+        plain = mechanical(own, NOTHING_KNOWN)
         gravity = (w.mean @ np.sin(y), w.mean @ np.cos(y))
-        X.append(np.column_stack([w.second @ y, *friction, *gravity]))
-        b.append((w.held if held else w.mean) @ np.asarray(one.log["F"]))
-        block.append(BLOCKS * i + w.middle * BLOCKS // len(y))
+        parts.append(replace(plain, X=np.column_stack([plain.X, *gravity])))
         angles.append((w, y))
     longest = max(w.length * one.log.h for one, w in made)
     highest = int(min(2.0 * HIGHEST, 2.0 * np.pi / (speed * longest)))
     if highest < 2:
         return None
-    counts: BoolArray = np.ones(sum(map(len, b)), dtype=bool)
-    return _Turning(
-        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), counts, highest
-    )  # fmt: skip
+    found = stacked(parts)
+    return _Turning(found, tuple(angles), np.ones(len(found.b), dtype=np.bool_), highest)
 
 
 def _windows(one: MotionLog, speed: float) -> WeakWindows:
