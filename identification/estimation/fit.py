@@ -36,17 +36,17 @@ from identification.estimation.recorded_logs import (
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.row_fit import rough
 from identification.estimation.run_or_equation import answered
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
-    search_is_hopeless,
     searched,
 )
 from identification.estimation.surroundings import surrounding_estimates, widened_friction
 from identification.estimation.two_masses import of_two_masses, two_masses
-from identification.estimation.windowed_run.parameters import even
+from identification.estimation.windowed_run.parameters import even, loose
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
@@ -230,7 +230,10 @@ def finished(
     search, other, forced_rng = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, PRESCRIBED_WHY)
-    if not (quick or needs_no_search(found, recorded)):
+    # A motor's stops are searched already.
+    hopeless = loose(found.plant, recorded.drive) and rough(found.outcomes)
+    followed = found.misfit <= COMPLETE and not found.imposed
+    if not (quick or followed or recorded.held or hopeless):
         found = searched(found, recorded, search, report, SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
@@ -240,13 +243,6 @@ def finished(
             again = finished(start, forced, forced_rng, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
     return answered(found, recorded, report, quick=quick)
-
-
-def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
-    """Whether no search for the plain plant is made: it is followed, a motor drives it, whose
-    stops are searched already, or a search is hopeless."""
-    open_to_more = found.imposed or found.misfit > COMPLETE
-    return recorded.held or not open_to_more or search_is_hopeless(found, recorded)
 
 
 def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> KarnoppFit:

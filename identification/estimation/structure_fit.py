@@ -89,7 +89,8 @@ def fitted_structure(
     try:
         free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
         if free and not (missing or on_bristle(plant)):
-            done = _stops_searched(regressed, recorded, rng)
+            stopped = stick_search(plant, logs, drive, rng)
+            done = refit(stopped, logs, drive, prior=prior, effort="near")
             if done.misfit <= followed:
                 return model.refined(done)
         done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)
@@ -115,15 +116,6 @@ def _best_so_far(
     with recorded.halt.closing():
         found += [(one, misfit(one, recorded.logs, recorded.drive)) for one in begun]
     return min(found, key=lambda one: one[1])
-
-
-def _stops_searched(
-    regressed: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator
-) -> Refit:
-    """The regression's plant, its stops searched by themselves, refined on the free run."""
-    logs, drive = recorded.logs, recorded.drive
-    plant = stick_search(regressed.plant, logs, drive, rng)
-    return refit(plant, logs, drive, prior=dict(regressed.prior), effort="near")
 
 
 def _refined(
@@ -166,19 +158,11 @@ def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedS
     if MECHANICAL not in first:
         return _from_first_estimate(stage, first, recorded)
     model = fitted_structure(stage, first, (), recorded, regressed)
-    if model.imposed or model.misfit <= COMPLETE or search_is_hard(model, recorded):
+    # It takes long where nothing brings a run back, and hardly has a chance where much is left.
+    hard = loose(model.plant, recorded.drive) or rough(model.outcomes)
+    if model.imposed or model.misfit <= COMPLETE or hard:
         return model
     return searched(model, recorded, search)
-
-
-def search_is_hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
-    """Whether a search for the plain plant takes long, or hardly has a chance."""
-    return loose(model.plant, recorded.drive) or rough(model.outcomes)
-
-
-def search_is_hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
-    """Whether it takes long and hardly has a chance."""
-    return loose(model.plant, recorded.drive) and rough(model.outcomes)
 
 
 def _from_first_estimate(

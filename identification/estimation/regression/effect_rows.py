@@ -1,6 +1,6 @@
 """Logs and the structure found so far, and an effect's rows beside it in every equation."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -260,22 +260,27 @@ def columns(
 
     Source: weak form, Messenger, Bortz (2021).
     """
-    trials = [
-        {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
-    ] or [dict(shape)]
-    out = []
-    for values in trials:
+
+    def made(values: Values) -> Array:
         if effect.place.feeds:
             assert one.whole is not None
             raw = contribution(effect, values, one.signals, one.log.h, stage.friction)
-            out.append(one.whole.mean @ raw)
-            continue
-        raw = _in_sliding(effect, values, one, stage.friction)
-        if effect.place.drives:
-            out.append(-(one.sliding.mean @ raw))
-        else:
-            out.append(np.where(one.up, 1.0, -1.0) * (one.sliding.mean @ raw))
-    return (out, np.zeros(0)) if effect.linear else ([], out[0])
+            return np.asarray(one.whole.mean @ raw)
+        mean = np.asarray(one.sliding.mean @ _in_sliding(effect, values, one, stage.friction))
+        return -mean if effect.place.drives else np.where(one.up, 1.0, -1.0) * mean
+
+    return _of_each_size(effect, shape, made)
+
+
+def _of_each_size(
+    effect: Effect, shape: Values, made: Callable[[Values], Array]
+) -> tuple[list[Array], Array]:
+    """What is made of an effect with one of its sizes 1 and the others 0, for each; or, of one that
+    has no sizes, of what it is."""
+    if not effect.linear:
+        return [], made(dict(shape))
+    alone = [{name: float(name == one) for name in effect.linear} for one in effect.linear]
+    return [made({**shape, **sizes}) for sizes in alone], np.zeros(0)
 
 
 def _in_sliding(effect: Effect, values: Values, one: MotionLog, friction: Karnopp) -> Array:
@@ -345,11 +350,9 @@ def _stiction(
     signals["d"] = np.ones(len(one.log))
     for low, high in rest_stretches(one, 2):
         signals["d"][low:high] = 0.0
-    trials = [
-        {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
-    ] or [dict(shape)]
-    out = [
-        events.direction * contribution(effect, x, signals, one.log.h, stage.friction)[events.at]
-        for x in trials
-    ]
-    return (out, np.zeros(0)) if effect.linear else ([], out[0])
+
+    def made(values: Values) -> Array:
+        shown = contribution(effect, values, signals, one.log.h, stage.friction)
+        return np.asarray(events.direction * shown[events.at])
+
+    return _of_each_size(effect, shape, made)
