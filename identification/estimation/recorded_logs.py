@@ -8,8 +8,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
     MECHANICAL,
-    NOTHING_KNOWN,
     MotionLog,
     actuator,
 )
@@ -164,21 +164,14 @@ def plain_share(recorded: RecordedLogs) -> float:
 
     Ours: `regression/README.md`, (13).
     """
-    if recorded.held:
-        if any(not len(one.sliding.start) for one in recorded.logs):
-            return 0.0
-        # Near standstill a fine encoder shows what the equation of sliding does not hold.
-        sliding = first_stage(recorded.logs, recorded.by_command)[1].get(MECHANICAL)
-        if sliding is None:
-            return 0.0
-        return share_between(recorded.logs, sliding.rows, sliding.slowest)
-    if recorded.by_command:
-        first = solve_rows(
-            stacked([actuator(one, NOTHING_KNOWN[:3]) for one in recorded.logs])
-        ).theta
-        rows = [actuator(one, first) for one in recorded.logs]
-        return share_between(recorded.logs, stacked(rows))
-    return 0.0
+    if not (recorded.held or recorded.by_command):
+        return 0.0
+    if recorded.held and any(not len(one.sliding.start) for one in recorded.logs):
+        return 0.0
+    # Near standstill a fine encoder shows what the equation of sliding does not hold.
+    stage = first_stage(recorded.logs, recorded.by_command)[1]
+    shown = stage.get(MECHANICAL if recorded.held else ACTUATOR)
+    return share_between(recorded.logs, shown.rows, shown.slowest) if shown else 0.0
 
 
 def recorded_logs(

@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.estimates import beside_in, of_effect, reported_estimate
+from identification.estimation.estimates import effect_estimates, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
 from identification.estimation.regression.motion_log import motion_log
@@ -178,23 +178,13 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
     }  # fmt: skip
     for acting, one in zip(around.cogging, around.orders, strict=True):
         deviations |= {f"{acting.key}.a": one.sine.sd, f"{acting.key}.b": one.cosine.sd}
-    known = {
-        f"{acting.key}.{p.name}": of_effect(
-            p,
-            acting.values[p.name],
-            deviations.get(f"{acting.key}.{p.name}"),
-            beside_in(acting, p),
-        )
-        for acting in around.effects
+    whole = {
+        f"{acting.key}.{p.name}": Estimate(acting.values[p.name], p.unit, reason=WHOLE_NUMBER)
+        for acting in around.cogging
         for p in acting.effect.params
+        if p.name not in ("a", "b")
     }
-    for acting in around.cogging:
-        known |= {
-            f"{acting.key}.{p.name}": Estimate(acting.values[p.name], p.unit, reason=WHOLE_NUMBER)
-            for p in acting.effect.params
-            if p.name not in ("a", "b")
-        }
-    return known
+    return effect_estimates(around.effects, deviations) | whole
 
 
 def widened_friction(
@@ -211,14 +201,8 @@ def widened_friction(
     up = np.concatenate(moves) > 0.0
     ways = {"F_cp": up, "F_cn": ~up}
     out: dict[str, Estimate] = {}
-    for name, one in friction.items():
-        if (
-            name not in NAMES
-            or one.value is None
-            or one.sd is None
-            or one.low is None
-            or one.high is None
-        ):
+    for name, one in ((name, friction[name]) for name in NAMES if name in friction):
+        if one.value is None or one.sd is None or one.low is None or one.high is None:
             continue
         parts = [OF_TAKEN_OUT * one.value]
         if name in ways:
