@@ -127,13 +127,8 @@ def without_estimates(fit: KarnoppFit, share: float) -> KarnoppFit:
         " larger than friction acts (`workbench trace` searches for it), so no estimate is valid"
     )
     values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
-    found = {
-        name: replace(one, value=None, sd=None, low=None, high=None, at_most=None,
-                      reason=reason, assumed=values[name])
-        if name in NAMES else one
-        for name, one in fit.estimates.items()
-    }  # fmt: skip
-    return replace(fit, estimates=found)
+    none = {name: fit.estimates[name].withheld(reason, x) for name, x in values.items()}
+    return replace(fit, estimates={**fit.estimates, **none})
 
 
 def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
@@ -195,9 +190,7 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
         f"motion one way alone: {both.value:.3g} {units_of(rig.motion)[name]}{between} is friction"
         " and any constant force together; log motion both ways"
     )
-    both = replace(both, value=None, sd=None, low=None, high=None, assumed=both.value,
-                   reason=reason)  # fmt: skip
-    return replace(fit, estimates={**fit.estimates, name: both})
+    return replace(fit, estimates={**fit.estimates, name: both.withheld(reason, both.value)})
 
 
 def _slightest_mass(data: Sequence[Rows]) -> float:

@@ -36,6 +36,10 @@ class Estimate:
     assumed: float | None = None
     at_most: float | None = None
 
+    def withheld(self, reason: str, assumed: float) -> "Estimate":
+        """The same parameter without a value, and why."""
+        return Estimate(None, self.unit, reason=reason, assumed=assumed)
+
     @property
     def known(self) -> bool:
         """Whether it is identified: its value, or that it is too small to matter."""
