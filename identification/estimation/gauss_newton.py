@@ -160,8 +160,7 @@ def smooth_jacobian(fun: Callable[[Array], Array], x: Array) -> Array:
     on the other. Ours.
     """
     here = fun(x)
-    down, up = (-jacobian(lambda at: fun(2.0 * x - at), x, here, FINE_STEP),
-                jacobian(fun, x, here, FINE_STEP))  # fmt: skip
+    down, up = (jacobian(fun, x, here, step) for step in (-FINE_STEP, FINE_STEP))
     alike = np.abs(up - down) <= ALIKE * np.maximum(np.abs(up), np.abs(down))
     least = np.where(np.abs(up) <= np.abs(down), up, down)
     return np.where(alike, 0.5 * (up + down), least)

@@ -126,8 +126,7 @@ def lasting_jacobian(
     within next to nothing: no fit finds the parameter by that, and many find a wrong one.
     """
     here = fun(x)
-    up = jacobian(fun, x, here, LASTING_STEP)
-    down = -jacobian(lambda at: fun(2.0 * x - at), x, here, LASTING_STEP)
+    down, up = (jacobian(fun, x, here, step) for step in (-LASTING_STEP, LASTING_STEP))
     apart = np.abs(up - down)
     lasts = apart <= LASTING_SHARE * np.maximum(np.abs(up), np.abs(down))
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
