@@ -80,7 +80,7 @@ def settled(
     values, left = values_of(plant, near.names), min(near.misfit, misfit)
     adequate, events = is_adequate(left), _events(plant, recorded, seconds)
     covariance = _covariance(near, recorded, values, events)
-    logs = tuple(_log_fit(plant, one, recorded.drive, seconds) for one in recorded.logs)
+    logs = tuple(_log_fit(plant, one, recorded.drive, seconds, near.whole) for one in recorded.logs)
     remarks = _remarks(adequate, near, logs, recorded)
     if near.whole:
         runs = [left_in_windows(plant, one, recorded.drive, seconds) for one in recorded.logs]
@@ -185,7 +185,7 @@ def _as_large_as_can_be(plant: Plant, names: Sequence[str], values: Array, event
     return np.maximum(np.abs(values), [largest.get(name, 0.0) for name in names])
 
 
-def _log_fit(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> LogFit:
+def _log_fit(plant: Plant, one: MotionLog, drive: Drive, seconds: float, whole: bool) -> LogFit:
     """What runs leave of a log: of its force too where it is followed whole."""
     r = left_in_windows(plant, one, drive, seconds, even=True)
     y, *F = [CANNOT_BE_FOLLOWED] if r is None else np.sqrt(np.mean(r**2, axis=1)).tolist()
@@ -193,7 +193,7 @@ def _log_fit(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> LogF
         log=one.log.name,
         start=measured_start(one.log),
         position_rms=y * one.noise.y,
-        force_rms=F[0] * one.noise.F if F and seconds > RUN_WINDOW else None,
+        force_rms=F[0] * one.noise.F if F and whole else None,
         chi_square=y**2,
     )
 
