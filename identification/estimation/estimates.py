@@ -19,7 +19,6 @@ from identification.model.plant import units_of
 from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
 from identification.thresholds import AS_GOOD_AS_NONE, EVENTS_NEEDED
 
-CROSSINGS = "crossings of the band's limit"
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
@@ -139,16 +138,21 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
         return None
     side = 1 if name.endswith("n") else 0
     way = ("positive", "negative")[side]
-    for kinds, counts, least, what, add in (
-        ("F_s", events.breakaways, EVENTS_NEEDED, "breakaways", "slow reversals or longer rests"),
-        ("dv_", events.crossings, EVENTS_NEEDED, CROSSINGS, "starts and stops"),
-        (("F_", "dv_"), events.sliding, SLIDING_SAMPLES, "samples of sliding", "motion that way"),
-    ):
-        if name.startswith(kinds) and counts[side] < least:
-            return (
-                f"{log}: {counts[side]} {what} in the {way} direction, at least {least} needed;"
-                f" add {add}"
-            )
+    if name.startswith("F_s") and events.breakaways[side] < EVENTS_NEEDED:
+        return (
+            f"{log}: {events.breakaways[side]} breakaways in the {way} direction, at least"
+            f" {EVENTS_NEEDED} needed; add slow reversals or longer rests"
+        )
+    if name.startswith("dv") and events.crossings[side] < EVENTS_NEEDED:
+        return (
+            f"{log}: {events.crossings[side]} crossings of the band's limit in the {way}"
+            f" direction, at least {EVENTS_NEEDED} needed; add starts and stops"
+        )
+    if events.sliding[side] < SLIDING_SAMPLES:
+        return (
+            f"{log}: {events.sliding[side]} samples of sliding in the {way} direction, at least"
+            f" {SLIDING_SAMPLES} needed; add motion that way"
+        )
     return None
 
 

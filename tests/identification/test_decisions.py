@@ -13,12 +13,12 @@ from tests.test_lengths import ROOT, tree
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
     "contradicted", "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
-    "regressed_plant", "residual_drift", "settling", "structure_fit", "surroundings", "turn_orders",
-    "two_masses",
+    "regressed_plant", "residual_drift", "run_or_equation", "settling", "structure_fit",
+    "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip
 # Names of equations, parameters, signals and remarks, and bounds of what a parameter can be.
 NO_NUMBERS = {
-    "ABSORBED", "ACTUATOR", "AT_REST", "BREAKAWAY", "DELAY", "END_PLACES", "FIVE", "FORCES",
+    "ABSORBED", "ACTUATOR", "AT_REST", "BREAKAWAY", "DELAY", "END_PLACES", "FORCES",
     "GRAVITY", "MECHANICAL", "NAMES", "NEGATIVE", "NO_INFORMATION", "NOT_SIGNALS", "OF_AN_ANGLE",
     "OF_SPEED", "REST", "STUCK", "TURNS", "VISCOUS_NAMES",
 }  # fmt: skip
