@@ -3,7 +3,7 @@
 A gain is a number in SI (with the unit of the command in place of V), or a text with a unit.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -20,6 +20,13 @@ from workbench.cards.units import in_unit_of
 Quantity = Positive | str
 QuantityOrNone = NotNegative | str
 Kind = Literal["PD", "PID", "P-PI", "RST"]
+# Units of the gains; "stiffness" and "damping" are those of what the law gives.
+GAIN_UNITS: Mapping[Kind, Mapping[str, str]] = {
+    "PD": {"k_d": "stiffness", "T_d": "s", "eps": "s"},
+    "PID": {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
+    "P-PI": {"k_v": "1/s", "k_p": "damping", "T_i": "s", "eps": "s", "v_ff": "1"},
+    "RST": {},
+}
 
 
 @dataclass(frozen=True)
@@ -72,10 +79,6 @@ class _Common(CardTable):
     anti_windup_s: NotNegative | Literal["none"] | None = None
     """time in which its sum forgets what a limit cut off; without it T_i"""
 
-    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
-        """Names of the gains and their units; output: unit of what the controller gives."""
-        return iter(())
-
     def value(self, rig: Rig) -> CardController:
         """The controller; raises BadCard where a gain's unit is of another kind."""
         units = shown(rig.motion == "rotary", rig.command_unit)
@@ -86,10 +89,12 @@ class _Common(CardTable):
                 ' for, output = "force"; a motor has none'
             )
         given = units.force if output == "force" else units.command
-        gains = {
-            name: Estimate(_quantity(getattr(self, name), unit, name), unit)
-            for name, unit in self.units(over(given, units.position), given)
-        }
+        stiffness = over(given, units.position)
+        of_law = {"stiffness": stiffness, "damping": _times_second(stiffness)}
+        gains = dict[str, Estimate]()
+        for name, of in GAIN_UNITS[self.kind].items():
+            unit = of_law.get(of, of)
+            gains[name] = Estimate(_quantity(getattr(self, name), unit, name), unit)
         T_i = gains["T_i"].value if "T_i" in gains else None
         forget = T_i if self.anti_windup_s is None else self.anti_windup_s
         rate = self.reference_rate
@@ -123,10 +128,6 @@ class PresentPD(_Common):
     eps: Quantity
     """s, or a text"""
 
-    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
-        """See `_Common.units`."""
-        yield from (("k_d", per_length), ("T_d", "s"), ("eps", "s"))
-
 
 class PresentPID(_Common):
     """A PID as a card writes it."""
@@ -146,11 +147,6 @@ class PresentPID(_Common):
     c: NotNegative = 1.0
     """share of the reference in the derivative"""
 
-    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
-        """See `_Common.units`."""
-        times = (("T_i", "s"), ("T_d", "s"), ("eps", "s"))
-        yield from (("k_R", per_length), *times, ("b", "1"), ("c", "1"))
-
 
 class PresentPPI(_Common):
     """A position P above a speed PI as a card writes it."""
@@ -167,12 +163,6 @@ class PresentPPI(_Common):
     """v is the difference of y behind 1/(eps s + 1)"""
     v_ff: NotNegative = 0.0
     """share of the reference's speed that is fed forward"""
-
-    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
-        """See `_Common.units`."""
-        over_length, _, length = per_length.rpartition("/")
-        speed_gain = f"{over_length} s/{length}" if over_length not in ("", "1") else f"s/{length}"
-        yield from (("k_v", "1/s"), ("k_p", speed_gain), ("T_i", "s"), ("eps", "s"), ("v_ff", "1"))
 
 
 class PresentRST(_Common):
@@ -191,6 +181,12 @@ class PresentRST(_Common):
 ControllerSection = Annotated[
     PresentPD | PresentPID | PresentPPI | PresentRST, Field(discriminator="kind")
 ]
+
+
+def _times_second(stiffness: str) -> str:
+    """The unit over a speed, of one over a length."""
+    above, _, length = stiffness.rpartition("/")
+    return f"s/{length}" if above in ("", "1") else f"{above} s/{length}"
 
 
 def _quantity(written: float | str, unit: str, name: str) -> float:

@@ -10,7 +10,7 @@ from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit
-from workbench.cards.units import NUMBER_AND_UNIT, Motion, conversion
+from workbench.cards.units import Motion, conversion, number_and_unit
 
 _COMMAND = re.compile(r"\bV\b")
 _SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
@@ -127,18 +127,18 @@ def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
 
 def _with_unit(where: str, text: str, unit: str, example: str) -> float:
     """The number in `text` in SI; raises BadModel where it is of another kind than `unit`."""
-    found = NUMBER_AND_UNIT.fullmatch(text)
-    if found is None:
+    number, own = number_and_unit(text)
+    if number is None:
         raise BadModel(f'{where} = {text!r}: no number with a unit; write it as "{example}"')
     try:
-        scale = conversion(found[2], unit)
+        scale = conversion(own, unit)
     except BadCard as error:
         raise BadModel(f"{where}: {error}; {unit!r} needed") from None
     if scale is None:
         raise BadModel(
-            f'{where}: unit {found[2]!r} is of another kind than {unit!r}; write it as "{example}"'
+            f'{where}: unit {own!r} is of another kind than {unit!r}; write it as "{example}"'
         )
-    return scale.factor * float(found[1]) + scale.shift
+    return scale.factor * number + scale.shift
 
 
 def _example(effect: Effect, name: str) -> str:

@@ -118,65 +118,31 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     " i2t gain trigger 状態 異常 電力 trust feedforward vorsteuerung humidity frequency frequenz"
     " load_cycle checksum crc latency",
 }
-_SHORT: Mapping[str, Mapping[Quantity, float]] = {  # whole words of up to three letters
-    "t": {"time": 3.0, "temperature": 0.5},
-    "y": {"position": 3.0},
-    "x": {"position": 3.0},
-    "z": {"position": 2.0},
-    "q": {"position": 2.0},
-    "s": {"position": 1.5},
-    "v": {"velocity": 2.0, "command": 0.5},
-    "w": {"velocity": 0.5},
-    "a": {"acceleration": 1.0},
-    "f": {"force": 3.0},
-    "m": {"force": 0.5},
-    "p": {"pressure": 2.5},
-    "u": {"command": 3.0},
-    "i": {"command": 1.5, "count": 0.5},
-    "n": {"count": 1.0, "velocity": 0.5},
-    "k": {"count": 1.0},
-    "nr": {"count": 2.0},
-    "no": {"count": 2.0},
-    "pa": {"pressure": 2.0},
-    "pb": {"pressure": 2.0},
-    "pp": {"pressure": 2.0},
-    "pn": {"pressure": 2.0},
-    "tau": {"force": 2.0},
-    "mot": {"command": 1.0},
-    "dt": {"time": 1.0},
-    "iq": {"command": 3.0},
-    "isq": {"command": 3.0},
-    "ia": {"command": 2.5},
-    "im": {"command": 2.0},
-    "amp": {"command": 2.0},
-    "uq": {"command": 2.0},
-    "vq": {"command": 2.0},
-    "ua": {"command": 2.0},
-    "id": {"other": 2.0},
-    "isd": {"other": 2.0},
-    "ud": {"other": 2.0},
-    "vd": {"other": 2.0},
-    "kp": {"other": 2.0},
-    "ki": {"other": 2.0},
-    "kd": {"other": 2.0},
-    "ff": {"other": 1.5},
-    "qd": {"velocity": 2.0},
-    "dq": {"velocity": 2.0},
-    "dx": {"velocity": 2.0},
-    "dy": {"velocity": 2.0},
-    "qdd": {"acceleration": 2.0},
-    "ddq": {"acceleration": 2.0},
-    "acc": {"acceleration": 3.0},
-    "rpm": {"velocity": 3.0},
-    "enc": {"position": 2.0},
-    "alpha": {"position": 1.5},
-    "beta": {"position": 1.5},
-    "psi": {"position": 1.5},
-    "trq": {"force": 3.0},
-    "tor": {"force": 2.0},
-    "in": {"command": 1.0},
-    "out": {"command": 1.0},
+_SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each with its weight
+    "time": "t 3 dt 1",
+    "position": "y 3 x 3 z 2 q 2 s 1.5 enc 2 alpha 1.5 beta 1.5 psi 1.5",
+    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 rpm 3",
+    "acceleration": "a 1 acc 3 qdd 2 ddq 2",
+    "force": "f 3 m 0.5 tau 2 trq 3 tor 2",
+    "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
+    "command": "u 3 i 1.5 v 0.5 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
+    "temperature": "t 0.5",
+    "count": "n 1 k 1 i 0.5 nr 2 no 2",
+    "other": "id 2 isd 2 ud 2 vd 2 kp 2 ki 2 kd 2 ff 1.5",
 }
+
+
+def _short_words() -> dict[str, dict[Quantity, float]]:
+    """What each short word may mean, with its weight."""
+    out: dict[str, dict[Quantity, float]] = {}
+    for quantity, line in _SHORT.items():
+        words = line.split()
+        for word, weight in zip(words[::2], words[1::2], strict=True):
+            out.setdefault(word, {})[quantity] = float(weight)
+    return out
+
+
+_SHORT_WORDS = _short_words()
 _ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque",
            "トルク", "drehmoment", "motormoment", "drehzahl", "omega", "rpm", "elbow", "knee",
            "wrist", "shoulder", "pendulum", "pendel", "関節")  # fmt: skip
@@ -287,8 +253,8 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
     """Weight of each quantity that the words mean, by the longest part that each contains."""
     found: dict[Quantity, float] = {}
     for word in words:
-        if word in _SHORT:
-            for quantity, weight in _SHORT[word].items():
+        if word in _SHORT_WORDS:
+            for quantity, weight in _SHORT_WORDS[word].items():
                 found[quantity] = max(found.get(quantity, 0.0), weight)
             continue
         best: tuple[int, Quantity] | None = None

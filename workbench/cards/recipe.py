@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from identification.arrays import Array
-from identification.effects._base import Acting
 from identification.effects._library import Library, built_in
 from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
@@ -42,10 +41,6 @@ class StepsSection(CardTable):
     dwell_s: Positive
     """time at each level, s"""
 
-    def value(self) -> Steps:
-        """The specification."""
-        return Steps(self.levels, self.dwell_s)
-
 
 class RandomStepsSection(CardTable):
     """`RandomSteps` as a card writes it."""
@@ -57,10 +52,6 @@ class RandomStepsSection(CardTable):
     dwell_s: Positive
     """time at each level, s"""
 
-    def value(self) -> RandomSteps:
-        """The specification."""
-        return RandomSteps(self.amplitude, self.dwell_s)
-
 
 class RampsSection(CardTable):
     """`Ramps` as a card writes it."""
@@ -71,10 +62,6 @@ class RampsSection(CardTable):
     """between minus and plus this size"""
     rate: Positive
     """slope: so much in a second"""
-
-    def value(self) -> Ramps:
-        """The specification."""
-        return Ramps(self.amplitude, self.rate)
 
 
 class MultisineSection(CardTable):
@@ -97,10 +84,6 @@ class MultisineSection(CardTable):
             raise ValueError("high_hz must be above low_hz")
         return self
 
-    def value(self) -> Multisine:
-        """The specification."""
-        return Multisine(self.amplitude, self.low_hz, self.high_hz, self.lines)
-
 
 class SumSection(CardTable):
     """`Sum` as a card writes it."""
@@ -110,15 +93,25 @@ class SumSection(CardTable):
     parts: "tuple[ReferenceSection, ...]" = Field(min_length=1)
     """references that are added"""
 
-    def value(self) -> Sum:
-        """The specification."""
-        return Sum(tuple(part.value() for part in self.parts))
-
 
 ReferenceSection = Annotated[
     StepsSection | RandomStepsSection | RampsSection | MultisineSection | SumSection,
     Field(discriminator="kind"),
 ]
+
+
+def specification(written: ReferenceSection) -> ReferenceSpec:
+    """The reference that a card writes so."""
+    match written:
+        case StepsSection():
+            return Steps(written.levels, written.dwell_s)
+        case RandomStepsSection():
+            return RandomSteps(written.amplitude, written.dwell_s)
+        case RampsSection():
+            return Ramps(written.amplitude, written.rate)
+        case MultisineSection():
+            return Multisine(written.amplitude, written.low_hz, written.high_hz, written.lines)
+    return Sum(tuple(map(specification, written.parts)))
 
 
 def multisines(reference: ReferenceSection) -> list[MultisineSection]:
@@ -356,15 +349,23 @@ class RecipeSection(CardTable):
         beside = self.loop.compensator if self.loop else None
         if beside and beside.friction:
             _ = beside.friction.value  # refused here, not in the simulation
-        known = library or (_installed() if self.effects else built_in())
-        effects = tuple(self._effect(key, known, motion, command) for key in self.effects)
-        plant = Plant(self.friction.value, drive, effects)
+        if self.effects and not library:
+            from workbench.cards import own_effects  # with it comes numba
+
+            library = own_effects.library()
+        try:
+            effects = tuple(
+                written_effect(key, written, library or built_in(), motion, command)
+                for key, written in self.effects.items()
+            )
+        except BadModel as error:
+            raise BadModel(f"effects: {error}") from None
         return Recipe(
-            plant=plant,
+            plant=Plant(self.friction.value, drive, effects),
             duration=self.duration_s,
             h=self.h_s,
             loop=self.loop,
-            reference=self.reference.value(),
+            reference=specification(self.reference),
             noise_F=self.noise_F,
             noise_y=self.noise_y,
             noise_p=self.noise_p,
@@ -372,15 +373,3 @@ class RecipeSection(CardTable):
             drive=self.drive,
             mean_pressure=self.mean_pressure_pa,
         )
-
-    def _effect(self, key: str, library: Library, motion: Motion, command: str) -> Acting:
-        try:
-            return written_effect(key, self.effects[key], library, motion, command)
-        except BadModel as error:
-            raise BadModel(f"effects: {error}") from None
-
-
-def _installed() -> Library:
-    from workbench.cards.own_effects import library
-
-    return library()

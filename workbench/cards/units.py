@@ -67,19 +67,6 @@ def commands(motion: Motion) -> tuple[str, ...]:
     return ("V", "A", "1", _FORCE_UNIT[motion])
 
 
-def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
-    """Factor and shift from `unit` to SI for a signal of this name.
-
-    The command `u` may be a voltage, a current, a pure number (duty) or a force. A temperature
-    becomes kelvin. Raises BadCard where the unit is unknown or of the wrong dimension; the caller
-    says in which file.
-    """
-    found = scale_or_none(unit, signal, motion)
-    if found is None:
-        raise BadCard(f"signals.{signal}: unit {unit!r} is not {kind(signal, motion)}")
-    return found
-
-
 def scale_or_none(
     unit: str,
     signal: str,
@@ -87,9 +74,10 @@ def scale_or_none(
     per: str | None = None,
     command: str | None = None,
 ) -> Scale | None:
-    """As `scale`, of `unit` over the unit `per`; None where the dimension is wrong.
+    """Factor and shift to SI from `unit`, or `unit` over `per`, for a signal of this name.
 
-    command: the unit in which a command is held, by default any of `commands`.
+    A temperature becomes kelvin. command: the unit in which a command is held, by default any of
+    `commands`. None where the dimension is wrong; raises BadCard where a unit is unknown.
     """
     need = command if signal == "u" and command else si_unit(signal, motion)
     if unit == need and per is None:
@@ -164,7 +152,9 @@ def _registry() -> "pint.UnitRegistry[float]":
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
-_GAIN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)?\s*(.*?)\s*", re.DOTALL)
+_NUMBER_AND_UNIT = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)?\s*(.*?)\s*", re.DOTALL
+)
 _OUTPUTS = ("V", "A", "1")  # what sensors give; a number as gain is taken for these only
 
 
@@ -175,23 +165,25 @@ class Gain(NamedTuple):
     unit: str | None
 
 
+def number_and_unit(text: str) -> tuple[float | None, str]:
+    """The number with which the text begins, if any, and what stands behind it."""
+    found = _NUMBER_AND_UNIT.fullmatch(text)
+    assert found is not None  # both parts may be empty
+    return None if found[1] is None else float(found[1]), found[2]
+
+
 def parse_gain(gain: float | str) -> Gain:
     """The gain as a card writes it; raises ValueError, in words, where it is none or 0."""
-    if isinstance(gain, str):
-        if len(gain) > LONGEST_UNIT:
-            raise ValueError('gain is too long; write it as in gain = "80 V/m"')
-        found = _GAIN.fullmatch(gain)
-        number, unit = found.groups() if found else (None, "")
-        parsed = Gain(1.0 if number is None else float(number), unit or None)
-        if number is None and parsed.unit is None:
-            raise ValueError('gain is empty; write it as in gain = "80 V/m"')
-        if unit[:1] in (",", ".", ";"):
-            raise ValueError('gain is no number with a unit; write it as in gain = "80.5 V/m"')
-    else:
-        parsed = Gain(gain, None)
-    if parsed.number == 0.0 or not math.isfinite(parsed.number):
+    if isinstance(gain, str) and len(gain) > LONGEST_UNIT:
+        raise ValueError('gain is too long; write it as in gain = "80 V/m"')
+    number, unit = number_and_unit(gain) if isinstance(gain, str) else (gain, "")
+    if number is None and not unit:
+        raise ValueError('gain is empty; write it as in gain = "80 V/m"')
+    if unit.startswith((",", ".", ";")):
+        raise ValueError('gain is no number with a unit; write it as in gain = "80.5 V/m"')
+    if number == 0.0 or not math.isfinite(number or 1.0):
         raise ValueError("gain must not be 0 or infinite")
-    return parsed
+    return Gain(1.0 if number is None else number, unit or None)
 
 
 def command_unit(unit: str, gain: float | str | None, motion: Motion) -> str:
@@ -267,30 +259,26 @@ def _per(signal: str, motion: Motion) -> str:
     return f"({need})" if " " in need else need
 
 
-NUMBER_AND_UNIT = re.compile(
-    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL
-)
-
-
 def in_unit_of(written: float | str | None, unit: str, where: str) -> float | None:
     """The number in `unit`, of a number (which is in it) or a text with a unit of its own.
 
     Raises BadCard, naming `where`, where the text is no number with a unit of that kind.
     """
-    if written is None or not isinstance(written, str):
+    if not isinstance(written, str):
         return written
-    found = NUMBER_AND_UNIT.fullmatch(written) if len(written) <= LONGEST_UNIT else None
-    if found is None:
+    number, own = number_and_unit(written) if len(written) <= LONGEST_UNIT else (None, "")
+    if number is None:
         raise BadCard(
             f"{where} = {written[:40]!r}: a number needed, or one with a unit as {unit!r}"
         )
-    number, own = float(found[1]), found[2]
     if not math.isfinite(number):
         raise BadCard(f"{where} = {written[:40]!r}: a finite number needed")
+    if own in ("", unit):
+        return number
     try:
-        scale = conversion(own, unit) if own and own != unit else None
+        scale = conversion(own, unit)
     except BadCard as error:
         raise BadCard(f"{where}: {error}; {unit!r} needed") from None
-    if own and own != unit and scale is None:
+    if scale is None:
         raise BadCard(f"{where}: unit {own!r} is of another kind than {unit!r}")
-    return number if scale is None else scale.factor * number + scale.shift
+    return scale.factor * number + scale.shift

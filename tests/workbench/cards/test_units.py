@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.errors import BadCard
-from workbench.cards.units import Motion, scale
+from workbench.cards.units import Motion, column_scale
 
 
 @pytest.mark.parametrize(
@@ -30,16 +30,16 @@ from workbench.cards.units import Motion, scale
     ],
 )
 def test_known_conversions(unit: str, signal: str, motion: Motion, factor: float) -> None:
-    found = scale(unit, signal, motion)
+    found = column_scale(unit, None, signal, motion)
     assert found.factor == pytest.approx(factor, rel=1e-10)
     assert found.shift == 0.0
 
 
 def test_temperature_has_an_offset() -> None:
-    found = scale("degC", "temperature")
+    found = column_scale("degC", None, "temperature", "linear")
     assert found.factor == pytest.approx(1.0)
     assert found.shift == pytest.approx(273.15)
-    assert scale("degF", "temperature").factor == pytest.approx(5 / 9)
+    assert column_scale("degF", None, "temperature", "linear").factor == pytest.approx(5 / 9)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_temperature_has_an_offset() -> None:
 )
 def test_wrong_units_are_refused(unit: str, signal: str, message: str) -> None:
     with pytest.raises(BadCard) as caught:
-        scale(unit, signal)
+        column_scale(unit, None, signal, "linear")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -70,7 +70,9 @@ def test_wrong_units_are_refused(unit: str, signal: str, message: str) -> None:
 )
 def test_lengths_scale_by_their_prefix(unit: str, value: float) -> None:
     sizes = {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "inch": 0.0254, "um": 1e-6}
-    assert value * scale(unit, "y").factor == pytest.approx(value * sizes[unit], rel=1e-12)
+    assert value * column_scale(unit, None, "y", "linear").factor == pytest.approx(
+        value * sizes[unit], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -87,10 +89,10 @@ def test_lengths_scale_by_their_prefix(unit: str, value: float) -> None:
 )
 def test_units_that_would_be_worked_out_for_ever_are_unknown(unit: str) -> None:
     with pytest.raises(BadCard, match="is unknown; write it as in") as caught:
-        scale(unit, "y", "linear")
+        column_scale(unit, None, "y", "linear")
     assert len(str(caught.value)) < 200
 
 
 @pytest.mark.parametrize("unit", ["kg m^2/s^2", "kg*m**2*s**-2", "kg m² s^(-2)", "(m/s)^2 kg"])
 def test_powers_of_sound_units_are_read(unit: str) -> None:
-    assert scale(unit, "F", "rotary").factor == pytest.approx(1.0)
+    assert column_scale(unit, None, "F", "rotary").factor == pytest.approx(1.0)
