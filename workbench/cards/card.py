@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -168,12 +169,9 @@ _DEEP = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+)
 
 
 def _recipe_signals(rig: RigSection) -> dict[str, SignalSpec]:
-    linear = rig.motion == "linear"
-    position, force = ("m", "N") if linear else ("rad", "N m")
-    command = rig.command_unit or "V"
-    units = {"t": "s", "r": position, "y": position, "F": force, "u": command}
-    if rig.kind == "electro-pneumatic":
-        units = {"t": "s", "r": position, "y": position, "p_p": "Pa", "p_n": "Pa", "u": command}
+    names = ("F",) if rig.kind != "electro-pneumatic" else ("p_p", "p_n")
+    units = {name: str(si_unit(name, rig.motion)) for name in ("t", "r", "y", *names)}
+    units["u"] = rig.command_unit or "V"
     return {name: SignalSpec(column=name, unit=unit) for name, unit in units.items()}
 
 
@@ -188,20 +186,14 @@ def _need_signals(
                 f"{path}: {where} kind = {rig.kind!r} needs signals.{name}{nearest(name, others)};"
                 f' add {name} = {{ column = "<its name in the log>", unit = "{unit}" }}'
             )
-    _refuse_twice(path, signals)
-
-
-def _refuse_twice(path: Path, signals: Mapping[str, SignalSpec]) -> None:
-    """Raises BadCard where time or position is read from the column of another signal."""
-    for name in ("t", "y"):
-        for other in _OWN_COLUMN_SIGNALS:
-            if other != name and other in signals and name in signals:
-                column = signals[name].column
-                if signals[other].column == column:
-                    raise BadCard(
-                        f"{path}: signals.{name} and signals.{other} are both read from the column"
-                        f" {column!r}; correct one of them"
-                    )
+    for name, other in product(("t", "y"), _OWN_COLUMN_SIGNALS):
+        if other != name and {name, other} <= signals.keys():
+            column = signals[name].column
+            if signals[other].column == column:
+                raise BadCard(
+                    f"{path}: signals.{name} and signals.{other} are both read from the column"
+                    f" {column!r}; correct one of them"
+                )
 
 
 def _check_split(path: Path, parsed: CardFile) -> None:

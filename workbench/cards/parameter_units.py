@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
@@ -72,19 +72,16 @@ def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:
             f" {unit!r}, or run 'workbench identify' again"
         )
 
-    def si(value: float | None) -> float | None:
-        return None if value is None else found.factor * value + found.shift
+    return scaled(estimate, unit, found.factor, found.shift)
 
-    return replace(
-        estimate,
-        value=si(estimate.value),
-        unit=unit,
-        sd=None if estimate.sd is None else found.factor * estimate.sd,
-        low=si(estimate.low),
-        high=si(estimate.high),
-        assumed=si(estimate.assumed),
-        at_most=None if estimate.at_most is None else found.factor * estimate.at_most,
-    )
+
+def scaled(estimate: Estimate, unit: str, factor: float, shift: float = 0.0) -> Estimate:
+    """The estimate in `unit`: factor times its numbers, and `shift` for those that are no width."""
+    shifts = dict.fromkeys(("value", "low", "high", "assumed"), shift)
+    shifts |= {"sd": 0.0, "at_most": 0.0}
+    numbers = {name: (getattr(estimate, name), by) for name, by in shifts.items()}
+    found: dict[str, Any] = {n: factor * x + by for n, (x, by) in numbers.items() if x is not None}
+    return replace(estimate, unit=unit, **found)
 
 
 def converted(written: Estimate, found: Estimate, where: str) -> str | None:

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import NamedTuple
 
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import shown
+from workbench.cards.parameter_units import scaled, shown
 
 SHOWN_DIGITS = 6
 SHOWN_UNITS = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "N/Pa": ("N/bar", 1e5)}
@@ -79,14 +78,7 @@ def as_shown(estimate: Estimate) -> Estimate:
     unit, factor = shown_unit(estimate.unit)
     if estimate.value is None or factor == 1.0:
         return estimate
-
-    def scaled(value: float | None) -> float | None:
-        return None if value is None else factor * value
-
-    return replace(
-        estimate, unit=unit, value=scaled(estimate.value), sd=scaled(estimate.sd),
-        low=scaled(estimate.low), high=scaled(estimate.high),
-    )  # fmt: skip
+    return scaled(estimate, unit, factor)
 
 
 def in_digits(values: Iterable[float], size: float, sd: float | None) -> list[str]:

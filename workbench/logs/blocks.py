@@ -82,30 +82,27 @@ def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
             f"{path}: holds {len(blocks)} tables one below the other, of the same columns (rows"
             f" again from line {blocks[1].first + 1}): several runs, it seems; give each a file"
         )
-    names, groups, clocks, places = (
-        list[str](),
-        list[str](),
-        dict[str, int](),
-        list[tuple[int, int]](),
-    )
+    columns, clocks = list[tuple[str, str, Block, int]](), dict[str, int]()
     for k, (block, own) in enumerate(zip(blocks, called, strict=True)):
-        group = own if own not in groups else f"{own} {k + 1}"
+        group = own if own not in clocks else f"{own} {k + 1}"
         heads = _heads(block)
-        clocks[group] = len(names)
+        clocks[group] = len(columns)
         for column in range(block.width):
-            plain = own if block.width == PAIR else heads[column] if heads else f"{own} {column}"
-            plain += _unit(block) if block.width == PAIR else ""
-            names.append((heads[0] if heads else "time") if column == 0 else plain)
-            groups.append(group)
-            places.append((k, column))
+            if column == 0:
+                name = heads[0] if heads else "time"
+            elif block.width == PAIR:
+                name = own + _unit(block)
+            else:
+                name = heads[column] if heads else f"{own} {column}"
+            columns.append((name, group, block, column))
+    names, groups, *_ = zip(*columns, strict=True)
 
     def fetch(number: int) -> RawColumn:
-        k, column = places[number]
-        one = blocks[k]
+        *_, one, column = columns[number]
         cells = (_fields(row, one.mark)[column] for row in one.rows)
         return np.array([float(cell.replace(decimal, ".")) if cell else np.nan for cell in cells])
 
-    return Table(tuple(names), fetch, blocks[0].first + 1, True, tuple(groups), clocks)
+    return Table(names, fetch, blocks[0].first + 1, True, groups, clocks)
 
 
 def decimal_of(blocks: Sequence[Block]) -> str:

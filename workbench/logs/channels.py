@@ -80,14 +80,18 @@ def read_tdms(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, BINARY_BYTES, "a TDMS file", BadLog)
     library = optional("nptdms", "tdms", path)
     channels = list[Channel]()
+
+    def values(group: str, name: str) -> RawColumn:
+        with _opened_tdms(library, path) as file:
+            return np.asarray(file[group][name][:])
+
     with _opened_tdms(library, path) as file:
         begun = _first_start(file)
         for group in file.groups():
             names = [channel.name for channel in group.channels()]
-            for channel in group.channels():
+            for name, channel in zip(names, group.channels(), strict=True):
                 refuse_long(path, len(channel))
-                where = (library, path, group.name, channel.name)
-                channels.append(Channel(group.name, channel.name, partial(_values, *where)))
+                channels.append(Channel(group.name, name, partial(values, group.name, name)))
             clock = next((c for c in group.channels() if _has_clock(c)), None)
             if clock is not None and _WAVEFORM_CLOCK not in names:
                 times = partial(_times, len(clock), dict(clock.properties), begun)
@@ -100,11 +104,6 @@ def _opened_tdms(library: Any, path: Path) -> Iterator[Any]:
     library.log.log_manager.set_level(logging.ERROR)  # of a file cut off it reads what is there
     with path.open("rb") as stream, library.TdmsFile.open(stream) as file:
         yield file
-
-
-def _values(library: Any, path: Path, group: str, name: str) -> RawColumn:
-    with _opened_tdms(library, path) as file:
-        return np.asarray(file[group][name][:])
 
 
 def _has_clock(channel: Any) -> bool:
@@ -146,7 +145,8 @@ def read_mdf(path: Path, spec: FileSpec) -> Table:
     library = optional("asammdf", "mdf", path)
     channels = list[Channel]()
     with _opened_mdf(library, path) as file:
-        names = [_group_name(group, number) for number, group in enumerate(file.groups)]
+        given = (getattr(group.channel_group, "acq_name", "") for group in file.groups)
+        names = [str(name or "").strip() or f"group {k}" for k, name in enumerate(given)]
         for number, group in enumerate(file.groups):
             name = names[number]
             if names.count(name) > 1:
@@ -180,12 +180,6 @@ def _close_half_read(error: Exception) -> None:
         if type(half).__name__ == "MDF4":
             half.header = half.identification = None  # which its close takes to be there
             half.close()
-
-
-def _group_name(group: Any, number: int) -> str:
-    channel_group = group.channel_group
-    named = getattr(channel_group, "acq_name", "") or ""
-    return str(named).strip() or f"group {number}"
 
 
 def _values_of(library: Any, path: Path, group: int, index: int, clock: bool) -> RawColumn:
@@ -225,12 +219,10 @@ def read_ulog(path: Path, spec: FileSpec) -> Table:
         file = library.ULog(stream, only)
     if file.file_corruption:
         raise BadLog(f"{path}: damaged or cut off, records are broken; copy it again")
-    return channel_table(path, list(_channels(path, file)), spec)
-
-
-def _channels(path: Path, file: Any) -> Iterator[Channel]:
+    channels = list[Channel]()
     for message in file.data_list:
         group = f"{message.name}[{message.multi_id}]" if message.multi_id else message.name
         for name, values in message.data.items():
             refuse_long(path, len(values))
-            yield Channel(group, name, partial(np.asarray, values))
+            channels.append(Channel(group, name, partial(np.asarray, values)))
+    return channel_table(path, channels, spec)

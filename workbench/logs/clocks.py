@@ -1,6 +1,7 @@
-"""Signals of several groups of one file, each on its own clock, brought to the clock of one."""
+"""Groups of one file, each on a clock of its own: found in one table by a clock before the columns
+it is of, and brought to the clock of one."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,82 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.remarks import MinorRemark
 from identification.signals.clean import LONGEST_GAP, at_times
+from workbench.cards.headers import read_header
+from workbench.logs.table import RawColumn
 
+FEWEST_GROUPS = 2
+STEPS_ALIKE = 0.5  # of the median step, that most steps of a clock are off it at most
+MOSTLY_EVEN = 0.8  # of the steps of a clock
+IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
 _SENSED = ("y", "F", "p_p", "p_n")
 FEW_ROWS = 3  # at the end, by which columns of one clock may differ
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
 Clock = Callable[[str], Array]
+
+
+class ClockGroups(NamedTuple):
+    """The group of each column, and the column of each group's clock."""
+
+    groups: tuple[str, ...]
+    clocks: Mapping[str, int]
+
+
+def clock_groups(
+    names: Sequence[str], first: Sequence[Array], fetch: Callable[[int], RawColumn]
+) -> ClockGroups | None:
+    """Groups of columns that each begin with their clock; None where there is one clock.
+
+    Either each column has its own clock before it, or each clock is called one. The clocks differ,
+    and most of their times are the same. first: the first numbers of each column, which spare
+    reading the others.
+    """
+    rising = [k for k, x in enumerate(first) if len(x) > 2 and _even(x)]
+    if len(rising) < FEWEST_GROUPS or rising[0] != 0:
+        return None
+    pairs = list(range(0, len(names), 2))
+    called = [k for k in rising if "time" in read_header(names[k]).means]
+    if not (len(names) % 2 == 0 and set(pairs) <= set(rising)):
+        if len(called) < FEWEST_GROUPS or called[0] != 0:
+            return None
+        pairs = called
+    ends = [*pairs[1:], len(names)]
+    if any(end - begin < 2 for begin, end in zip(pairs, ends, strict=True)):
+        return None
+    times = [_numbers(fetch(k)) for k in pairs]
+    if not _of_one_recording(times):
+        return None
+    groups = list[str]()
+    for begin, end in zip(pairs, ends, strict=True):
+        name = names[begin + 1] if end - begin == 2 else names[begin]
+        groups += [name] * (end - begin)
+    at = {groups[k]: k for k in pairs}
+    return ClockGroups(tuple(groups), at) if len(at) == len(pairs) else None
+
+
+def _numbers(raw: RawColumn) -> Array:
+    """A column of numbers without those that are missing; nothing of one that holds text."""
+    x = np.asarray(raw if raw.dtype.kind in "fiu" else [], dtype=np.float64)
+    return x[np.isfinite(x)]
+
+
+def _even(x: Array) -> bool:
+    """Whether values only go up, by steps mostly alike."""
+    step = np.diff(x)
+    middle = float(np.median(step))
+    if not np.all(step > 0.0):
+        return False
+    return bool(np.mean(np.abs(step - middle) < STEPS_ALIKE * middle) >= MOSTLY_EVEN)
+
+
+def _of_one_recording(times: Sequence[Array]) -> bool:
+    """Whether these are clocks in one unit over one recording, and not all the same one."""
+    if any(len(x) < 2 or not _even(x) for x in times):
+        return False
+    low, high = (float(f(x[at] for x in times)) for f, at in ((max, 0), (min, -1)))
+    longest = max(float(x[-1] - x[0]) for x in times)
+    same = all(np.array_equal(x, times[0][: len(x)]) for x in times)
+    return high - low > IN_COMMON * longest and not same
 
 
 class OneClock(NamedTuple):
@@ -40,24 +111,31 @@ def on_one_clock(
     _check(f"{where}, signals.t", base[usable])
     h = _period(base)
     every, remarks = dict(signals), list[str]()
-    members = _members(signals, groups)
+    members = dict[str, list[str]]()
+    for name in signals:
+        if groups[name] != own:
+            members.setdefault(groups[name], []).append(name)
     for group in members:
         times = clock(group)
-        if _same(times, base):
+        if np.array_equal(times, base, equal_nan=True):
             continue
         if _same_but_for_ends(times, base):
             for name in members[group]:
-                every[name] = _as_long(signals[name], len(base))
+                values = signals[name][: len(base)]
+                missing = (0, len(base) - len(values))
+                every[name] = np.pad(values, missing, constant_values=np.nan)
             usable[len(times) :] = False
             continue
         known = np.isfinite(times)
         _check(f"{where}, the clock of group {group!r}", times[known])
         period = _period(times)
         for name in members[group]:
-            if name in _SENSED and period > _SLOWEST * h:
-                raise BadLog(_too_slow(where, name, group, period, h))
+            _refuse_slow(f"{where}: signals.{name}", name, group, period, h)
             if len(signals[name]) != len(times):
-                raise BadLog(_unequal(where, name, group, len(signals[name]), len(times)))
+                raise BadLog(
+                    f"{where}: signals.{name} has {len(signals[name])} samples, the clock of its"
+                    f" group {group!r} {len(times)}; name another column"
+                )
             every[name] = _moved(name, times[known], signals[name][known], base, h)
         usable[usable] &= (base[usable] >= times[known][0]) & (
             base[usable] <= times[known][-1] + period
@@ -78,32 +156,11 @@ def on_one_clock(
     return OneClock(parts, first, tuple(remarks))
 
 
-def _members(signals: Mapping[str, Array], groups: Mapping[str, str]) -> dict[str, list[str]]:
-    """The signals of each group but that of `t`."""
-    out: dict[str, list[str]] = {}
-    for name in signals:
-        if groups[name] != groups["t"]:
-            out.setdefault(groups[name], []).append(name)
-    return out
-
-
-def _same(times: Array, base: Array) -> bool:
-    return times.shape == base.shape and bool(np.array_equal(times, base, equal_nan=True))
-
-
 def _same_but_for_ends(times: Array, base: Array) -> bool:
     """Whether one clock is the other's beginning, a few rows at the end apart."""
     both = min(len(times), len(base))
     rows = abs(len(times) - len(base))
     return 0 < rows <= FEW_ROWS and bool(np.array_equal(times[:both], base[:both]))
-
-
-def _as_long(values: Array, length: int) -> Array:
-    """Values cut, or with missing ones at the end, so that there are as many."""
-    out = np.full(length, np.nan)
-    both = min(len(values), length)
-    out[:both] = values[:both]
-    return out
 
 
 def _period(times: Array) -> float:
@@ -118,19 +175,12 @@ def _check(where: str, times: Array) -> None:
         raise BadLog(f"{where}: goes back at {times[back[0]]:.6g} s; log one continuous run a file")
 
 
-def _too_slow(where: str, name: str, group: str, period: float, h: float) -> str:
-    return (
-        f"{where}: signals.{name} is sampled every {period:.4g} s, signals.t every {h:.4g} s; a"
-        f" measured signal is not made faster: take signals.t from the group {group!r}, or log both"
-        " at one rate"
-    )
-
-
-def _unequal(where: str, name: str, group: str, values: int, times: int) -> str:
-    return (
-        f"{where}: signals.{name} has {values} samples, the clock of its group {group!r} {times};"
-        " name another column"
-    )
+def _refuse_slow(where: str, name: str, group: str, period: float, h: float) -> None:
+    if name in _SENSED and period > _SLOWEST * h:
+        raise BadLog(
+            f"{where} is sampled every {period:.4g} s, signals.t every {h:.4g} s; a measured signal"
+            f" is not made faster: take signals.t from the group {group!r}, or log both at one rate"
+        )
 
 
 def _moved(name: str, times: Array, values: Array, base: Array, h: float) -> Array:

@@ -1,17 +1,30 @@
-"""Messages of topics as a table: a group a topic, a column each number in its messages."""
+"""Messages of topics as a table, a group a topic, a column each number in its messages: MCAP files
+(ROS 1 and 2, Foxglove) and bags of ROS 1.
 
+The libraries of mcap read the container and the encodings cdr (ROS 2) and protobuf; json is
+Python's own. For ROS 1 see workbench/logs/ros1.py.
+"""
+
+import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
-from workbench.logs.channels import Channel, channel_table
-from workbench.logs.table import RawColumn, Table, refuse_long
+from workbench.files import refuse_larger
+from workbench.logs.channels import Channel, channel_table, optional
+from workbench.logs.ros1 import ros1_decoder
+from workbench.logs.table import BINARY_BYTES, RawColumn, Table, refuse_long
 
+_BAG_CLOCKS = ("log_time",)
+_CHUNK_BYTES = 200_000_000  # of a chunk unpacked; writers make them of a megabyte or a few
+_CLOCKS = ("log_time", "publish_time")
 Decoder = Callable[[bytes], Any]
 
 _ELEMENTS = 64  # of an array of numbers that become columns; above, it is an image or a scan
@@ -41,15 +54,6 @@ class Container:
     begun: int = 0
 
 
-@dataclass
-class _Topic:
-    """A topic as found: the names of its columns, by its first message, and how many it has."""
-
-    names: tuple[str, ...]
-    count: int = 0
-    columns: dict[str, RawColumn] = field(default_factory=dict)
-
-
 def message_table(file: Container, spec: FileSpec) -> Table | None:
     """The table of the file's topics; None where no topic is in an encoding that is read.
 
@@ -59,62 +63,61 @@ def message_table(file: Container, spec: FileSpec) -> Table | None:
     topics, others, begun = _topics(file, spec.rows)
     if not topics and others:
         return None
-    found = Container(file.path, file.clocks, file.messages, begun)
-    channels = [
-        Channel(name, column, partial(_column, found, name, topic, column))
-        for name, topic in topics.items()
-        for column in (*found.clocks, *topic.names)
-    ]
+    found = replace(file, begun=begun)
+    channels = [one for topic, rows in topics.items() for one in _channels(found, topic, *rows)]
     return channel_table(found.path, channels, spec)
 
 
-def _topics(file: Container, only: str | None) -> tuple[dict[str, _Topic], set[str], int]:
-    """Topics whose messages hold numbers, those that are not read, the first message's time."""
-    topics, others = dict[str, _Topic](), set[str]()
+def _topics(
+    file: Container, only: str | None
+) -> tuple[dict[str, tuple[int, tuple[str, ...]]], set[str], int]:
+    """Topics whose messages hold numbers, with how many there are and the numbers' names by the
+    first; those that are not read; the first message's time."""
+    counts, names, others = Counter[str](), dict[str, tuple[str, ...]](), set[str]()
     begun: int | None = None
     for one in file.messages():
         begun = one.times[0] if begun is None else min(begun, one.times[0])
-        if one.topic in others or (only is not None and one.topic != only):
+        if only is not None and one.topic != only:
             continue
-        if one.topic not in topics:
-            if one.decode is None:
+        if one.topic not in names:
+            if one.topic in others or one.decode is None:
                 others.add(one.topic)
                 continue
-            topics[one.topic] = _Topic(tuple(dict(_numbers(one.decode(one.data), 0))))
-        topics[one.topic].count += 1
-        refuse_long(file.path, topics[one.topic].count)
-    return topics, others, begun or 0
+            names[one.topic] = tuple(dict(_numbers(one.decode(one.data), 0)))
+        counts[one.topic] += 1
+        refuse_long(file.path, counts[one.topic])
+    return {topic: (counts[topic], own) for topic, own in names.items()}, others, begun or 0
 
 
-def _column(file: Container, name: str, topic: _Topic, column: str) -> RawColumn:
-    if not topic.columns:
-        topic.columns.update(_columns(file, name, topic))
-    return topic.columns[column]
+def _channels(file: Container, topic: str, count: int, names: Sequence[str]) -> Iterator[Channel]:
+    """The columns of a topic, all of them read where one is."""
 
+    @cache
+    def columns() -> dict[str, RawColumn]:
+        out = {key: np.full(count, np.nan) for key in (*file.clocks, *names)}
+        own = (one for one in file.messages() if one.topic == topic)
+        for row, one in enumerate(sorted(own, key=lambda one: one.times[0])):
+            for key, moment in zip(file.clocks, one.times, strict=True):
+                out[key][row] = (moment - file.begun) * 1e-9
+            read = {} if one.decode is None else dict(_numbers(one.decode(one.data), file.begun))
+            for key, value in read.items():
+                if key in out:
+                    out[key][row] = value
+        return out
 
-def _columns(file: Container, name: str, topic: _Topic) -> dict[str, RawColumn]:
-    out = {key: np.full(topic.count, np.nan) for key in (*file.clocks, *topic.names)}
-    own = (one for one in file.messages() if one.topic == name)
-    for row, one in enumerate(sorted(own, key=lambda one: one.times[0])):
-        for key, moment in zip(file.clocks, one.times, strict=True):
-            out[key][row] = (moment - file.begun) * 1e-9
-        read = {} if one.decode is None else dict(_numbers(one.decode(one.data), file.begun))
-        for key, value in read.items():
-            if key in out:
-                out[key][row] = value
-    return out
+    def fetch(column: str) -> RawColumn:
+        return columns()[column]
+
+    for column in (*file.clocks, *names):
+        yield Channel(topic, column, partial(fetch, column))
 
 
 def _numbers(message: Any, begun: int) -> Iterator[tuple[str, float]]:
     """The numbers of a message by their path in it."""
     for path, value in _leaves("", message, 0):
         if isinstance(value, tuple):
-            whole, nano = value
-            yield (
-                path,
-                (whole - (begun // 10**9 if whole > _EPOCH else 0))
-                + 1e-9 * (nano - (begun % 10**9 if whole > _EPOCH else 0)),
-            )
+            since = divmod(begun, 10**9) if value[0] > _EPOCH else (0, 0)
+            yield path, (value[0] - since[0]) + 1e-9 * (value[1] - since[1])
         else:
             yield path, float(value)
 
@@ -160,3 +163,127 @@ def _is_set(message: Any, part: Any) -> bool:
     """Whether a field is there; a number that is 0 is, though protobuf leaves it out."""
     single = part.message_type is not None and not part.is_repeated
     return not single or bool(message.HasField(part.name))
+
+
+def read_mcap(path: Path, spec: FileSpec) -> Table:
+    """The messages of the file by topic, a group each, as `message_table` says.
+
+    Raises BadLog where no topic has an encoding that is read.
+    """
+    refuse_larger(path, BINARY_BYTES, "an MCAP file", BadLog)
+    library = optional("mcap.stream_reader", "mcap", path)
+    decoders = tuple(
+        optional(name, "mcap", path).DecoderFactory()
+        for name in ("mcap_ros2.decoder", "mcap_protobuf.decoder")
+    )
+
+    def messages() -> Iterator[Message]:
+        known = dict[int, Decoder | None]()
+        for schema, channel, message in _messages(path, library):
+            if channel.id not in known:
+                known[channel.id] = _decoder(decoders, channel, schema)
+            times = (int(message.log_time), int(message.publish_time))
+            yield Message(str(channel.topic), times, message.data, known[channel.id])
+
+    found = message_table(Container(path, _CLOCKS, messages), spec)
+    if found is None:
+        encodings = {str(channel.message_encoding) for _, channel, _ in _messages(path, library)}
+        raise BadLog(
+            f"{path}: has no topic whose encoding is read (there is:"
+            f" {', '.join(sorted(encodings))}); cdr (ROS 2), ros1, protobuf and json are"
+        )
+    return found
+
+
+def _decoder(decoders: Sequence[Any], channel: Any, schema: Any) -> Decoder | None:
+    if channel.message_encoding == "json":
+        return json.loads
+    if channel.message_encoding == "ros1" and schema is not None:
+        return ros1_decoder(schema.name, schema.data.decode())
+    found = (one.decoder_for(channel.message_encoding, schema) for one in decoders)
+    return next((decode for decode in found if decode is not None), None)
+
+
+def _messages(path: Path, library: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """Schema (or None), channel and message of every message, as they stand in the file."""
+    schemas: dict[int, Any] = {0: None}
+    channels: dict[int, Any] = {}
+    with path.open("rb") as stream:
+        reader = library.StreamReader(
+            stream, emit_chunks=True, validate_crcs=True, record_size_limit=BINARY_BYTES
+        )
+        for record in _records(path, library, reader):
+            match type(record).__name__:
+                case "Schema":
+                    schemas[record.id] = record
+                case "Channel":
+                    channels[record.id] = record
+                case "Message":
+                    channel = channels[record.channel_id]
+                    yield schemas[channel.schema_id], channel, record
+
+
+def _records(path: Path, library: Any, reader: Any) -> Iterator[Any]:
+    unpacked = 0
+    for record in reader.records:
+        if type(record).__name__ != "Chunk":
+            yield record
+            continue
+        chunk = replace(record, data=_unpacked(path, record), compression="")
+        unpacked += len(chunk.data)
+        if unpacked > BINARY_BYTES:
+            raise BadLog(
+                f"{path}: holds more than {BINARY_BYTES / 1e6:g} MB when unpacked; keep the"
+                " topics that the card names (mcap filter -y /topic)"
+            )
+        yield from library.breakup_chunk(chunk, validate_crc=True)
+
+
+def _unpacked(path: Path, chunk: Any) -> bytes:
+    """The chunk's bytes; a few that say they are more than any writer's are not unpacked."""
+    most = _CHUNK_BYTES
+    match chunk.compression:
+        case "zstd":
+            library = optional("zstandard", "mcap", path)
+            with library.ZstdDecompressor().stream_reader(chunk.data) as reader:
+                data = bytes(reader.read(most + 1))
+        case "lz4":
+            library = optional("lz4.frame", "mcap", path)
+            data = bytes(library.LZ4FrameDecompressor().decompress(chunk.data, most + 1))
+        case "":
+            data = bytes(chunk.data)
+        case other:
+            raise BadLog(f"{path}: is compressed by {other!r}; write it with zstd or lz4")
+    if len(data) > most:
+        raise BadLog(f"{path}: a chunk of it unpacks to more than {most / 1e6:g} MB; write it anew")
+    return data
+
+
+def read_bag(path: Path, spec: FileSpec) -> Table:
+    """The messages of the bag by topic, a group each, as `message_table` says.
+
+    Raises BadLog where the bag has no index, or no message of numbers.
+    """
+    refuse_larger(path, BINARY_BYTES, "a bag", BadLog)
+    library = optional("rosbags.rosbag1", "rosbag", path)
+
+    def messages() -> Iterator[Message]:
+        decoders = dict[int, Decoder]()
+        with library.Reader(path) as reader:
+            for connection, moment, data in reader.messages():
+                if connection.id not in decoders:
+                    name = str(connection.msgtype).replace("/msg/", "/")
+                    text = getattr(connection.msgdef, "data", connection.msgdef)
+                    decoders[connection.id] = ros1_decoder(name, text)
+                yield Message(connection.topic, (int(moment),), bytes(data),
+                              decoders[connection.id])  # fmt: skip
+
+    try:
+        found = message_table(Container(path, _BAG_CLOCKS, messages), spec)
+    except library.ReaderError as error:
+        raise BadLog(
+            f"{path}: the bag cannot be opened ({' '.join(str(error).split())}); run rosbag reindex"
+            " on it where its recording was cut off"
+        ) from None
+    assert found is not None
+    return found

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
-from workbench.logs.table import Table, damaged
+from workbench.logs.table import Table, damaged, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
 
@@ -164,50 +165,27 @@ def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:
     out = np.empty(len(raw))
     for k, value in enumerate(raw):
         try:
-            out[k] = _number(value)
-        except ValueError:
-            shown = " ".join(repr(_text(value)).split())[:40]
+            out[k] = number_of(value)
+        except (TypeError, ValueError):
+            shown = " ".join(repr(text_of(value)).split())[:40]
             row = f"{where}, row {first_row + k}"
             advice = _advice(raw, k)
             raise BadLog(f"{row}: {shown} is not a number; {advice}") from None
     return out
 
 
-def _text(value: object) -> object:
-    """The value, a text as Python's own."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return str(value) if isinstance(value, str) else value
-
-
 def _advice(raw: NDArray[Any], k: int) -> str:
     """What to do about the text in row `k` of a column."""
-    text = str(_text(raw[k]))
-    if _CLOCK.search(text):
+    if _CLOCK.search(str(text_of(raw[k]))):
         return "log times in seconds, not as dates or clock times"
-    if k == 0 and len(raw) > 1:
-        try:
-            _number(raw[1])
-        except ValueError:
-            pass
-        else:
+    with suppress(TypeError, ValueError, IndexError):
+        if k == 0:
+            number_of(raw[1])
             return (
                 "if it is a row of units, take it out, or set skip_rows = 1 in the card's [file]"
                 " and give the columns by number"
             )
     return "correct it or leave the field empty"
-
-
-def _number(value: object) -> float:
-    """The number that a field holds, NaN for an empty one; raises ValueError on others."""
-    text = _text(value)
-    if text is None or text == "":
-        return float("nan")
-    if isinstance(text, str) and text.strip().lower() in ("true", "false"):
-        return float(text.strip().lower() == "true")
-    if isinstance(text, str | int | float | np.generic):
-        return float(text)
-    raise ValueError("no number")
 
 
 def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -> Array:

@@ -84,12 +84,14 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
             raise BadLog(f"{path.name}: given twice; name every log once")
         rigs[whole] = card.rig(path.name)
         if isinstance(one, Recorded):
-            prepared = runs_of(one.table, path, card)
+            prepared, name, digest = runs_of(one.table, path, card), one.name, one.sha256
         else:
             prepared = read_runs(path, card)
+            name, digest = shown_name(path), sha256_of(path)
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)
-        found.extend((whole, _source(one, path, run, prepared.period)) for run in prepared.runs)
+        for run in prepared.runs:
+            found.append((whole, Source(run, name, digest, len(run), prepared.period)))
     names_of = Counter(path.name for path in rigs)
     runs = [_discriminated(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
@@ -106,12 +108,6 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
         )
     remarks.extend(log_remarks([run.log for run in runs], rigs[first], card.signals))
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
-
-
-def _source(log: str | Recorded, path: Path, run: Log, period: float | None) -> Source:
-    if isinstance(log, Recorded):
-        return Source(run, log.name, log.sha256, len(run), period)
-    return Source(run, shown_name(path), sha256_of(path), len(run), period)
 
 
 def _discriminated(source: Source, path: Path) -> Source:

@@ -38,15 +38,6 @@ def plain_tree(value: Any) -> Any:
     return value
 
 
-def entry(tree: Any, key: str) -> Any:
-    """What a table holds by that key, a list by that number; raises LookupError."""
-    if isinstance(tree, Mapping):
-        return tree[key]
-    if isinstance(tree, list) and key.isdigit():
-        return tree[int(key)]
-    raise LookupError(key)
-
-
 def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]]:
     if depth > DEEPEST:
         return
@@ -111,22 +102,16 @@ def _label(one: Mapping[str, Any]) -> str:
 
 def _array(path: str, value: Any) -> Iterator[tuple[str, RawColumn]]:
     """A vector, or the columns of an array that has few."""
-    if isinstance(value, list) and (ragged := _ragged(value)):
-        if ragged == "tables":
+    if isinstance(value, list):
+        lengths = {len(one) if isinstance(one, list) else -1 for one in value}
+        if len(lengths) > 1:  # no array
             return
-        value = [one for one in value if not isinstance(one, list)]
     x = np.atleast_1d(np.squeeze(np.asarray(value)))
     if x.ndim == 1:
         yield path, x
     elif x.ndim == 2 and min(x.shape) <= WIDEST_ARRAY:
         for k, one in enumerate(x if x.shape[0] < x.shape[1] else x.T):
             yield f"{path}[{k}]", one
-
-
-def _ragged(value: list[Any]) -> str:
-    """Whether a list is no array: "tables" where its lists differ in length."""
-    lengths = {len(one) if isinstance(one, list) else -1 for one in value}
-    return "tables" if len(lengths) > 1 else ""
 
 
 _HEADER = 128

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import BadLog
@@ -58,7 +59,8 @@ class Table:
                 f"name the column by its number (0 to {count - 1}) in the card"
             )
         full = self.full_names()
-        found = _places(key, full) or _places(key, self.names)
+        found = [k for k, name in enumerate(full) if name == key]
+        found = found or [k for k, name in enumerate(self.names) if name == key]
         if not found:
             known = full if len(set(self.groups)) > 1 else self.names
             raise BadLog(f"{where}: no column {key!r}{nearest(key, known)}")
@@ -87,18 +89,23 @@ class Table:
         )
 
 
-def of_vectors(found: Mapping[str, RawColumn], spec: FileSpec) -> Table:
-    """A table of named vectors; a scalar stays one value, which the caller may spread."""
+def of_vectors(names: Sequence[str], read: Callable[[str], RawColumn], spec: FileSpec) -> Table:
+    """A table of vectors that are read by name; a scalar stays one value, which the caller may
+    spread."""
 
     def fetch(number: int) -> RawColumn:
-        values = list(found.values())[number].ravel()
+        values = np.ravel(read(names[number]))
         return values[spec.skip_rows :] if values.size > 1 else values
 
-    return Table(tuple(found), fetch, 1 + spec.skip_rows)
+    return Table(tuple(names), fetch, 1 + spec.skip_rows)
 
 
-def of_matrix(path: Path, values: RawColumn, spec: FileSpec) -> Table:
-    """A table of a matrix, a column a signal; one of a few long rows has a row a signal."""
+def of_array(path: Path, values: RawColumn, spec: FileSpec) -> Table:
+    """A table of an array's named fields, or of a matrix: a column a signal; one of a few long rows
+    has a row a signal."""
+    refuse_long(path, max(values.shape, default=0))
+    if values.dtype.names:
+        return of_vectors(values.dtype.names, values.__getitem__, spec)
     if values.ndim != 2:
         what = repr(spec.rows) if spec.rows else "the array"
         raise BadLog(f"{path}: {what} has the shape {values.shape}, rows and columns needed")
@@ -106,6 +113,23 @@ def of_matrix(path: Path, values: RawColumn, spec: FileSpec) -> Table:
         values = values.T
     names = tuple(str(number) for number in range(values.shape[1]))
     return Table(names, lambda k: values[spec.skip_rows :, k], 1 + spec.skip_rows, headed=False)
+
+
+def text_of(cell: object) -> object:
+    """What a cell holds, a text as Python's own."""
+    if isinstance(cell, bytes):
+        return cell.decode("utf-8", "replace")
+    return str(cell) if isinstance(cell, str) else cell
+
+
+def number_of(cell: object) -> float:
+    """The number in a cell, NaN in an empty one; raises TypeError or ValueError on others."""
+    text: Any = text_of(cell)
+    if text is None or text == "":
+        return float("nan")
+    if isinstance(text, str) and text.strip().lower() in ("true", "false"):
+        return float(text.strip().lower() == "true")
+    return float(text)
 
 
 def refuse_long(path: Path, rows: int) -> None:
@@ -124,7 +148,3 @@ def damaged(path: Path, form: str, error: Exception) -> BadLog:
         f"{path}: cannot be read as a {form} file ({text}): it is damaged or cut off, or laid out"
         " as is not read here; copy it again, or write its columns as CSV"
     )
-
-
-def _places(key: str, names: Sequence[str]) -> list[int]:
-    return [k for k, name in enumerate(names) if name == key]

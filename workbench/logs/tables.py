@@ -1,10 +1,11 @@
-"""Files as tables of columns, in the format that their content says.
+"""Files as tables of columns, in the format that their first bytes say, else their name.
 
 A table hands out raw columns (numbers or text) by name or by number from 0. What foreign readers
 raise on damaged files becomes BadLog in one line.
 """
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,21 +13,19 @@ from typing import Any
 import numpy as np
 
 from identification.errors import BadLog
-from workbench.cards.card_tables import FileSpec
+from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.nearest import nearest
-from workbench.files import refuse_larger
+from workbench.files import broken_link, refuse_larger, refuse_special
 from workbench.logs.channels import read_mdf, read_tdms, read_ulog
 from workbench.logs.excel import read_excel
-from workbench.logs.formats import HDF5_MAGIC, checked_format, head_of
-from workbench.logs.mcap import read_mcap
-from workbench.logs.ros1 import read_bag
-from workbench.logs.structs import entry, plain_tree, records, tags_are_sound, vectors_of
+from workbench.logs.messages import read_bag, read_mcap
+from workbench.logs.structs import plain_tree, records, tags_are_sound, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
     RawColumn,
     Table,
     damaged,
-    of_matrix,
+    of_array,
     of_vectors,
     refuse_long,
 )
@@ -34,6 +33,114 @@ from workbench.logs.text import read_text_table
 
 _OBJECT_MARK = "MATLAB_object_decode"  # attribute of an object in a MAT file of version 7.3
 JSON_BYTES = 100_000_000  # of text; as Python's values it takes ten times that
+
+HDF5_MAGIC = b"\x89HDF"
+"""How HDF5 begins, from byte 512 on where MATLAB wrote it."""
+
+_ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_PACKED = {
+    b"\x1f\x8b": "compressed by gzip; unpack it (gunzip) and give the file in it",
+    b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
+    b"\xfd7zXZ": "compressed by xz; unpack it (unxz) and give the file in it",
+    _ZIP: "a zip archive or an Excel workbook; unpack it, or save its sheet as CSV",
+    _OLE: "an old Excel workbook; save its sheet as CSV",
+}
+_MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
+    "parquet": (b"PAR1",),
+    "mat": (b"MATLAB",),
+    "hdf5": (HDF5_MAGIC,),
+    "tdms": (b"TDSm",),
+    "mdf": (b"MDF     ", b"UnFinMF "),
+    "mcap": (b"\x89MCAP0\r\n",),
+    "ulog": (b"ULog\x01\x12\x35",),
+    "npy": (b"\x93NUMPY",),
+    "rosbag": (b"#ROSBAG V2.0",),
+}
+_SUFFIXES: Mapping[Format, tuple[str, ...]] = {
+    "parquet": (".parquet",),
+    "mat": (".mat",),
+    "hdf5": (".h5", ".hdf5"),
+    "json": (".json",),
+    "tdms": (".tdms",),
+    "mdf": (".mdf", ".mf4"),
+    "mcap": (".mcap",),
+    "ulog": (".ulg",),
+    "excel": (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+    "npy": (".npy", ".npz"),
+    "rosbag": (".bag",),
+}
+_JSON = re.compile(rb"\s*(\{\s*[\"}]|\[\s*([\[{\"\d\]-]|true|false|null))")  # "[Name]" is a text's
+
+
+def checked_format(path: Path, spec: FileSpec) -> Format:
+    """The file's format, as the card says or found; raises BadLog where its bytes are not so."""
+    head = head_of(path)
+    form = spec.format or find_format(path, head)
+    if form in _MAGIC and spec.format is None and path.suffix == ".csv":
+        raise BadLog(
+            f"{path}: is a binary {form} file named .csv; rename it, or give its format in the "
+            "card's [file]"
+        )
+    _check_magic(path, form, head, spec)
+    return form
+
+
+def find_format(path: Path, head: bytes) -> Format:
+    """The format that the first bytes say, else the suffix, else CSV."""
+    for form, magics in _MAGIC.items():
+        if head.startswith(magics):
+            return form
+    for form, suffixes in _SUFFIXES.items():
+        if path.suffix.lower() in suffixes:
+            return form
+    return "json" if _JSON.match(head) else "csv"
+
+
+def head_of(path: Path) -> bytes:
+    refuse_special(path, BadLog)
+    try:
+        with path.open("rb") as file:
+            head = file.read(1024)
+    except FileNotFoundError:
+        broken = broken_link(path)
+        if broken:
+            raise BadLog(f"{path}: {broken}") from None
+        folder = path.parent
+        around = sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
+        raise BadLog(f"{path}: no such file{nearest(path.name, around)}") from None
+    except IsADirectoryError:
+        raise BadLog(f"{path}: is a directory; name the log files in it") from None
+    except OSError as error:
+        wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
+        raise BadLog(f"{path}: {wrong}") from None
+    if not head:
+        raise BadLog(f"{path}: is empty (0 bytes); copy it again")
+    return head
+
+
+def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
+    """Raises BadLog where the first bytes are those of no such file."""
+    for magic, what in _PACKED.items():
+        book = form == "excel" and magic in (_ZIP, _OLE)
+        if form in ("csv", "excel") and head.startswith(magic) and not book:
+            raise BadLog(f"{path}: is {what}")
+    wrong = {
+        # Of version 4 a MAT file has no such beginning.
+        "mat": not head.startswith(b"MATLAB") and HDF5_MAGIC not in head and _is_text(head),
+        "hdf5": HDF5_MAGIC not in head,
+        "json": head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["),
+        "excel": not head.startswith((_ZIP, _OLE)),
+        "npy": not head.startswith((*_MAGIC["npy"], _ZIP)),
+    }
+    if wrong.get(form, form in _MAGIC and not head.startswith(_MAGIC[form])):
+        advice = "; copy it again or rename it"
+        if spec.format is not None:
+            advice = ", which the card's [file] format says; take it out, or copy it again"
+        raise BadLog(f"{path}: is not a {form} file by its first bytes{advice}")
+
+
+def _is_text(head: bytes) -> bool:
+    return all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
 
 
 def read_table(path: Path, spec: FileSpec) -> Table:
@@ -94,18 +201,30 @@ def _read_mat(path: Path, spec: FileSpec) -> Table:
     for _name, shape, _kind in found_there:
         refuse_long(path, max(shape, default=0))
     content: Any = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
-    found: Any = {
-        name: plain_tree(value) for name, value in content.items() if not name.startswith("__")
-    }
-    for key in spec.rows.split(".") if spec.rows else ():
-        try:
-            found = entry(found, key)
-        except LookupError:
-            there = found if isinstance(found, dict) else ()
-            raise BadLog(f"{path}: no variable {spec.rows!r}{nearest(key, there)}") from None
+    variables = {k: plain_tree(value) for k, value in content.items() if not k.startswith("__")}
+    found = _part(path, variables, spec, f"no variable {spec.rows!r}")
     if isinstance(found, np.ndarray):
-        return of_matrix(path, found, spec)
-    return of_vectors(vectors_of(found), spec)
+        return of_array(path, found, spec)
+    return _of_tree(found, spec)
+
+
+def _part(path: Path, tree: Any, spec: FileSpec, missing: str) -> Any:
+    """What stands at `spec.rows` in tables and lists within each other; raises BadLog where nothing
+    does."""
+    for key in spec.rows.split(".") if spec.rows else ():
+        if isinstance(tree, dict) and key in tree:
+            tree = tree[key]
+        elif isinstance(tree, list) and key.isdigit() and int(key) < len(tree):
+            tree = tree[int(key)]
+        else:
+            there = tree if isinstance(tree, dict) else ()
+            raise BadLog(f"{path}: {missing}{nearest(key, there)}")
+    return tree
+
+
+def _of_tree(tree: Any, spec: FileSpec) -> Table:
+    found = vectors_of(tree)
+    return of_vectors(tuple(found), found.__getitem__, spec)
 
 
 def _read_hdf5(path: Path, spec: FileSpec) -> Table:
@@ -118,12 +237,10 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
         root = file[spec.rows.replace(".", "/")] if spec.rows else file
         if isinstance(root, h5py.Dataset):
             refuse_long(path, max(root.shape, default=0))
-            values = root[()]
-            if values.dtype.names:
-                return of_vectors({name: values[name] for name in values.dtype.names}, spec)
-            return of_matrix(path, values.T if matlab else values, spec)
+            return of_array(path, root[()].T if matlab else root[()], spec)
         names: list[str] = []
-        if matlab and all(_OBJECT_MARK in item.attrs for item in _variables(root)):
+        variables = [root[name] for name in root if not name.startswith("#")]  # "#": MATLAB's own
+        if matlab and all(_OBJECT_MARK in item.attrs for item in variables):
             raise BadLog(_objects(path))
 
         def visit(name: str, item: Any) -> None:
@@ -134,17 +251,11 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
         root.visititems(visit)
         place = root.name
 
-    def fetch(number: int) -> RawColumn:
+    def read(name: str) -> RawColumn:
         with h5py.File(path, "r") as file:
-            values = np.atleast_1d(np.asarray(file[place][names[number]][()])).ravel()
-        return values[spec.skip_rows :] if values.size > 1 else values
+            return np.asarray(file[place][name][()])
 
-    return Table(tuple(names), fetch, 1 + spec.skip_rows)
-
-
-def _variables(root: Any) -> list[Any]:
-    """The variables of a MAT file of version 7.3; those that begin with "#" are MATLAB's own."""
-    return [root[name] for name in root if not name.startswith("#")]
+    return of_vectors(names, read, spec)
 
 
 def _objects(path: Path) -> str:
@@ -164,22 +275,20 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
         raise damaged(path, "json", error) from None
     except json.JSONDecodeError as error:
         raise _no_json(path, text, error) from None
-    outer = content if isinstance(content, dict) else {}
-    rows = content
-    for key in spec.rows.split(".") if spec.rows else ():
-        try:
-            rows = entry(rows, key)
-        except LookupError:
-            there = rows if isinstance(rows, dict) else ()
-            raise BadLog(
-                f"{path}: no key {spec.rows!r} for the rows{nearest(key, there)}"
-            ) from None
+    rows = _part(path, content, spec, f"no key {spec.rows!r} for the rows")
     if isinstance(rows, dict):
-        return of_vectors(vectors_of(rows), spec)
+        return _of_tree(rows, spec)
     if not isinstance(rows, list) or not rows:
         raise BadLog(f"{path}: holds no list of rows; name its key in the card, [file] rows")
-    scalars = {k: np.asarray([v]) for k, v in outer.items() if not isinstance(v, list | dict)}
-    return _records(path, rows, scalars, spec)
+    if isinstance(rows[0], dict):
+        outer = content.items() if isinstance(content, dict) else ()
+        scalars = {k: np.asarray([v]) for k, v in outer if not isinstance(v, list | dict)}
+        vectors = {**dict(records("", rows)), **scalars}
+        return of_vectors(tuple(vectors), vectors.__getitem__, spec)
+    for number, row in enumerate(rows, start=1):
+        if not isinstance(row, list) or len(row) != len(rows[0]):
+            raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")
+    return of_array(path, np.asarray(rows), spec)
 
 
 def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
@@ -200,15 +309,6 @@ def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
     )
 
 
-def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: FileSpec) -> Table:
-    if isinstance(rows[0], dict):
-        return of_vectors({**dict(records("", rows)), **scalars}, spec)
-    for number, row in enumerate(rows, start=1):
-        if not isinstance(row, list) or len(row) != len(rows[0]):
-            raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")
-    return of_matrix(path, np.asarray(rows), spec)
-
-
 def read_numpy(path: Path, spec: FileSpec) -> Table:
     """The columns of an array, of its named fields, or of an archive's arrays.
 
@@ -219,7 +319,7 @@ def read_numpy(path: Path, spec: FileSpec) -> Table:
     try:
         loaded = np.load(path, allow_pickle=False)
         if isinstance(loaded, np.ndarray):
-            return _table(path, loaded, spec)
+            return of_array(path, np.squeeze(loaded), spec)
         with loaded as archive:
             found = {name: archive[name] for name in archive.files}
     except ValueError as error:
@@ -236,23 +336,16 @@ def _of_archive(path: Path, found: dict[str, RawColumn], spec: FileSpec) -> Tabl
     if spec.rows:
         if spec.rows not in found:
             raise BadLog(f"{path}: no array {spec.rows!r}{nearest(spec.rows, found)}")
-        return _table(path, found[spec.rows], spec)
+        return of_array(path, np.squeeze(found[spec.rows]), spec)
     vectors = {name: np.atleast_1d(np.squeeze(x)) for name, x in found.items()}
     flat = {name: x for name, x in vectors.items() if x.ndim == 1}
     long = max((x.size for x in flat.values()), default=0)
     matrices = [x for x in vectors.values() if x.ndim == 2]
     if matrices and long < max(max(x.shape) for x in matrices):
-        return _table(path, max(matrices, key=lambda x: x.size), spec)
+        return of_array(path, max(matrices, key=lambda x: x.size), spec)
     for name, x in vectors.items():
         refuse_long(path, max(x.shape, default=0))
         if x.ndim == 2 and long in x.shape:  # a row, or a column, an axis
             each = x if x.shape[1] == long else x.T
             flat |= {f"{name}_{k}": row for k, row in enumerate(each)}
-    return of_vectors(flat, spec)
-
-
-def _table(path: Path, values: RawColumn, spec: FileSpec) -> Table:
-    refuse_long(path, max(values.shape, default=0))
-    if values.dtype.names:
-        return of_vectors({name: values[name] for name in values.dtype.names}, spec)
-    return of_matrix(path, np.squeeze(values), spec)
+    return of_vectors(tuple(flat), flat.__getitem__, spec)

@@ -15,7 +15,7 @@ from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, block_table, blocks_of, decimal_of
-from workbench.logs.clock_groups import clock_groups
+from workbench.logs.clocks import clock_groups
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.table import Table
 
@@ -106,11 +106,23 @@ def _numbers(cells: Sequence[str], marks: _Marks) -> Array:
 def _first_line_layout(
     path: Path, lines: list[str], fields: list[list[str]], spec: FileSpec
 ) -> Layout:
-    """The header in the first line, as the card says or because nothing shows where it is."""
-    if spec.header is None:
-        _check_first_line(path, lines, fields, spec)
-    headed = spec.header if spec.header is not None else not all(map(is_number, fields[0]))
-    return Layout(tuple(fields[0]) if headed else (), int(headed))
+    """The header in the first line, as the card says or because nothing shows where it is.
+
+    Raises BadLog where the first line cannot be a header, since the rows have more fields.
+    """
+    first, headed = fields[0], spec.header
+    if headed is None:
+        widths = [len(line) for line in fields[1:_COMPARED] if line]
+        width = max(set(widths), key=widths.count) if widths else 0
+        if len(first) <= 1 and width > 1 and 2 * widths.count(width) >= len(widths):
+            header = next(k for k, line in enumerate(fields) if k and len(line) == width)
+            raise BadLog(
+                f"{path}: line {spec.skip_rows + 1} ({lines[0].strip()[:40]!r}) is no header of the"
+                f" {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
+                " card's [file], or comment to the sign with which such lines begin"
+            )
+        headed = not all(map(is_number, first))
+    return Layout(tuple(first) if headed else (), int(headed))
 
 
 def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
@@ -181,22 +193,6 @@ def _decode(path: Path, encoding: str) -> str:
     if "\n" not in text:
         text = text.replace("\r", "\n")
     return text.removeprefix("\ufeff")
-
-
-def _check_first_line(
-    path: Path, lines: list[str], fields: list[list[str]], spec: FileSpec
-) -> None:
-    """Raises BadLog where the first line cannot be a header, since the rows have more fields."""
-    widths = [len(line) for line in fields[1:_COMPARED] if line]
-    width = max(set(widths), key=widths.count) if widths else 0
-    if len(fields[0]) > 1 or width < 2 or 2 * widths.count(width) < len(widths):
-        return
-    header = next(k for k, line in enumerate(fields) if k and len(line) == width)
-    raise BadLog(
-        f"{path}: line {spec.skip_rows + 1} ({lines[0].strip()[:40]!r}) is no header of the"
-        f" {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
-        " card's [file], or comment to the sign with which such lines begin"
-    )
 
 
 def _skipped(line: str, comment: str) -> bool:

@@ -16,10 +16,9 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header, written_unit
 from workbench.files import refuse_larger
-from workbench.logs.formats import find_format, head_of
 from workbench.logs.layout import is_number
-from workbench.logs.table import Table
-from workbench.logs.tables import JSON_BYTES, read_table
+from workbench.logs.table import Table, number_of, text_of
+from workbench.logs.tables import JSON_BYTES, find_format, head_of, read_table
 from workbench.logs.text import TEXT_BYTES, first_lines, holds_blocks
 from workbench.logs.times import seconds
 
@@ -195,20 +194,18 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
         return np.zeros(0), "no column"
     if raw.dtype.kind in "fiub":
         return np.asarray(raw, dtype=np.float64), ""
-    if raw.dtype.kind in "Mm":
-        return np.full(len(raw), np.nan), "dates, not numbers"
     out = np.full(len(raw), np.nan)
-    for k, value in enumerate(raw.tolist()):
-        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-        try:
-            if text is not None and text != "":
-                out[k] = float(text)
-        except (TypeError, ValueError):
-            if str(text).strip().lower() not in ("true", "false"):
-                shown = repr(str(text).strip()[:20])
-                alone = len(set(raw.tolist())) == 1 and not str(text).strip().isalnum()
-                return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
-            out[k] = float(str(text).strip().lower() == "true")
+    if raw.dtype.kind in "Mm":
+        return out, "dates, not numbers"
+    cells = raw.tolist()
+    try:
+        for k, cell in enumerate(cells):
+            out[k] = number_of(cell)
+    except (TypeError, ValueError):
+        text = str(text_of(cell)).strip()
+        alone = len(set(cells)) == 1 and not text.isalnum()
+        shown = repr(text[:20])
+        return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
     return out, ""
 
 
@@ -223,30 +220,24 @@ def _times(table: Table, number: int, path: Path) -> Array | None:
 def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
     """How the file is to be read; names and units where the reader does not take them itself."""
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
-    encoding = _encoding(path)
-    spec = FileSpec() if encoding == "utf-8" else FileSpec(encoding=encoding)
-    if holds_blocks(path, spec):
-        return spec, (), ()
-    rows = first_lines(path, spec)
+    spec = FileSpec(encoding=_encoding(path))
+    rows = [] if holds_blocks(path, spec) else first_lines(path, spec)
     at = _first_of_data(rows)
-    if at is None:
+    above = [k for k in range(at or 0) if any(rows[k])]
+    if at is None or not above:
         return spec, (), ()
     width = len(rows[at])
-    above = [k for k in range(at) if any(rows[k])]
     units = _units(rows[above[-1]], width) if len(above) > 1 else ()
-    head = above[-2] if units else (above[-1] if above else None)
-    if head is None:
-        return spec, (), ()
+    head = above[-2] if units else above[-1]
     commented = rows[head][0].startswith(spec.comment)
     names = [one.strip() for one in rows[head]]
     if commented:
         names[0] = names[0].lstrip("# ")
         names = names if names[0] else names[1:]
+    by_number = spec.model_copy(update={"skip_rows": at, "header": False})
     if len(names) != width or all(map(is_number, names)):
-        skip = {"skip_rows": at, "header": False} if above else {}
-        return spec.model_copy(update=skip), (), ()
+        return by_number, (), ()
     if units or commented:
-        by_number = spec.model_copy(update={"skip_rows": at, "header": False})
         return by_number, tuple(names), units
     before = [k for k in above[:-1] if not rows[k][0].startswith(spec.comment)]
     return (spec.model_copy(update={"skip_rows": head}) if before else spec), (), ()
@@ -299,7 +290,7 @@ def _other_layout(path: Path, form: Format) -> tuple[FileSpec, tuple[str, ...]]:
         rows = _struct_of(path)
     elif form == "json":
         rows, said = _rows_of(path)
-    return (FileSpec(rows=rows) if rows else FileSpec()), (said,) if said else ()
+    return FileSpec(rows=rows), (said,) if said else ()
 
 
 def _rows_of(path: Path) -> tuple[str | None, str]:
@@ -319,15 +310,9 @@ def _rows_of(path: Path) -> tuple[str | None, str]:
     own = [(one, place) for one, place in long if place[: len(run)] == run]
     if isinstance(own[0][0][0], dict | list):
         return ".".join(own[0][1]) or None, said
-    place = _shared([place for _, place in own])
+    levels = zip(*(place for _, place in own), strict=False)
+    place = tuple(keys[0] for keys in takewhile(lambda keys: len(set(keys)) == 1, levels))
     return ".".join(place[:-1] if len(own) == 1 else place) or None, said
-
-
-def _shared(places: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """The beginning that all places share."""
-    levels = zip(*places, strict=False)
-    same = takewhile(lambda keys: len(set(keys)) == 1, levels)
-    return tuple(keys[0] for keys in same)
 
 
 def _run_of(places: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], str]:

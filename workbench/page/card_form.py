@@ -160,7 +160,7 @@ def form_of(of: "Proposal", file: str) -> CardForm:
     """The proposal as a form; file: name of the log, of which the machine's is made."""
     why = {_field(one.key): (one.sure, one.why) for one in of.rig}
     why |= {f"column_{one.name}": (one.sure, one.why) for one in of.signals}
-    columns = [(json.dumps(one.key), one.header or one.shown) for one in of.columns]
+    columns = [(json.dumps(one.raw.key), one.raw.header or one.shown) for one in of.columns]
     unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
     layout = of.spec.model_dump(exclude_defaults=True)
     remarks = [*of.hardly, *of.remarks, *unused]

@@ -55,7 +55,7 @@ def warm() -> None:
 def refuse_no_log(path: Path) -> None:
     """Raises BadView where the file's first bytes are of something else than its name says."""
     from workbench.cards.card_tables import FileSpec
-    from workbench.logs.formats import checked_format
+    from workbench.logs.tables import checked_format
 
     with _without(path):
         checked_format(path, FileSpec())

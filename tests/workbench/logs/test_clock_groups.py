@@ -7,7 +7,7 @@ import pytest
 
 from identification.arrays import Array
 from workbench.cards.card import load_card
-from workbench.logs.clock_groups import ClockGroups, clock_groups
+from workbench.logs.clocks import ClockGroups, clock_groups
 from workbench.logs.runs import read_log
 from workbench.logs.unknown import read_unknown
 

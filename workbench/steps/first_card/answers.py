@@ -1,6 +1,7 @@
 """What somebody answers to a guess of the first card, and the card with it."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,7 +10,8 @@ from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale
-from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, SignalGuess
+from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
@@ -39,8 +41,7 @@ def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
         return replace(of, signals=tuple(other for other in of.signals if other is not one))
     found = replace(one, sure=True, why=CONFIRMED) if not text else _answered(of, one, text)
     try:
-        gain = found.gain
-        column_scale(found.unit, gain, name, of.motion)
+        column_scale(found.unit, found.gain, name, of.motion)
     except BadCard as error:
         raise BadAnswer(str(error)) from None
     return replace(of, signals=tuple(found if other is one else other for other in of.signals))
@@ -53,20 +54,17 @@ def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
     """
     one = next(guess for guess in of.rig if guess.key == key)
     text = _other(answer.strip(), one.rival)
-    found: RigGuess = replace(one, sure=one.value is not None, why=CONFIRMED)
-    if key == "kind" and text not in ("", of.kind):
-        return _of_kind(of, text)
+    found = replace(one, sure=one.value is not None, why=CONFIRMED)
     if key == "kind":
-        return replace(of, rig=tuple(found if x is one else x for x in of.rig))
-    if key == "motion" and text:
+        if text not in ("", of.kind):
+            return _of_kind(of, text)
+    elif key == "motion" and text:
         if text not in ("linear", "rotary"):
             raise BadAnswer(f"{text!r}: linear or rotary needed")
-        return replace(
-            of, motion="rotary" if text == "rotary" else "linear",
-            signals=tuple(_turned(x) for x in of.signals) if text != of.motion else of.signals,
-            rig=tuple(replace(found, value=text) if x is one else x for x in of.rig),
-        )  # fmt: skip
-    if text == LEAVE_OUT:
+        turned = of.signals if text == of.motion else tuple(map(_turned, of.signals))
+        of = replace(of, motion="rotary" if text == "rotary" else "linear", signals=turned)
+        found = replace(found, value=text)
+    elif text == LEAVE_OUT:
         if key in ("area_p_m2", "area_n_m2") and of.kind == "electro-pneumatic":
             raise BadAnswer(f"a rig of two pressures needs {key}; give a number in {one.unit}")
         found = replace(one, value=None)
@@ -118,14 +116,11 @@ def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
     """The signal from a column, a unit, or both."""
     names = _names(of)
     given = replace(one, sure=True, why="given on the terminal")
-    if text in names:
-        column = names[text]
-        return replace(given, column=column.key, shown=column.shown, gain=None, bits=None)
     before, _, last = text.rpartition(" ")
-    if before.strip() in names:
-        column = names[before.strip()]
-        return replace(given, column=column.key, shown=column.shown, unit=_unit(last),
-                       gain=None, bits=None)  # fmt: skip
+    if column := names.get(text) or names.get(before.strip()):
+        unit = one.unit if text in names else _unit(last)
+        return replace(given, column=column.raw.key, shown=column.shown, unit=unit, gain=None,
+                       bits=None)  # fmt: skip
     if WRITTEN_GAIN.fullmatch(text):
         return replace(given, gain=text)
     if written_unit(text) is None:
@@ -138,8 +133,9 @@ def _unit(text: str) -> str:
     return found.card if found else text
 
 
-def _names(of: Proposal) -> Mapping[str, FileColumn]:
+def _names(of: Proposal) -> Mapping[str, Column]:
     """What a column may be called in an answer: its number, or its header where that is one's."""
-    headers = [one.header for one in of.columns]
-    own = {one.header: one for one in of.columns if headers.count(one.header) == 1 and one.header}
-    return {str(one.number): one for one in of.columns} | own
+    headers = Counter(one.raw.header for one in of.columns)
+    once = [one for one in of.columns if one.raw.header and headers[one.raw.header] == 1]
+    numbers = {str(one.raw.number): one for one in of.columns}
+    return numbers | {one.raw.header: one for one in once}

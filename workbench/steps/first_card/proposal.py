@@ -77,16 +77,6 @@ class RigGuess:
 
 
 @dataclass(frozen=True)
-class FileColumn:
-    """A column of the file: its number, its header, what a card calls it, and how it is shown."""
-
-    number: int
-    header: str
-    key: str | int
-    shown: str
-
-
-@dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
     every column of the file, what else was noticed, the axes that the file holds and the one of the
@@ -104,7 +94,7 @@ class Proposal:
     signals: tuple[SignalGuess, ...]
     rig: tuple[RigGuess, ...]
     unused: Mapping[str, str]
-    columns: tuple[FileColumn, ...]
+    columns: tuple[Column, ...]
     remarks: tuple[str, ...] = ()
     axes: tuple[str, ...] = ()
     axis: str = ""
@@ -225,10 +215,7 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
         signals=tuple(_signals(columns, roles, units)),
         rig=tuple(rig),
         unused=_unused(columns, roles),
-        columns=tuple(
-            FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
-            for one in columns.read
-        ),
+        columns=columns.read,
         remarks=(*columns.notes, *remarks_on(columns, roles, units)),
         axes=columns.axes,
         axis=roles.columns["y"].axis,
@@ -413,7 +400,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
     for name in (name for name in CARD_ORDER if name in found):
         one, unit = found[name], units[name]
         sign = roles.signs.get(name, 1.0)
-        gain: float | str | None = unit.gain if unit.gain is not None else None
+        gain: float | str | None = unit.gain
         if sign < 0.0:
             gain = -1.0 if gain is None else f"-{gain}"
         odds = SURE if name == "t" else roles.odds[name]
@@ -454,14 +441,14 @@ def _extra(columns: Columns, roles: Roles) -> dict[str, str | int]:
 
 def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
     """Columns that the card leaves out, and why."""
-    used = {one.raw.number: name for name, one in roles.columns.items() if name in CARD_ORDER}
+    names = {one.raw.number: name for name, one in roles.columns.items()}
     out = {}
     for one in columns.signals:
-        name = next((name for name, c in roles.columns.items() if c is one), None)
-        if one.raw.number not in used:
+        name = names.get(one.raw.number, "")
+        if name not in CARD_ORDER:
             of_another = one.axis not in ("", roles.columns["y"].axis)
             other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
-            out[one.shown] = roles.why.get(name or "", other)
+            out[one.shown] = roles.why.get(name, other)
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():
         out[shown[number]] = why
