@@ -170,13 +170,11 @@ class RigSection(CardTable):
             area_n=self.area_n_m2,
             supply_pressure=self.supply_pressure_pa,
             force_per_command=in_unit_of(self.force_per_command, per, "rig.force_per_command"),
-            control_limit=_positive(in_unit_of(limit, command, "rig.control_limit")),
+            control_limit=_positive_in(command, limit, "rig.control_limit"),
             stroke=self.stroke_m,
             motion=self.motion,
             command_unit=command,
-            motor_inertia=_positive(
-                in_unit_of(self.motor_inertia, mass, "rig.motor_inertia"), "motor_inertia"
-            ),
+            motor_inertia=_positive_in(mass, self.motor_inertia, "rig.motor_inertia"),
         )
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
@@ -188,9 +186,10 @@ class RigSection(CardTable):
         return "V" if self.control_limit is None else force_unit(self.motion)
 
 
-def _positive(value: float | None, key: str = "control_limit") -> float | None:
+def _positive_in(unit: str, written: float | str | None, where: str) -> float | None:
+    value = in_unit_of(written, unit, where)
     if value is not None and not value > 0:
-        raise BadCard(f"rig.{key} = {value:g}, must be > 0")
+        raise BadCard(f"{where} = {value:g}, must be > 0")
     return value
 
 

@@ -95,8 +95,14 @@ class _Common(CardTable):
         for name, of in GAIN_UNITS[self.kind].items():
             unit = of_law.get(of, of)
             gains[name] = Estimate(_quantity(getattr(self, name), unit, name), unit)
-        T_i = gains["T_i"].value if "T_i" in gains else None
-        forget = T_i if self.anti_windup_s is None else self.anti_windup_s
+        loop = None
+        if self.force is not None:
+            k_i = _quantity(self.force.k_i, units.force_gain, "force.k_i")
+            T_i = _quantity(self.force.T_i, "s", "force.T_i")
+            loop = CardForceLoop(k_i, T_i, self.force.period_s)
+        forget = self.anti_windup_s
+        if forget is None and "T_i" in gains:
+            forget = gains["T_i"].value
         rate = self.reference_rate
         return CardController(
             kind=self.kind,
@@ -104,16 +110,10 @@ class _Common(CardTable):
             polynomials={key: getattr(self, key) for key in "RST" if hasattr(self, key)},
             period=self.period_s,
             output=output,
-            force=self._force(units.force_gain),
+            force=loop,
             rate=None if rate is None else _quantity(rate, units.velocity, "reference_rate"),
             forget=None if isinstance(forget, str) else forget,
         )
-
-    def _force(self, gain: str) -> CardForceLoop | None:
-        if self.force is None:
-            return None
-        k_i = _quantity(self.force.k_i, gain, "force.k_i")
-        return CardForceLoop(k_i, _quantity(self.force.T_i, "s", "force.T_i"), self.force.period_s)
 
 
 class PresentPD(_Common):

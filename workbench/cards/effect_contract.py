@@ -111,10 +111,8 @@ def check_equation(effect: Effect) -> None:
                 )
         for part in PARTS[1:]:
             if getattr(effect, part) is not None:
-                by_hand, found = (
-                    python_answer(effect, part, one),
-                    compiled_answer(effect, part, one),
-                )
+                by_hand = python_answer(effect, part, one)
+                found = compiled_answer(effect, part, one)
                 if not abs(found - by_hand) <= SAME * max(1.0, abs(by_hand)):
                     raise Broken(
                         f"{part} gives {by_hand:.6g} run by Python and {found:.6g} compiled at"
@@ -150,7 +148,7 @@ def check_depends_on(effect: Effect) -> None:
     by_friction = moved_by(effect, "f")  # or it only distinguishes sliding from rest
     found |= {"v"} if by_friction and not set(AT_REST) & set(effect.names) else set()
     found |= {"u"} if effect.place.delays else set()
-    found |= {k for i, k in enumerate(effect.signals) if _moved_in(effect, "s", i, "value")}
+    found |= {name for name in effect.signals if moved_by(effect, name)}
     remembers = moved_by(effect, "z")  # a bristle's state is the simulation's own
     by_state = remembers and effect.evolve is not None
     of_state = {
@@ -168,9 +166,9 @@ def check_depends_on(effect: Effect) -> None:
     if remembers and not declared & (HISTORY | of_state):
         raise Broken("it has a state, and depends_on names nothing that changes the state")
     parts = [part for part in PARTS if getattr(effect, part) is not None]
-    for i, p in enumerate(effect.params):
-        if not any(_moved_in(effect, "p", i, part) for part in parts):
-            raise Broken(f"{p.name} does nothing")
+    for name in effect.names:
+        if not any(moved_by(effect, name, part) for part in parts):
+            raise Broken(f"{name} does nothing")
 
 
 def check_units(effect: Effect) -> None:
@@ -203,33 +201,25 @@ def check_units(effect: Effect) -> None:
 
 
 def moved_by(effect: Effect, name: str, part: str = "value") -> bool:
-    """Whether an argument of the state moves the contribution, or another kernel's answer."""
-    return _moves(
-        effect, part, lambda a, b: Draw({**a.x, name: b.x[name]}, a.s, a.p, a.dt)
-    )  # fmt: skip
-
-
-def _moves(effect: Effect, part: str, change: Callable[[Draw, Draw], Draw]) -> bool:
+    """Whether an argument of the state, a signal or a parameter moves the contribution, or another
+    kernel's answer."""
     rng = np.random.default_rng(9)
     place = effect.place
     own = "y" if place.shows else "u" if place.on_command and not place.delays else None
     base = own if part == "value" else None
     for _ in range(POINTS_DRAWN):
-        one = drawn_arguments(effect, rng)
-        two = change(one, drawn_arguments(effect, rng))
+        one, other = drawn_arguments(effect, rng), drawn_arguments(effect, rng)
+        two = Draw(dict(one.x), one.s.copy(), one.p.copy(), one.dt)
+        if name in STATE_NAMES:
+            two.x[name] = other.x[name]
+        elif name in effect.signals:
+            two.s[effect.signals.index(name)] = other.s[effect.signals.index(name)]
+        else:
+            two.p[effect.names.index(name)] = other.p[effect.names.index(name)]
         a, b = (python_answer(effect, part, k) - (k.x[base] if base else 0.0) for k in (one, two))
         if abs(a - b) > 1e-9 * max(abs(a), abs(b), 1e-9):
             return True
     return False
-
-
-def _moved_in(effect: Effect, which: str, i: int, part: str) -> bool:
-    def change(a: Draw, b: Draw) -> Draw:
-        s, p = a.s.copy(), a.p.copy()
-        (s if which == "s" else p)[i] = (b.s if which == "s" else b.p)[i]
-        return Draw(a.x, s, p, a.dt)
-
-    return _moves(effect, part, change)
 
 
 def _parsed(effect: Effect) -> Any:

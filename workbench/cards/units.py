@@ -224,17 +224,13 @@ def column_scale(
         raise BadCard(_mismatch(unit, number, per, signal, motion))
     if gain is not None and any(conversion(unit, output) for output in _OUTPUTS):
         return Scale(1.0 / number, 0.0)
-    raise BadCard(_not_the_signal(unit, gain, signal, motion))
-
-
-def _not_the_signal(unit: str, gain: float | str | None, signal: str, motion: Motion) -> str:
     text = f"signals.{signal}: unit {unit!r} is not {kind(signal, motion)}"
     if signal == "t":
-        return text
-    number = "<number>" if gain is None else f"{parse_gain(gain).number:g}"
-    return (
+        raise BadCard(text)
+    shown = "<number>" if gain is None else f"{number:g}"
+    raise BadCard(
         f"{text}; write such a unit, or, if {unit!r} is what the sensor gives, its gain with its"
-        f' unit: gain = "{number} {unit}/{_per(signal, motion)}"'
+        f' unit: gain = "{shown} {unit}/{_per(signal, motion)}"'
     )
 
 

@@ -47,7 +47,9 @@ def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
     have, above a row of units or types if there is one; or the row "Name" of a block in which
     each line begins with a key, as TwinCAT's Scope writes.
     """
-    width = _width(lines)
+    # Fields of a line of data: the most frequent number among the last lines.
+    counted = Counter(len(line) for line in lines[len(lines) // 2 :] if line)
+    width = counted.most_common(1)[0][0] if counted else 0
     first = _first_data(lines, width)
     if first is None:
         return None
@@ -73,12 +75,6 @@ def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
 def is_number(field: str) -> bool:
     """Whether the field is empty or a number, with a point or a comma."""
     return not field or NUMBER.fullmatch(field) is not None
-
-
-def _width(lines: Sequence[Sequence[str]]) -> int:
-    """Fields of a line of data: the most frequent number among the last lines."""
-    counted = Counter(len(line) for line in lines[len(lines) // 2 :] if line)
-    return counted.most_common(1)[0][0] if counted else 0
 
 
 def _first_data(lines: Sequence[Sequence[str]], width: int) -> int | None:

@@ -4,7 +4,6 @@ import os
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +28,6 @@ _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
 
 
-@dataclass(frozen=True)
-class _Raw:
-    """Signals as they stand in a file, the number of their first row, and what was done to them."""
-
-    log: Log
-    first_row: int
-    remarks: tuple[str, ...]
-
-
 def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
@@ -45,9 +35,9 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw = _signals_of(_table(path, card), path, card)
-    log = with_force(_repaired(raw, path, card).log, path, card)
-    check(log, card.rig(path.name), raw.first_row)
+    raw, first_row, _ = _signals_of(_table(path, card), path, card)
+    log = with_force(_repaired(raw, first_row, path, card).log, path, card)
+    check(log, card.rig(path.name), first_row)
     return log
 
 
@@ -58,12 +48,11 @@ def read_runs(path: Path, card: Card) -> Prepared:
 
 def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     """As `read_runs`, of a table; path: what the run and the messages are called by."""
-    raw = _signals_of(table, path, card)
-    written, fresh = raw.log, renewed(raw.log)
-    raw = replace(raw, log=fresh.log, remarks=(*raw.remarks, *fresh.remarks))
-    first_row, read = raw.first_row, raw.remarks
-    repaired = _repaired(raw, path, card)
-    del raw  # of a long log a gigabyte
+    log, first_row, read = _signals_of(table, path, card)
+    fresh = renewed(log)
+    period, read = log.h if fresh.remarks else None, (*read, *fresh.remarks)
+    repaired = _repaired(fresh.log, first_row, path, card)
+    del log, fresh  # of a long log a gigabyte
     rig = card.rig(path.name)
     if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
@@ -72,12 +61,11 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    period = written.h if fresh.remarks else repaired.log.h
-    return Prepared(prepared.runs, remarks, bad, period)
+    return Prepared(prepared.runs, remarks, bad, period or repaired.log.h)
 
 
-def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:
-    return repair(raw.log, raw.first_row, rotary=card.rig(path.name).motion == "rotary")
+def _repaired(log: Log, first_row: int, path: Path, card: Card) -> Repaired:
+    return repair(log, first_row, rotary=card.rig(path.name).motion == "rotary")
 
 
 def shown_name(path: Path) -> str:
@@ -98,8 +86,7 @@ def with_force(log: Log, path: Path, card: Card) -> Log:
 
 def read_signals(path: Path, card: Card) -> tuple[Log, int]:
     """The card's signals in SI as they stand in the file, and the number of the first row."""
-    raw = _signals_of(_table(path, card), path, card)
-    return raw.log, raw.first_row
+    return _signals_of(_table(path, card), path, card)[:2]
 
 
 def _table(path: Path, card: Card) -> Table:
@@ -108,8 +95,9 @@ def _table(path: Path, card: Card) -> Table:
     return read_table(path, card.file)
 
 
-def _signals_of(table: Table, path: Path, card: Card) -> _Raw:
-    """The card's signals in SI as they stand in the table, on the clock of `t`."""
+def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[str, ...]]:
+    """The card's signals in SI as they stand in the table, on the clock of `t`, the number of their
+    first row, and what was done to them."""
     signals, groups = dict[str, Array](), dict[str, str]()
     for name, spec in card.signals.items():
         number = table.number(spec.column, f"{path}, signals.{name}")
@@ -118,8 +106,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> _Raw:
         if table.groups:
             groups[name] = table.groups[number]
     if not groups:
-        same = _same_length(signals, path)
-        return _Raw(Log(shown_name(path), same), table.first_row, ())
+        return Log(shown_name(path), _same_length(signals, path)), table.first_row, ()
 
     def clock(group: str) -> Array:
         number = table.clocks.get(group)
@@ -130,7 +117,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> _Raw:
 
     found = on_one_clock(signals, groups, clock, shown_name(path))
     log = Log(shown_name(path), _same_length(found.signals, path))
-    return _Raw(log, table.first_row + found.first, found.remarks)
+    return log, table.first_row + found.first, found.remarks
 
 
 def _signal(table: Table, number: int, name: str, card: Card, path: Path) -> Array:

@@ -176,8 +176,15 @@ def find_data(name: str | Path, card: Card) -> Path:
     if os.environ.get(DATA_VARIABLE):
         folders.insert(0, Path(os.environ[DATA_VARIABLE]) / card.name)
     for folder in folders:
-        if (folder / path).is_file():
-            return _verified(folder / path, entry)
+        if not (folder / path).is_file():
+            continue
+        wanted = entry.sha256 if entry else None
+        if wanted and (found := sha256_of(folder / path)) != wanted:
+            raise BadLog(
+                f"{folder / path}: sha256 {found[:12]}... is not the card's {wanted[:12]}...;"
+                " it was changed or cut off, delete it to fetch it again"
+            )
+        return folder / path
     if entry is None:
         raise BadLog(f"{name}: no such file{_nearest(path, card)}")
     if entry.url is None:
@@ -194,18 +201,6 @@ def _nearest(path: Path, card: Card) -> str:
     if not folder.is_dir():
         return f"; there is no folder {str(folder)!r} either, check the path"
     return nearest(path.name, sorted(p.name for p in folder.iterdir() if p.is_file()))
-
-
-def _verified(path: Path, entry: FileEntry | None) -> Path:
-    if entry is None or entry.sha256 is None:
-        return path
-    found = sha256_of(path)
-    if found != entry.sha256:
-        raise BadLog(
-            f"{path}: sha256 {found[:12]}... is not the card's {entry.sha256[:12]}...; "
-            "it was changed or cut off, delete it to fetch it again"
-        )
-    return path
 
 
 def _download(entry: FileEntry, card: Card) -> Path:

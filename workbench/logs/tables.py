@@ -124,9 +124,10 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
         book = form == "excel" and magic in (_ZIP, _OLE)
         if form in ("csv", "excel") and head.startswith(magic) and not book:
             raise BadLog(f"{path}: is {what}")
+    is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
     wrong = {
         # Of version 4 a MAT file has no such beginning.
-        "mat": not head.startswith(b"MATLAB") and HDF5_MAGIC not in head and _is_text(head),
+        "mat": not head.startswith(b"MATLAB") and HDF5_MAGIC not in head and is_text,
         "hdf5": HDF5_MAGIC not in head,
         "json": head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["),
         "excel": not head.startswith((_ZIP, _OLE)),
@@ -137,10 +138,6 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
         if spec.format is not None:
             advice = ", which the card's [file] format says; take it out, or copy it again"
         raise BadLog(f"{path}: is not a {form} file by its first bytes{advice}")
-
-
-def _is_text(head: bytes) -> bool:
-    return all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
 
 
 def read_table(path: Path, spec: FileSpec) -> Table:

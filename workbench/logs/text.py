@@ -90,17 +90,13 @@ def _blocks(text: str, spec: FileSpec) -> list[Block]:
 
 def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Table:
     """The table, its columns in groups where each of several has a clock before it."""
-    width = len(table.names)
-    whole = [row for row in rows if len(row) == width]
-    first = [_numbers([row[k] for row in whole], marks) for k in range(width)]
+    whole = [row for row in rows if len(row) == len(table.names)]
+    first = list[Array]()
+    for cells in zip(*whole, strict=True):
+        plain = (cell.replace(marks.decimal, ".") for cell in cells if cell and is_number(cell))
+        first.append(np.array([float(cell) for cell in plain]))
     found = clock_groups(table.names, first, table.fetch)
     return replace(table, groups=found.groups, clocks=found.clocks) if found else table
-
-
-def _numbers(cells: Sequence[str], marks: _Marks) -> Array:
-    """The cells as numbers, those that are none left out."""
-    plain = (cell.replace(marks.decimal, ".") for cell in cells if cell and is_number(cell))
-    return np.array([float(cell) for cell in plain], dtype=np.float64)
 
 
 def _first_line_layout(

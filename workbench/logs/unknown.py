@@ -3,6 +3,7 @@ several clocks brought to one of these."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -132,16 +133,19 @@ def read_unknown(path: Path) -> UnknownLog:
     file, are found by looking. Raises BadLog, one line, where there are no columns of numbers.
     """
     form = find_format(path, head_of(path))
-    names, units, notes = tuple[str, ...](), tuple[str, ...](), tuple[str, ...]()
+    names, units, said = tuple[str, ...](), tuple[str, ...](), ""
     if form == "csv":
         spec, names, units = _text_layout(path)
+    elif form == "json":
+        rows, said = _rows_of(path)
+        spec = FileSpec(rows=rows)
     else:
-        spec, notes = _other_layout(path, form)
+        spec = FileSpec(rows=_struct_of(path) if form == "mat" else None)
     table = read_table(path, spec)
     headed = table.headed and not names
     texts, full = names or _plain_names(table, form), table.full_names()
-    if form == "csv" and (rows := len(table.fetch(0))) < SHORTEST_LOG:
-        raise BadLog(_too_short(path, f"{rows} row" + ("s" if rows != 1 else "")))
+    if form == "csv" and (count := len(table.fetch(0))) < SHORTEST_LOG:
+        raise BadLog(_too_short(path, f"{count} row" + ("s" if count != 1 else "")))
     found, scalars = list[RawColumn](), list[RawColumn]()
     for number in range(len(table.names)):
         text = texts[number] if number < len(texts) and (table.headed or names) else ""
@@ -150,8 +154,11 @@ def read_unknown(path: Path) -> UnknownLog:
         key = called[number] if headed and text and not twice else number
         below = units[number] if number < len(units) else ""
         values, why = _numbers(table, number)
-        if why.startswith("text") and (times := _times(table, number, path)) is not None:
-            values, why, below = times, "", "s"
+        if why.startswith("text"):
+            with suppress(BadLog):
+                times = seconds(np.asarray(table.fetch(number)), str(path), table.first_row)
+                if times is not None:
+                    values, why, below = times, "", "s"
         group = table.groups[number] if table.groups else ""
         one = RawColumn(number, key, text, below, values, why, group)
         (scalars if len(values) == 1 else found).append(one)
@@ -161,9 +168,9 @@ def read_unknown(path: Path) -> UnknownLog:
         many = f"{longest} rows of numbers" if longest else "no column of numbers"
         raise BadLog(_too_short(path, many))
     same = [one for one in found if longest - ONE_ROW <= len(one.values) <= longest]
-    rows = min((len(one.values) for one in same), default=0)
-    same = [replace(one, values=one.values[:rows]) for one in same]
-    return UnknownLog(path, spec, tuple(same), tuple(scalars), notes)
+    shortest = min((len(one.values) for one in same), default=0)
+    same = [replace(one, values=one.values[:shortest]) for one in same]
+    return UnknownLog(path, spec, tuple(same), tuple(scalars), (said,) if said else ())
 
 
 def _plain_names(table: Table, form: Format) -> tuple[str, ...]:
@@ -207,14 +214,6 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
         shown = repr(text[:20])
         return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
     return out, ""
-
-
-def _times(table: Table, number: int, path: Path) -> Array | None:
-    """The column as times of day, dates or durations [s]; None where it holds none."""
-    try:
-        return seconds(np.asarray(table.fetch(number)), str(path), table.first_row)
-    except BadLog:
-        return None
 
 
 def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
@@ -280,17 +279,6 @@ def _encoding(path: Path) -> str:
         if name != "cp932" or any("\u3040" <= letter <= "\u9fff" for letter in text):
             return name
     return "utf-8"
-
-
-def _other_layout(path: Path, form: Format) -> tuple[FileSpec, tuple[str, ...]]:
-    """Where the rows of a file that is no text table lie: of a JSON or MAT file within it; and what
-    else is said of it."""
-    rows, said = None, ""
-    if form == "mat":
-        rows = _struct_of(path)
-    elif form == "json":
-        rows, said = _rows_of(path)
-    return FileSpec(rows=rows), (said,) if said else ()
 
 
 def _rows_of(path: Path) -> tuple[str | None, str]:

@@ -83,9 +83,13 @@ def stem(head: Header) -> tuple[str, ...]:
     return tuple(word for word in words_of(head.name) if not says_purpose(word))
 
 
-def correlation(x: Array) -> Array:
-    """Correlation of the columns of x (n, k), (k, k)."""
+def normed(x: Array) -> Array:
+    """Columns (n, k) without their mean, of length one."""
     a = x - x.mean(axis=0)
     size = np.sqrt(np.sum(a**2, axis=0))
-    a = a / np.where(size > 0.0, size, 1.0)
-    return np.asarray(a.T @ a)
+    return np.asarray(a / np.where(size > 0.0, size, 1.0))
+
+
+def correlation(x: Array) -> Array:
+    """Correlation of the columns of x (n, k), (k, k)."""
+    return np.asarray(normed(x).T @ normed(x))

@@ -55,10 +55,10 @@ def known_motion(roles: Roles) -> MotionGuess:
     turn = unit_by_turn(roles.columns["y"])
     if turn is not None:
         return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
-    if _counted_shaft(roles):
+    y = roles.columns["y"]
+    if "u" in roles.columns and is_count(y) and is_current(roles.columns["u"]):
         why = "counts of an encoder beside a motor's current are mostly those of a shaft"
         return MotionGuess("rotary", why, False, rotor)
-    y = roles.columns["y"]
     if is_count(y) and y.header.unit is None and not y.header.means:
         return MotionGuess(
             "rotary", "it has the steps of an encoder, which shafts mostly have", False
@@ -68,11 +68,6 @@ def known_motion(roles: Roles) -> MotionGuess:
         why = f"machines that turn have names like {most.shown} more often"
         return MotionGuess("rotary", why, False, rotor)
     return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
-
-
-def _counted_shaft(roles: Roles) -> bool:
-    """Whether a position in counts is driven by a current."""
-    return "u" in roles.columns and is_count(roles.columns["y"]) and is_current(roles.columns["u"])
 
 
 def is_count(y: Column) -> bool:

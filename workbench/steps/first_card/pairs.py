@@ -16,7 +16,7 @@ from identification.signals.relations import (
     force_laws,
     lead,
 )
-from workbench.steps.first_card.axes import correlation, stem
+from workbench.steps.first_card.axes import correlation, normed, stem
 from workbench.steps.first_card.columns import MOST_ROWS_READ, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
@@ -104,7 +104,7 @@ def _rates(x: Array) -> tuple[Array, Array]:
         step = max(1, size // 4)
         change = (mean[size:] - mean[:-size])[::step]
         rise = (summed[size:] - summed[:-size])[::step]
-        found = _normed(change).T @ _normed(rise)
+        found = normed(change).T @ normed(rise)
         factor = found * np.std(rise, axis=0) / np.maximum(np.std(change, axis=0), 1e-300)[:, None]
         constant = middle + (rise.mean(axis=0) - factor * change.mean(axis=0)[:, None]) / size
         own = np.abs(constant) < MOST_CONSTANT * spread
@@ -114,13 +114,6 @@ def _rates(x: Array) -> tuple[Array, Array]:
     for one in (best, every):
         np.fill_diagonal(one, 0.0)
     return best, every
-
-
-def _normed(x: Array) -> Array:
-    """Columns (n, k) without their mean, of length one."""
-    a = x - x.mean(axis=0)
-    size = np.sqrt(np.sum(a**2, axis=0))
-    return np.asarray(a / np.where(size > 0.0, size, 1.0))
 
 
 def _clipped(before: Column, behind: Column) -> bool:

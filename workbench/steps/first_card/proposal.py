@@ -15,7 +15,7 @@ from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
-from workbench.steps.first_card.motion_guess import MotionGuess, known_motion
+from workbench.steps.first_card.motion_guess import known_motion
 from workbench.steps.first_card.remarks import (
     BALANCED,
     are_exchanged,
@@ -154,20 +154,16 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         )
     _refuse_resting(columns, roles)
     _refuse_sign_bits(columns, roles)
-    named = _card_name(name or path.stem)
+    named = re.sub(r"[^\w.-]+", "-", name or path.stem).strip("-.") or "machine"
     found = _of_roles(columns, roles, named)
-    named_so = roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO
-    if named_so and (share := _velocity_in(roles)) > ALL_FOLLOWED:
-        return _or_velocity(found, roles, share)
+    y = roles.columns["y"].motion
+    assert y is not None
+    if roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO:
+        share = derivative(y, roles.columns["u"].x).share  # of the command, that is the velocity
+        if share > ALL_FOLLOWED:
+            return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
     return replace(found, other=other)
-
-
-def _velocity_in(roles: Roles) -> float:
-    """Share of the command that is the velocity."""
-    y = roles.columns["y"]
-    assert y.motion is not None
-    return derivative(y.motion, roles.columns["u"].x).share
 
 
 def _or_velocity(motor: Proposal, roles: Roles, share: float) -> Proposal:
@@ -200,10 +196,12 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     roles, area = _pressure_beside_force(columns, roles)
     motion = known_motion(roles)
     units = guessed_units(columns, roles, motion)
+    turns = "" if motion.sure else "linear" if motion.motion == "rotary" else "rotary"
     rig = [
-        _kind_guess(roles, other), _motion_guess(motion),
+        _kind_guess(roles, other),
+        RigGuess("motion", motion.motion, "", motion.sure, motion.why, turns),
         *_rig(columns, roles, motion.motion, units),
-    ]  # fmt: skip
+    ]
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
@@ -266,10 +264,6 @@ def _refuse_resting(columns: Columns, roles: Roles) -> None:
             )
 
 
-def _card_name(text: str) -> str:
-    return re.sub(r"[^\w.-]+", "-", text).strip("-.") or "machine"
-
-
 def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str | None]:
     """The roles with the pressures that are logged beside a measured force, and the name of the
     one that the force bears, where it is off zero by more than friction."""
@@ -327,11 +321,6 @@ def _drives(roles: Roles) -> tuple[str, ...]:
 def drive_columns(roles: Roles) -> str:
     """The columns that drive the body, in words."""
     return " and ".join(roles.columns[name].shown for name in _drives(roles))
-
-
-def _motion_guess(found: MotionGuess) -> RigGuess:
-    rival = "" if found.sure else "linear" if found.motion == "rotary" else "rotary"
-    return RigGuess("motion", found.motion, "", found.sure, found.why, rival)
 
 
 def _rig(

@@ -139,7 +139,8 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
     best = choices[0]
-    other = _of_another_kind(best, choices)
+    same = (one for one in choices if one.way.y is best.way.y)
+    other = next((one for one in same if one.way.kind != best.way.kind), None)
     rest = None if other is None else _roles_of(other, [one for one in choices if one is not best])
     ahead = np.inf if other is None else best.score - other.score
     return replace(_roles_of(best, choices), other=rest, ahead=ahead)
@@ -390,12 +391,6 @@ def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
             if role not in out and other is not None and other is not column:
                 out[role] = other
     return out
-
-
-def _of_another_kind(best: _Choice, choices: Sequence[_Choice]) -> _Choice | None:
-    """The likeliest choice of another kind of rig with the same position."""
-    others = (one for one in choices if one.way.y is best.way.y)
-    return next((one for one in others if one.way.kind != best.way.kind), None)
 
 
 def _reasons(best: _Choice) -> dict[str, str]:

@@ -72,7 +72,8 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     if "r" not in out:
         out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
     for name, column in found.items():
-        if name not in out and name == "u" and _beside_counts(roles):
+        nameless = name == "u" and not column.header.means and column.bits is None
+        if name not in out and nameless and is_count(roles.columns["y"]):
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
             out[name] = _alone(name, column, motion)
@@ -90,19 +91,19 @@ def _of_header(name: str, column: Column) -> UnitGuess | None:
 def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) -> Units:
     """Units of clock, position, force and velocity that go together best."""
     turns = "" if motion.motion == "linear" else " rotary"
-    open_of = {
-        "t": _open("t", given) or _clock_units(columns.clock),
-        "y": _open("y", given) or USUAL[f"y{turns}"],
-        "F": _open("F", given) or (USUAL[f"F{turns}"] if "F" in roles.columns else {"": 0.0}),
-        "v": _open("v", given) or (USUAL[f"v{turns}"] if "v" in roles.columns else {"": 0.0}),
-    }
+    usual = {"t": _clock_units(columns.clock), "y": USUAL[f"y{turns}"]}
+    for name in ("F", "v"):
+        usual[name] = USUAL[f"{name}{turns}"] if name in roles.columns else {"": 0.0}
+    open_of = {k: {given[k].unit: 0.0} if k in given else of for k, of in usual.items()}
     slope = _slope(columns, roles)
     scored = []
     for units in product(*(of.items() for of in open_of.values())):
         names = dict(zip(open_of, (unit for unit, _ in units), strict=True))
-        usual = sum(weight for _, weight in units)
-        likely = usual + _plausible(columns, roles, motion.machine, names, given)
-        scored.append((likely - _disagreement(names, given, slope), names))
+        likely = sum(weight for _, weight in units)
+        likely += _plausible(columns, roles, motion.machine, names, given)
+        off = _off(names, given, slope)
+        likely -= 0.0 if off is None else min(0.5 * (off / AGREES) ** 2, MOST_LOST)
+        scored.append((likely, names))
     scored.sort(key=lambda one: -one[0])
     _, names = scored[0]
     out = {}
@@ -118,11 +119,6 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         rival = others[0][1] if others else ""
         out[name] = UnitGuess(unit, None, counted or related, why, rival)
     return out
-
-
-def _open(name: str, given: Mapping[str, UnitGuess]) -> Mapping[str, float]:
-    """The one unit that is given, else none."""
-    return {given[name].unit: 0.0} if name in given else {}
 
 
 def _ticks(columns: Columns) -> UnitGuess | None:
@@ -189,12 +185,6 @@ def _off(units: Mapping[str, str], given: Units, slope: float | None) -> float |
     return float(np.log(max(ratio, 1e-300)))
 
 
-def _disagreement(units: Mapping[str, str], given: Units, slope: float | None) -> float:
-    """Log-probability lost where velocity and position contradict each other."""
-    off = _off(units, given, slope)
-    return 0.0 if off is None else min(0.5 * (off / AGREES) ** 2, MOST_LOST)
-
-
 def _by_relation(name: str, units: Mapping[str, str], given: Units, slope: float | None) -> bool:
     """Whether the other two of clock, position and velocity are given, and make sure of this."""
     off = _off(units, given, slope)
@@ -242,12 +232,6 @@ def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
         return UnitGuess(unit, None, False, "by its size, the header says none", rival)
     unit = max(USUAL.get(name, {"1": 0.0}).items(), key=lambda one: one[1])[0]
     return UnitGuess(unit, None, False, "the usual one, the header says none")
-
-
-def _beside_counts(roles: Roles) -> bool:
-    """Whether a command of which its header says nothing stands beside counts."""
-    u = roles.columns["u"]
-    return is_count(roles.columns["y"]) and not u.header.means and u.bits is None
 
 
 def _of_command(column: Column) -> UnitGuess:

@@ -11,7 +11,7 @@ from identification.signals.renewal import RENEWED_AT
 from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
-from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
+from workbench.steps.first_card.proposal import Proposal, SignalGuess
 from workbench.steps.hardly_identifiable import hardly_identifiable
 
 LEGEND = (
@@ -26,18 +26,21 @@ def written(of: Proposal, *, asked: bool = False) -> str:
     head = (f"Written by workbench init from {of.path.name}{by}.", *LEGEND)
     tables: dict[str, Sequence[Line]] = {
         "card": [Line("name", of.name)],
-        "rig": [*map(_rig_line, of.rig)],
+        "rig": [
+            Line(
+                one.key,
+                one.value,
+                _remark(one.sure, f"{one.unit}: {one.why}".lstrip(": "), one.rival),
+            )
+            for one in of.rig
+        ],
         "signals": [_signal_line(one) for one in of.signals],
     }
     layout = of.spec.model_dump(exclude_defaults=True)
     if layout:
         tables["file"] = [Line(key, value) for key, value in layout.items()]
-    return card_text(head, tables, _tail(of))
-
-
-def _rig_line(one: RigGuess) -> Line:
-    why = f"{one.unit}: {one.why}".lstrip(": ")
-    return Line(one.key, one.value, _remark(one.sure, why, one.rival))
+    left_out = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
+    return card_text(head, tables, [*of.hardly, *of.remarks, *left_out, *_extra(of)])
 
 
 def _signal_line(one: SignalGuess) -> Line:
@@ -54,11 +57,6 @@ def _signal_line(one: SignalGuess) -> Line:
 def _remark(sure: bool, why: str, rival: str) -> str:
     other = "" if sure or not rival else f"; else {rival}"
     return f"{'sure' if sure else 'guess'}: {why}{other}"
-
-
-def _tail(of: Proposal) -> list[str]:
-    lines = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
-    return [*of.hardly, *of.remarks, *lines, *_extra(of)]
 
 
 def _extra(of: Proposal) -> list[str]:
