@@ -92,4 +92,5 @@ def normed(x: Array) -> Array:
 
 def correlation(x: Array) -> Array:
     """Correlation of the columns of x (n, k), (k, k)."""
-    return np.asarray(normed(x).T @ normed(x))
+    a = normed(x)
+    return np.asarray(a.T @ a)

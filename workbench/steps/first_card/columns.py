@@ -1,7 +1,7 @@
 """Columns of an unknown log made comparable: the clock found, the others on its even grid."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,7 +12,6 @@ from identification.errors import BadLog
 from identification.signals.differentiate import Motion, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
-from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import Header, read_header
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
@@ -109,22 +108,18 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """The clock, the columns that may be signals, and why each of the others is not.
+    """A log's clock, the columns that may be signals, and why each of the others is not.
 
-    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`;
-    notes: what else the file holds.
+    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`.
     """
 
-    path: Path
-    spec: FileSpec
+    log: UnknownLog
     clock: Column
     step: float
     grid: int
     signals: tuple[Column, ...]
     left_out: Mapping[int, str]
     read: tuple[Column, ...]
-    scalars: tuple[Column, ...] = field(default=())
-    notes: tuple[str, ...] = ()
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -134,7 +129,9 @@ class Columns:
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    read = [_signed(one) for one in _known_units([_column(one) for one in log.columns])]
+    headed = [Column(one, read_header(one.header, one.unit_below), one.values, one.values)
+              for one in log.columns]  # fmt: skip
+    read = [_signed(one) for one in _known_units(headed)]
     usable = [one for one in read if not _unusable(one)]
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
@@ -145,15 +142,8 @@ def columns_of(log: UnknownLog) -> Columns:
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
     distinct, twice = _without_doubles(signals)
-    distinct = _with_axes(distinct)
-    return Columns(
-        log.path, log.spec, clock, step, grid, tuple(distinct), left_out | twice,
-        tuple(read), tuple(_column(one) for one in log.scalars), log.notes,
-    )  # fmt: skip
-
-
-def _column(raw: RawColumn) -> Column:
-    return Column(raw, read_header(raw.header, raw.unit_below), raw.values, raw.values)
+    own = tuple(_with_axes(distinct))
+    return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
 
 
 def _known_units(columns: Sequence[Column]) -> list[Column]:

@@ -205,16 +205,16 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
-        path=columns.path,
+        path=columns.log.path,
         name=name,
         kind=roles.kind,
         motion=motion.motion,
-        spec=columns.spec,
+        spec=columns.log.spec,
         signals=tuple(_signals(columns, roles, units)),
         rig=tuple(rig),
         unused=_unused(columns, roles),
         columns=columns.read,
-        remarks=(*columns.notes, *remarks_on(columns, roles, units)),
+        remarks=(*columns.log.notes, *remarks_on(columns, roles, units)),
         axes=columns.axes,
         axis=roles.columns["y"].axis,
         extra=_extra(columns, roles),
@@ -233,8 +233,8 @@ def _of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Colu
         return columns.signals, named[0]
     there = ", ".join(columns.axes) or "its headers name one alone"
     raise BadLog(
-        f"{columns.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of a"
-        " position"
+        f"{columns.log.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
+        " a position"
     )
 
 
@@ -246,7 +246,7 @@ def _refuse_sign_bits(columns: Columns, roles: Roles) -> None:
             continue
         top = 2**found.sign_bit
         raise BadLog(
-            f"{columns.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
+            f"{columns.log.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
             f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
             f" write x where x < {top}, else {top} - x, and give that log"
         )
@@ -259,7 +259,7 @@ def _refuse_resting(columns: Columns, roles: Roles) -> None:
         why = columns.left_out.get(one.raw.number, "")
         if why.startswith("is always") and said(one, "y") >= max(SURE, said(y, "y") + 1.0):
             raise BadLog(
-                f"{columns.path}: column {one.shown}, the position by its header, {why}; motion"
+                f"{columns.log.path}: column {one.shown}, the position by its header, {why}; motion"
                 " needed: check the sensor, or leave the column out"
             )
 
@@ -357,9 +357,9 @@ def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
 
 def _motor_constant(columns: Columns, force: str) -> RigGuess:
     """Force per command from a single value in the file whose name says so."""
-    for one in columns.scalars:
-        if MOTOR_CONSTANT.search(one.raw.header.strip()) and np.isfinite(one.values[0]):
-            why = f"the file's {one.raw.header!r}; check that it is {force} for one unit of u"
+    for one in columns.log.scalars:
+        if MOTOR_CONSTANT.search(one.header.strip()) and np.isfinite(one.values[0]):
+            why = f"the file's {one.header!r}; check that it is {force} for one unit of u"
             return RigGuess("force_per_command", float(one.values[0]), f"{force}/u", False, why)
     why = (
         "not in any log: the motor's constant times the amplifier's gain; identify needs it"
