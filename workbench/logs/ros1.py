@@ -7,7 +7,8 @@ length.
 
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 _FORMATS = {
@@ -27,7 +28,7 @@ class _Field(NamedTuple):
     length: int | None  # of an array; 0: given by the message, None: no array
 
 
-Definitions = dict[str, list[_Field]]
+Definitions = Mapping[str, Sequence[_Field]]
 
 
 def ros1_decoder(name: str, text: str) -> Callable[[bytes], dict[str, Any]]:
@@ -39,12 +40,10 @@ def ros1_decoder(name: str, text: str) -> Callable[[bytes], dict[str, Any]]:
     """
     first, *rest = _DEFINITION.split(text.replace("\r\n", "\n"))
     named = dict(zip(rest[::2], rest[1::2], strict=True))
-    definitions: Definitions = {key: _fields(body) for key, body in named.items()}
-    definitions[name] = _fields(first)
-    package = name.partition("/")[0]
+    definitions = {key: _fields(body) for key, body in named.items()} | {name: _fields(first)}
 
     def decode(data: bytes) -> dict[str, Any]:
-        return _message(definitions, definitions[name], package, data, 0, 0)[0]
+        return _Bytes(definitions, data).message(name)
 
     return decode
 
@@ -63,49 +62,51 @@ def _fields(body: str) -> list[_Field]:
     return out
 
 
-def _message(
-    definitions: Definitions, fields: list[_Field], package: str, data: bytes, at: int, depth: int
-) -> tuple[dict[str, Any], int]:
-    """Fields of the message whose bytes begin at `at`, and where they end."""
-    if depth > _NESTED:
-        raise ValueError("definitions lie too deep in each other")
-    out: dict[str, Any] = {}
-    for field in fields:
-        count, many = 1, field.length is not None
+@dataclass
+class _Bytes:
+    """A message's bytes and what they mean, read from `at` on."""
+
+    definitions: Definitions
+    data: bytes
+    at: int = 0
+
+    def message(self, name: str, depth: int = 0) -> dict[str, Any]:
+        """The fields of a message."""
+        if depth > _NESTED:
+            raise ValueError("definitions lie too deep in each other")
+        package = name.partition("/")[0]
+        return {one.name: self._field(one, package, depth) for one in self.definitions[name]}
+
+    def _take(self, form: str) -> tuple[Any, ...]:
+        values = struct.unpack_from(f"<{form}", self.data, self.at)
+        self.at += struct.calcsize(f"<{form}")
+        return values
+
+    def _field(self, field: _Field, package: str, depth: int) -> Any:
+        count = 1 if field.length is None else field.length
         if field.length == 0:
-            (count,) = struct.unpack_from("<I", data, at)
-            at += 4
-            if count > len(data):
+            (count,) = self._take("I")
+            if count > len(self.data):
                 raise ValueError("an array is longer than its message")
-        elif field.length is not None:
-            count = field.length
         if field.kind in _FORMATS:
-            form = f"<{count}{_FORMATS[field.kind]}"
-            values: list[Any] = list(struct.unpack_from(form, data, at))
-            at += struct.calcsize(form)
+            values = list(self._take(f"{count}{_FORMATS[field.kind]}"))
         else:
-            values = []
-            for _ in range(count):
-                value, at = _compound(definitions, field.kind, package, data, at, depth)
-                values.append(value)
-        out[field.name] = values if many else values[0]
-    return out, at
+            values = [self._compound(field.kind, package, depth) for _ in range(count)]
+        return values[0] if field.length is None else values
 
-
-def _compound(
-    definitions: Definitions, kind: str, package: str, data: bytes, at: int, depth: int
-) -> tuple[Any, int]:
-    """A text, a time or a message within a message, and where it ends."""
-    if kind in _MOMENTS:
-        secs, nsecs = struct.unpack_from(f"<{_MOMENTS[kind]}", data, at)
-        return {"secs": secs, "nsecs": nsecs}, at + 8
-    if kind == "string":
-        (size,) = struct.unpack_from("<I", data, at)
-        if at + 4 + size > len(data):
-            raise ValueError("a text is longer than its message")
-        return data[at + 4 : at + 4 + size], at + 4 + size
-    whole = "std_msgs/Header" if kind == "Header" else kind
-    found = next((one for one in (whole, f"{package}/{kind}") if one in definitions), None)
-    if found is None:
-        raise ValueError(f"no definition of {kind!r}")
-    return _message(definitions, definitions[found], found.partition("/")[0], data, at, depth + 1)
+    def _compound(self, kind: str, package: str, depth: int) -> Any:
+        """A text, a time or a message within a message."""
+        if kind in _MOMENTS:
+            secs, nsecs = self._take(_MOMENTS[kind])
+            return {"secs": secs, "nsecs": nsecs}
+        if kind == "string":
+            (size,) = self._take("I")
+            if self.at + size > len(self.data):
+                raise ValueError("a text is longer than its message")
+            self.at += size
+            return self.data[self.at - size : self.at]
+        whole = "std_msgs/Header" if kind == "Header" else kind
+        found = next((one for one in (whole, f"{package}/{kind}") if one in self.definitions), None)
+        if found is None:
+            raise ValueError(f"no definition of {kind!r}")
+        return self.message(found, depth + 1)

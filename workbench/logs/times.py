@@ -1,6 +1,7 @@
 """Times written as durations, clock times or dates, as seconds."""
 
 import re
+from contextlib import suppress
 from datetime import date, datetime, time, timedelta
 from typing import Any
 
@@ -100,10 +101,8 @@ def _text_moment(text: str) -> tuple[date | None, float] | None:
 
 def _day(text: str) -> date | None:
     for form in _DATES:
-        try:
+        with suppress(ValueError):
             return datetime.strptime(text, form).date()
-        except ValueError:
-            continue
     return None
 
 

@@ -199,3 +199,17 @@ def test_what_else_was_measured_is_offered(
     text = path.read_text("utf-8").replace("# pos_rod = {", "pos_rod = {")
     path.write_text(text.replace("# force_per_command = ...", "force_per_command = 1.0"), "utf-8")
     assert load_card(path).signals["pos_rod"].column == "pos rod"
+
+
+@pytest.mark.parametrize("rows", [5000, 25000])
+def test_the_rate_of_counted_samples_is_found_in_short_and_long_logs(
+    rows: int, tmp_path: Path
+) -> None:
+    t, w = 1e-3 * np.arange(rows), np.pi
+    y = 20.0 * np.sin(w * t) + 5.0 * np.sin(2.7 * w * t + 1.0)
+    v = np.gradient(y, t)
+    F = 15.0 * np.sign(v) + 0.2 * v + 2e-3 * np.gradient(v, t)
+    noise = 0.01 * np.random.default_rng(1).standard_normal((2, rows))
+    columns = (np.arange(rows, dtype=np.float64), np.round(y, 3), v + noise[0], F + noise[1])
+    one = propose(tmp_path, "sample,pos [mm],vel [mm/s],force [N]", *columns).signal("t")
+    assert one is not None and (one.unit, one.gain) == ("1", "1000 1/s")

@@ -23,7 +23,12 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
     yield from _of_clock(columns, second, h)
     yield from _of_names(columns, roles)
     if (ratio := contradicted_clock(columns, roles, dict(units))) is not None:
-        yield _contradiction(roles, units, ratio)
+        slow = f"{ratio:.3g} times too fast" if ratio > 1.0 else f"{1.0 / ratio:.3g} times too slow"
+        yield (
+            f"the velocity {roles.columns['v'].shown} is {ratio:.3g} times the derivative of the"
+            f" position by this clock: the clock runs {slow}, or the unit of position"
+            f" ({units['y'].unit}) or velocity ({units['v'].unit}) is another"
+        )
     if roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
         balance, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
         if balance > BALANCED * coulomb:
@@ -79,13 +84,3 @@ def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
     for name in (name for name, many in Counter(one.header for one in raw).items() if many > 1):
         places = [str(one.number) for one in raw if one.header == name]
         yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: taken by number"
-
-
-def _contradiction(roles: Roles, units: Mapping[str, UnitGuess], ratio: float) -> str:
-    """In words, that clock and velocity do not go together."""
-    slow = f"{ratio:.3g} times too fast" if ratio > 1.0 else f"{1.0 / ratio:.3g} times too slow"
-    return (
-        f"the velocity {roles.columns['v'].shown} is {ratio:.3g} times the derivative of the"
-        f" position by this clock: the clock runs {slow}, or the unit of position"
-        f" ({units['y'].unit}) or velocity ({units['v'].unit}) is another"
-    )
