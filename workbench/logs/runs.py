@@ -20,7 +20,7 @@ from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
-from workbench.logs.table import Table, damaged, number_of, text_of
+from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
 
@@ -123,12 +123,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
 def _signal(table: Table, number: int, name: str, card: Card, path: Path) -> Array:
     """A column of the table in SI, as the signal `name` of the card."""
     spec = card.signals[name]
-    try:
-        raw = table.fetch(number)
-    except BadLog:
-        raise
-    except Exception as error:  # columns are read late, so damage may show only here
-        raise damaged(path, card.file.format or "data", error) from error
+    raw = table.fetch(number)
     where = f"{path}: column {spec.column!r}"
     numbers = seconds(raw, where, table.first_row) if name == "t" else None
     if numbers is None:

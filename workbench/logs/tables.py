@@ -7,8 +7,9 @@ raise on damaged files becomes BadLog in one line.
 import json
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from workbench.logs.table import (
 from workbench.logs.text import read_text_table
 
 _OBJECT_MARK = "MATLAB_object_decode"  # attribute of an object in a MAT file of version 7.3
+Value = TypeVar("Value")
 JSON_BYTES = 100_000_000  # of text; as Python's values it takes ten times that
 
 HDF5_MAGIC = b"\x89HDF"
@@ -157,12 +159,18 @@ def read_table(path: Path, spec: FileSpec) -> Table:
         "npy": read_numpy,
         "rosbag": read_bag,
     }
-    try:
-        return readers[form](path, spec)
-    except BadLog:
-        raise
-    except Exception as error:  # damaged files make the readers raise nearly anything
-        raise damaged(path, form, error) from error
+
+    def guarded(read: Callable[[], Value]) -> Value:
+        try:
+            return read()
+        except BadLog:
+            raise
+        except Exception as error:  # damaged files make the readers raise nearly anything
+            raise damaged(path, form, error) from error
+
+    table = guarded(lambda: readers[form](path, spec))
+    # Columns are read late, so damage may show only there.
+    return replace(table, fetch=lambda number: guarded(lambda: table.fetch(number)))
 
 
 def _read_parquet(path: Path, spec: FileSpec) -> Table:
@@ -236,7 +244,7 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
             refuse_long(path, max(root.shape, default=0))
             return of_array(path, root[()].T if matlab else root[()], spec)
         names: list[str] = []
-        variables = [root[name] for name in root if not name.startswith("#")]  # "#": MATLAB's own
+        variables = (root[name] for name in root if not name.startswith("#"))  # "#": MATLAB's own
         if matlab and all(_OBJECT_MARK in item.attrs for item in variables):
             raise BadLog(_objects(path))
 

@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 
 from identification.errors import BadLog
-from tests.workbench.log_files import signals
+from tests.workbench.log_files import signals, write_parquet
 from workbench.logs.unknown import read_unknown
 
 S = signals()
@@ -122,3 +122,14 @@ def test_a_pipe_is_refused_before_it_is_opened(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "log.csv")
     with pytest.raises(BadLog, match="is a pipe"):
         read_unknown(tmp_path / "log.csv")
+
+
+def test_damage_that_shows_only_in_a_column_is_said_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "run.parquet"
+    write_parquet(path, signals())
+    content = bytearray(path.read_bytes())
+    content[60:90] = bytes(30)
+    path.write_bytes(content)
+    with pytest.raises(BadLog, match="cannot be read as a parquet file") as refused:
+        read_unknown(path)
+    assert "\n" not in str(refused.value)
