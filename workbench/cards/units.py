@@ -106,7 +106,9 @@ def conversion(unit: str, target: str | None, per: str | None = None) -> Scale |
     wanted = None if target is None else _parsed(target)
     parsed = _parsed(unit) if per is None else _parsed(unit) / _parsed(per)
     try:
-        points = [_to_si(value, parsed, wanted) for value in (0.0, 1.0, 2.0)]
+        values = [_registry().Quantity(value, parsed) for value in (0.0, 1.0, 2.0)]
+        in_si = [one.to_base_units() if wanted is None else one.to(wanted) for one in values]
+        points = [float(one.magnitude) for one in in_si]
     except pint.DimensionalityError:
         return None
     except Exception as error:  # pint raises all kinds of errors on odd combinations
@@ -138,11 +140,6 @@ def _powers_are_small(unit: str) -> bool:
 def _unknown(unit: str) -> BadCard:
     shown = unit if len(unit) <= LONGEST_UNIT else f"{unit[:LONGEST_UNIT]}..."
     return BadCard(f"unit {shown!r} is unknown; write it as in 'mm', 'bar', 'N m'")
-
-
-def _to_si(value: float, unit: "pint.Unit", base: "pint.Unit | None") -> float:
-    quantity = _registry().Quantity(value, unit)
-    return float((quantity.to(base) if base is not None else quantity.to_base_units()).magnitude)
 
 
 @cache

@@ -53,7 +53,10 @@ def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) ->
     times = {name: one for name in groups if (one := _clock(name, columns, clocks)) is not None}
     if len(groups) < 2 or not times:
         return list(columns)
-    base = times[_base(columns, times)]
+    period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
+    quick = [name for name in times if period[name] < FAR_SLOWER * min(period.values())]
+    many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
+    base = times[max(quick, key=lambda name: (many[name], period[name]))]
     known = np.isfinite(base.values)
     moved = [_moved(one, times.get(one.group), base) for one in columns]
     return [replace(one, values=one.values[known]) if len(one.values) == len(known) else one
@@ -72,14 +75,6 @@ def _clock(group: str, columns: Sequence[RawColumn], clocks: Mapping[str, int]) 
 def _rises(x: Array) -> bool:
     known = x[np.isfinite(x)]
     return len(known) >= SHORTEST_LOG and bool(np.all(np.diff(known) > 0.0))
-
-
-def _base(columns: Sequence[RawColumn], times: Mapping[str, RawColumn]) -> str:
-    """The group by whose clock the log is looked at."""
-    period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
-    quick = [name for name in times if period[name] < FAR_SLOWER * min(period.values())]
-    many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
-    return max(quick, key=lambda name: (many[name], period[name]))
 
 
 def _moved(one: RawColumn, own: RawColumn | None, base: RawColumn) -> RawColumn:

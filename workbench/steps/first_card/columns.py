@@ -129,11 +129,16 @@ class Columns:
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    headed = [Column(one, read_header(one.header, one.unit_below), one.values, one.values)
-              for one in log.columns]  # fmt: skip
-    read = [_signed(one) for one in _known_units(headed)]
-    usable = [one for one in read if not _unusable(one)]
+    heads = [read_header(one.header, one.unit_below) for one in log.columns]
+    if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
+        heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
+    read = list[Column]()
+    for raw, header in zip(log.columns, heads, strict=True):
+        register = read_register(raw.values)
+        values = raw.values if register is None else register.values
+        read.append(Column(raw, header, values, values, register))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
+    usable = [one for one in read if one.raw.number not in left_out]
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
     step = float(np.median(np.diff(clock.values)))
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
@@ -146,14 +151,6 @@ def columns_of(log: UnknownLog) -> Columns:
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
 
 
-def _known_units(columns: Sequence[Column]) -> list[Column]:
-    """The columns, their doubtful units believed where others' headers end in units too."""
-    plain = [one for one in columns if one.header.unit and not one.header.doubtful]
-    if len(plain) < FEWEST_WITH_UNITS:
-        return list(columns)
-    return [replace(one, header=replace(one.header, doubtful=False)) for one in columns]
-
-
 def _unusable(one: Column) -> str:
     """Why a column cannot be a signal, empty where it can."""
     if one.raw.unusable:
@@ -164,14 +161,6 @@ def _unusable(one: Column) -> str:
     if np.ptp(one.values[finite]) == 0.0:
         return f"is always {one.values[finite][0] + 0.0:g}"
     return ""
-
-
-def _signed(one: Column) -> Column:
-    """The column as its register means it, where it counts below zero in one."""
-    found = read_register(one.values)
-    if found is None:
-        return one
-    return replace(one, values=found.values, x=found.values, register=found)
 
 
 def _ticks(one: Column) -> bool:
@@ -231,7 +220,6 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
             - means.get("count", 0.0)
             + (4.0 if unit and unit.quantity == "time" else 0.0)
             - (ROW_NUMBERS if counted else 0.0)
-            - (4.0 if unit and unit.quantity not in ("time", "count") else 0.0)
         )
 
     return max(ticking, key=likely)

@@ -267,31 +267,28 @@ def by_reference(
     turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
     if turn is not None:
         return UnitGuess(unit, f"{turn} count/turn", True, "it leaps back after a turn")
+
+    def guess(number: float, why: str, rival: float | None = None) -> UnitGuess:
+        other = "" if rival is None else f"{rival:.9g} {unit}/{per}"
+        return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, other)
+
     if (rate := _by_velocity(columns, roles, given, motion)) is not None:
-        number = _sensible(rate, per == "turn")
-        return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, "by the velocity beside it")
+        return guess(_sensible(rate, per == "turn"), "by the velocity beside it")
     if r is not None and not is_output(r):
-        together = lead(r.x, y.x)
         known = given.get("r")
         usual = USUAL["y" if motion == "linear" else "y rotary"]
         per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)[0]
-        if abs(together.likeness) > WELL_KNOWN:
+        if abs(lead(r.x, y.x).likeness) > WELL_KNOWN:
             number = _sensible(_slow_ratio(y.x, r.x), per == "turn")
-            why = f"by its size beside the reference {r.shown}"
-            return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
+            return guess(number, f"by its size beside the reference {r.shown}")
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
-    span = 2.0 ** np.ceil(np.log2(max(float(np.ptp(y.numbers)), 1.0)))
-    one_turn = float(np.ptp(y.numbers)) > NEARLY_A_TURN * span
-    if motion == "rotary" and unit == "count" and one_turn and span in COUNTS_OF_A_TURN:
-        rival = f"{number:.9g} {unit}/{per}"
-        return UnitGuess(unit, f"{span:.9g} {unit}/{per}", False,
-                         f"it spans nearly {span:.9g}, a turn it may be", rival)  # fmt: skip
-    rival = f"{other:.9g} {unit}/{per}"
+    why, width = "not in the log: see the sensor's data sheet", float(np.ptp(y.numbers))
     if unit == "V":
-        number = _sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0))
-        rival = ""
-    why = "not in the log: see the sensor's data sheet"
-    return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, rival)
+        return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
+    span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
+    if motion == "rotary" and width > NEARLY_A_TURN * span and span in COUNTS_OF_A_TURN:
+        return guess(span, f"it spans nearly {span:.9g}, a turn it may be", number)
+    return guess(number, why, other)
 
 
 def _by_velocity(
