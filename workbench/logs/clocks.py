@@ -2,6 +2,7 @@
 it is of, and brought to the clock of one."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from identification.errors import BadLog
 from identification.remarks import MinorRemark
 from identification.signals.clean import LONGEST_GAP, at_times
 from workbench.cards.headers import read_header
-from workbench.logs.table import RawColumn
+from workbench.logs.table import RawColumn, Table
 
 FEWEST_GROUPS = 2
 STEPS_ALIKE = 0.5  # of the median step, that most steps of a clock are off it at most
@@ -24,17 +25,9 @@ _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 Clock = Callable[[str], Array]
 
 
-class ClockGroups(NamedTuple):
-    """The group of each column, and the column of each group's clock."""
-
-    groups: tuple[str, ...]
-    clocks: Mapping[str, int]
-
-
-def clock_groups(
-    names: Sequence[str], first: Sequence[Array], fetch: Callable[[int], RawColumn]
-) -> ClockGroups | None:
-    """Groups of columns that each begin with their clock; None where there is one clock.
+def clock_groups(table: Table, first: Sequence[Array]) -> Table | None:
+    """The table in groups of columns that each begin with their clock; None where there is one
+    clock.
 
     Either each column has its own clock before it, or each clock is called one. The clocks differ,
     and most of their times are the same. first: the first numbers of each column, which spare
@@ -43,6 +36,7 @@ def clock_groups(
     rising = [k for k, x in enumerate(first) if len(x) > 2 and _even(x)]
     if len(rising) < FEWEST_GROUPS or rising[0] != 0:
         return None
+    names = table.names
     pairs = list(range(0, len(names), 2))
     called = [k for k in rising if "time" in read_header(names[k]).means]
     if not (len(names) % 2 == 0 and set(pairs) <= set(rising)):
@@ -52,7 +46,7 @@ def clock_groups(
     ends = [*pairs[1:], len(names)]
     if any(end - begin < 2 for begin, end in zip(pairs, ends, strict=True)):
         return None
-    times = [_numbers(fetch(k)) for k in pairs]
+    times = [_numbers(table.fetch(k)) for k in pairs]
     if not _of_one_recording(times):
         return None
     groups = list[str]()
@@ -60,7 +54,7 @@ def clock_groups(
         name = names[begin + 1] if end - begin == 2 else names[begin]
         groups += [name] * (end - begin)
     at = {groups[k]: k for k in pairs}
-    return ClockGroups(tuple(groups), at) if len(at) == len(pairs) else None
+    return replace(table, groups=tuple(groups), clocks=at) if len(at) == len(pairs) else None
 
 
 def _numbers(raw: RawColumn) -> Array:

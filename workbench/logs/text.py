@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +95,7 @@ def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Tabl
     for cells in zip(*whole, strict=True):
         plain = (cell.replace(marks.decimal, ".") for cell in cells if cell and is_number(cell))
         first.append(np.array([float(cell) for cell in plain]))
-    found = clock_groups(table.names, first, table.fetch)
-    return replace(table, groups=found.groups, clocks=found.clocks) if found else table
+    return clock_groups(table, first) or table
 
 
 def _first_line_layout(

@@ -7,8 +7,9 @@ import pytest
 
 from identification.arrays import Array
 from workbench.cards.card import load_card
-from workbench.logs.clocks import ClockGroups, clock_groups
+from workbench.logs.clocks import clock_groups
 from workbench.logs.runs import read_log
+from workbench.logs.table import Table
 from workbench.logs.unknown import read_unknown
 
 T: Array = np.asarray(2e-3 * np.arange(600), dtype=np.float64)
@@ -16,8 +17,9 @@ Y: Array = 0.1 * np.sin(6.0 * T)
 F: Array = np.cos(6.0 * T)
 
 
-def told(names: list[str], *columns: Array) -> ClockGroups | None:
-    return clock_groups(names, [one[:40] for one in columns], lambda k: columns[k])
+def told(names: list[str], *columns: Array) -> Table | None:
+    table = Table(tuple(names), lambda k: columns[k])
+    return clock_groups(table, [one[:40] for one in columns])
 
 
 def write(path: Path, names: str, *columns: Array, shorter: int = 0) -> Path:
