@@ -17,7 +17,7 @@ from identification.log import Log
 from identification.model.estimates import Drive
 from workbench.documents.design import Design
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import loop_period, run_loop
+from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.loop_figures import common_reference, tested_of
 from workbench.steps.predict import default_drive, predict
 from workbench.steps.validate import validate
@@ -229,8 +229,8 @@ def tracking(
     name = tested_of(found)
     try:
         checked, _ = validate(machine, found, rng)
-        reference = common_reference(machine, designs, loop_period(found))
-        run = run_loop(machine, found, found.controllers[name], reference, rng)
+        loop = driven_loop(machine, found, found.controllers[name])
+        run = run_driven(machine, loop, common_reference(machine, designs, loop.h), rng)
     except BadModel as error:
         return Tracking(None, (str(error),))
     with np.errstate(over="ignore", invalid="ignore"):

@@ -8,7 +8,7 @@ from design.compensator import Compensator
 from design.drive_law import DriveLaw
 from design.feed_forward import FeedForward
 from design.filters import filters_at
-from design.loop import ForcePI, LoopNoise, LoopRun
+from design.loop import ForcePI, LoopNoise
 from design.loop_signals import OfForce, pressures
 from design.schedule import Schedule
 from design.servo import Compensation, SecondMass, Servo, ServoRun, simulate_servo
@@ -110,18 +110,6 @@ def present_loop(machine: Model, now: Present) -> DrivenLoop:
     return DrivenLoop(now.law, force, now.rate, command.limit, direct=now.output == "command")
 
 
-def run_loop(
-    machine: Model,
-    found: Design,
-    one: Controller,
-    r: Array,
-    rng: np.random.Generator,
-    compensator: Compensator | None = None,
-) -> LoopRun:
-    """One reference r [m], (n,) at `loop_period`, through the design's loop; see `run_driven`."""
-    return run_driven(machine, driven_loop(machine, found, one, compensator), r, rng)
-
-
 def run_driven(
     machine: Model, loop: DrivenLoop, r: Array, rng: np.random.Generator | None
 ) -> ServoRun:
@@ -145,14 +133,15 @@ def run_plant(
             raise BadModel("the machine has an actuator, the design no force loop for it")
     elif loop.force is not None:
         raise BadModel("the design has a force loop, the machine no actuator for it")
-    return servo_run(
+    return simulate_servo(
         plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
-        replace(loop, direct=direct),
-        limit_on(machine, loop),
+        replace(loop.servo, direct=direct, control_limit=limit_on(machine, loop)),
         r,
-        noise,
-        chambers(machine.rig),
-        load_of(machine),
+        loop.h,
+        noise=noise,
+        start=(float(r[0]), 0.0, 0.0),
+        signals=chambers(machine.rig),
+        load=load_of(machine),
     )
 
 
@@ -167,32 +156,6 @@ def load_of(machine: Model) -> SecondMass | None:
     f_r, f_a = used(two["frequency"]), used(two["anti_resonance"])
     mass = machine.karnopp.m * (1.0 - (f_a / f_r) ** 2)
     return SecondMass.of(f_r, f_a, used(two["damping"]), mass) if mass > 0.0 else None
-
-
-def servo_run(
-    plant: Plant,
-    loop: DrivenLoop,
-    limit: float | None,
-    r: Array,
-    noise: LoopNoise | None,
-    chambers: dict[str, OfForce],
-    load: SecondMass | None = None,
-) -> ServoRun:
-    """One reference r [m], (n,) every loop.h, through the loop around a plant that stands at r[0].
-
-    limit: of the command, in its unit; chambers: the pressures by the force, by name; load: that
-    swings behind the body.
-    """
-    return simulate_servo(
-        plant,
-        replace(loop.servo, control_limit=limit),
-        r,
-        loop.h,
-        noise=noise,
-        start=(float(r[0]), 0.0, 0.0),
-        signals=chambers,
-        load=load,
-    )
 
 
 def limit_on(machine: Model, loop: DrivenLoop) -> float | None:
@@ -232,8 +195,3 @@ def chambers(rig: Rig) -> dict[str, OfForce]:
         return {}
     supply = rig.supply_pressure
     return pressures(rig.area_p, rig.area_n, 0.5 * supply, supply) if supply > 0 else {}
-
-
-def loop_period(found: Design) -> float:
-    """The period of the loop's samples [s]."""
-    return found.force.h if found.force else found.plant.h

@@ -1,6 +1,6 @@
 """Recipe -> log and truth: what a machine would have logged, and what only its maker knows."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
-from design.servo import Compensation, ServoRun
+from design.servo import Compensation, simulate_servo
 from identification.arrays import Array
 from identification.errors import BadCard, BadModel, BadSpecification
 from identification.log import Log, Rig
@@ -32,23 +32,12 @@ from workbench.documents.drive import PresentFile
 from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
 from workbench.files import ABSURD
-from workbench.steps.closed_loop import DrivenLoop, servo_run
+from workbench.steps.closed_loop import DrivenLoop
 from workbench.steps.present import present
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 CONVERGED_CHANGE = 1e-9  # relative change of the force from which it has settled
 Chambers = dict[str, OfForce]
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """What a run logs, (n,) each, and the force without the sensor's noise."""
-
-    r: Array
-    y: Array
-    F: Array
-    u: Array
-    F_true: Array
 
 
 def record(
@@ -76,8 +65,10 @@ def record(
             run = drive(recipe, reference, rng, chambers)
     except (BadModel, BadCard) as error:
         raise BadCard(f"{name}: {error}") from None
-    signals = {"t": recipe.t, "r": run.r, "y": run.y, "F": run.F, "u": run.u}
-    log = Log(name, signals | _logged_pressures(name, recipe, chambers, run.F_true, rng))
+    every = (len(run.t) - 1) // (len(recipe.t) - 1)  # a card's controller may run faster
+    logged = {"r": run.r, "y": run.y_measured, "F": run.F_measured, "u": run.u}
+    signals = {"t": recipe.t, **{key: values[::every] for key, values in logged.items()}}
+    log = Log(name, signals | _logged_pressures(name, recipe, chambers, run.F[::every], rng))
     lost = np.flatnonzero(~(np.abs(log["y"]) < ABSURD))
     if lost.size:
         raise BadCard(
@@ -89,7 +80,7 @@ def record(
 
 def _in_loop(
     recipe: Recipe, reference: Array, rng: np.random.Generator, chambers: Chambers
-) -> _Run:
+) -> LoopRun:
     """The reference as that of the recipe's position loop."""
     loop = recipe.loop
     assert loop is not None
@@ -97,38 +88,35 @@ def _in_loop(
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
     cascade = Cascade(_position(recipe), force, loop.control_limit_v)
     parts = (recipe.plant, cascade, reference, recipe.h)
-    beside = compensation(recipe, recipe.h)
-    run: LoopRun
+    beside = _compensation(recipe, recipe.h)
     if recipe.plant.effects or beside:
-        run = simulate_effect_loop(*parts, noise=noise, signals=chambers, friction=beside)
-    else:
-        run = simulate_loop(*parts, noise=noise)
-    return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
+        return simulate_effect_loop(*parts, noise=noise, signals=chambers, friction=beside)
+    return simulate_loop(*parts, noise=noise)
 
 
 def _by_card(
     recipe: Recipe, controller: CardController | None, rig: Rig | None,
     rng: np.random.Generator, chambers: Chambers,
-) -> _Run:  # fmt: skip
+) -> LoopRun:  # fmt: skip
     """The reference as that of the card's own controller, at the controller's clock."""
     if controller is None or rig is None:
         raise BadCard("no position controller; give recipe.loop.position, or add [controller]")
-    loop = recipe_loop(recipe, controller, rig)
-    run, at = run_present(recipe, loop, rng, chambers)
-    return _Run(run.r[at], run.y_measured[at], run.F_measured[at], run.u[at], run.F[at])
+    loop = _loop_of_card(recipe, controller, rig)
+    n = (len(recipe.t) - 1) * round(recipe.h / loop.h) + 1
+    r = reference_signal(recipe.reference, loop.h * np.arange(n, dtype=np.float64), rng)
+    noise = LoopNoise.draw(n, recipe.noise_y, recipe.noise_F, rng)
+    start = (float(r[0]), 0.0, 0.0)
+    return simulate_servo(
+        recipe.plant, loop.servo, r, loop.h, noise=noise, start=start, signals=chambers
+    )
 
 
-def _open_loop(recipe: Recipe, u: Array, rng: np.random.Generator, chambers: Chambers) -> _Run:
+def _open_loop(recipe: Recipe, u: Array, rng: np.random.Generator, chambers: Chambers) -> LoopRun:
     """The reference as the command, no loop around the plant."""
     run = _open_run(recipe, u, chambers)
     noise = rng.standard_normal((2, len(u)))
-    return _Run(
-        r=np.zeros(len(u)),
-        y=run.shown + recipe.noise_y * noise[0],
-        F=run.F + recipe.noise_F * noise[1],
-        u=u,
-        F_true=run.F,
-    )
+    y, F = run.shown + recipe.noise_y * noise[0], run.F + recipe.noise_F * noise[1]
+    return LoopRun(recipe.t, np.zeros(len(u)), run.y, run.v, run.F, y, F, u, run.mode)
 
 
 def _open_run(recipe: Recipe, u: Array, chambers: Chambers) -> FreeRun:
@@ -285,7 +273,7 @@ def _position(recipe: Recipe) -> RST:
 CLOCKS_ALIKE = 1e-6  # of a sample, by which clocks may differ
 
 
-def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
+def _loop_of_card(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
     """The card's controller around the recipe's machine, with the recipe's compensator and limit.
 
     Raises BadCard where it is none, or does not fit the machine or the clock of the log.
@@ -308,7 +296,7 @@ def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
         force=now.force,
         rate=now.rate,
         limit=min((one for one in limits if one is not None), default=None),
-        compensation=compensation(recipe, now.law.h),
+        compensation=_compensation(recipe, now.law.h),
         direct=isinstance(drive, Actuator) and now.output == "command",
     )
     if loop.direct and loop.compensation is not None:
@@ -325,22 +313,10 @@ def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
     return loop
 
 
-def compensation(recipe: Recipe, h: float) -> Compensation | None:
+def _compensation(recipe: Recipe, h: float) -> Compensation | None:
     """The recipe's compensator behind the filters that a design has at the period h [s]."""
     asked = recipe.loop.compensator if recipe.loop else None
     if asked is None:
         return None
     known = asked.friction.value if asked.friction else recipe.plant.friction
     return Compensation(Compensator(known, asked.N_c, asked.e_T), filters_at(h))
-
-
-def run_present(
-    recipe: Recipe, loop: DrivenLoop, rng: np.random.Generator, chambers: dict[str, OfForce]
-) -> tuple[ServoRun, slice]:
-    """The run at the loop's own clock, with the recipe's noise, and the samples that are logged."""
-    every = round(recipe.h / loop.h)
-    n = (len(recipe.t) - 1) * every + 1
-    r = reference_signal(recipe.reference, loop.h * np.arange(n, dtype=np.float64), rng)
-    noise = LoopNoise.draw(n, recipe.noise_y, recipe.noise_F, rng)
-    run = servo_run(recipe.plant, loop, loop.limit, r, noise, chambers)
-    return run, slice(None, None, every)

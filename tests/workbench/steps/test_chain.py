@@ -25,7 +25,7 @@ from workbench.documents.model import Model
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps import loop_figures
-from workbench.steps.closed_loop import run_driven, run_loop
+from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.design import effort_limit
 from workbench.steps.identify import (
     _force_error,
@@ -333,13 +333,14 @@ def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -
     found = designed(model)
     assert found.rst is not None and found.force is None
     r = np.repeat([0.0, 0.05], 200)
+    machines = [replace(model, rig=Rig("force", control_limit=v)) for v in (None, 1e-3)]
     free, limited = (
-        run_loop(replace(model, rig=Rig("force", control_limit=v)), found, found.rst, r, rng())
-        for v in (None, 1e-3)
+        run_driven(one, driven_loop(one, found, found.rst), r, rng()) for one in machines
     )
     assert np.array_equal(free.F, limited.F)
     motor = replace(model_of(EMPS, k_a=35.15), rig=Rig("motor", 35.15, control_limit=1e-3))
-    assert np.max(np.abs(run_loop(motor, found, found.rst, r, rng()).u)) <= 1e-3
+    run = run_driven(motor, driven_loop(motor, found, found.rst), r, rng())
+    assert np.max(np.abs(run.u)) <= 1e-3
 
 
 @pytest.mark.slow

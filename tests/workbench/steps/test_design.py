@@ -11,7 +11,7 @@ from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.report.reports import design_view
-from workbench.steps.closed_loop import run_loop
+from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.design import reference_demand
 from workbench.steps.validate import validate
 
@@ -94,9 +94,9 @@ def test_the_run_has_the_reference_as_given() -> None:
     found = designed(model)
     assert found.rst is not None
     r = np.repeat([0.0, 0.1], 500)
-    run = run_loop(model, found, found.rst, r, rng())
+    run = run_driven(model, driven_loop(model, found, found.rst), r, rng())
     assert np.array_equal(run.r, r)
-    free = run_loop(model, found, replace(found.rst, rate=None), r, rng())
+    free = run_driven(model, driven_loop(model, found, replace(found.rst, rate=None)), r, rng())
     assert np.max(np.abs(free.F)) > 2.0 * np.max(np.abs(run.F))
 
 

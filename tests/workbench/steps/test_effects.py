@@ -28,7 +28,7 @@ from workbench.cards.recipe import (
 from workbench.documents.model import Model
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path
-from workbench.steps.closed_loop import effects_left_out, in_the_loop, run_loop
+from workbench.steps.closed_loop import driven_loop, effects_left_out, in_the_loop, run_driven
 from workbench.steps.demo import recipe_of, simulated_log
 from workbench.steps.predict import Prediction, predict
 from workbench.steps.simulate import record, truth
@@ -219,7 +219,7 @@ def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     assert effects_left_out(whole) is None
     r = np.repeat([0.0, 0.05], round(2.0 / found.rst.h))
     one, other = (
-        run_loop(machine, found, found.rst, r, np.random.default_rng(0))
+        run_driven(machine, driven_loop(machine, found, found.rst), r, np.random.default_rng(0))
         for machine in (plain, whole)
     )
     assert np.max(np.abs(one.y - other.y)) > 1e-4
@@ -237,7 +237,7 @@ def test_a_loop_of_two_rates_has_the_model_s_effects() -> None:
     assert effects_left_out(whole) is None
     r = np.repeat([0.0, 0.05], 2000)
     one, other = (
-        run_loop(machine, found, found.rst, r, np.random.default_rng(0))
+        run_driven(machine, driven_loop(machine, found, found.rst), r, np.random.default_rng(0))
         for machine in (plain, whole)
     )
     assert np.max(np.abs(one.y - other.y)) > 1e-6
