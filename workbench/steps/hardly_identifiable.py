@@ -5,15 +5,14 @@ rest of what it sees.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.check import work_share
-from identification.signals.differentiate import Motion, differentiate, low_pass
+from identification.signals.differentiate import differentiate, low_pass
 from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
 
@@ -28,80 +27,63 @@ GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a driv
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
-@dataclass(frozen=True, eq=False)
-class _Moved:
-    """A run: its motion, the samples in which it surely moves, and what is logged of its drive."""
-
-    motion: Motion
-    sure: BoolArray
-    y: Array
-    drive: Array | None
-    name: str
-
-
 def hardly_identifiable(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
     """A line for each thing that the runs will hardly identify; nothing where there is no run."""
     if not runs:
         return ()
     log = max(runs, key=len)
-    return tuple([*_of_rate(log), *_of_motion(log, rig)])
-
-
-def _of_rate(log: Log) -> Iterator[str]:
     rate = 1.0 / log.h
-    if rate < 0.999 * INFORMATIVE_RATE:
-        yield (
-            f"sampled at {rate:.3g} Hz, slower than {INFORMATIVE_RATE:g} Hz: starts and stops lie"
-            " between two samples, so bands and breakaway forces are hardly identifiable; log"
-            " faster"
-        )
+    slow = (
+        f"sampled at {rate:.3g} Hz, slower than {INFORMATIVE_RATE:g} Hz: starts and stops lie"
+        " between two samples, so bands and breakaway forces are hardly identifiable; log faster",
+    )
+    return (*(slow if rate < 0.999 * INFORMATIVE_RATE else ()), *_of_motion(log, rig))
 
 
 def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     try:
-        found = _moved(log, rig)
+        motion = differentiate(log["y"], log.h)
     except BadLog:
         return
-    count = int(np.sum(found.sure))
+    sure = moving(motion)
+    y, v, a = log["y"][sure], motion.v[sure], motion.a[sure]
+    count = int(np.sum(sure))
     if count < FEWEST_MOVING:
         yield (
             f"hardly anything moves: {count} of {len(log)} samples are surely in motion, so"
             " friction is not identifiable; log a run with strokes in both directions"
         )
         return
-    up = float(np.mean(found.motion.v[found.sure] > 0.0))
+    up = float(np.mean(v > 0.0))
     one_way = min(up, 1.0 - up) < NEARLY_ONE_WAY
     if one_way:
         yield _said_of_one_way(up)
-    if found.drive is None:
+    of_command = rig.kind in ("motor", "velocity") and "u" in log
+    name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
+    if logged is None:
         return
-    drive = low_pass(found.drive, log.h, found.motion.cutoff)[found.sure]
-    if one_way and _is_idle(found, drive):
-        yield _said_of_coasting(found)
+    drive = low_pass(logged, log.h, motion.cutoff)[sure]
+    if one_way and _is_idle(drive, v, a):
+        yield _said_of_coasting(name, np.abs(v))
         return
-    work = None if one_way else work_share(found.y, found.drive)
-    if _bears_place_alone(found, drive, rotary=rig.motion == "rotary"):
+    work = None if one_way else work_share(log["y"], logged)
+    if _bears_place_alone(drive, y, v, a, rotary=rig.motion == "rotary"):
         yield (
-            f"the {found.name} depends on position alone, as a weight's or a spring's, and does not"
+            f"the {name} depends on position alone, as a weight's or a spring's, and does not"
             " drive the motion: something else moves the body, perhaps by hand; then friction is"
-            " not"
-            " identifiable; log a run in which the machine moves itself"
+            " not identifiable; log a run in which the machine moves itself"
         )
     elif work is not None and work < NO_WORK:
         yield (
-            f"the {found.name} does hardly any work on the body in all ({work:.0%} of what the two"
+            f"the {name} does hardly any work on the body in all ({work:.0%} of what the two"
             " exchange): no friction takes it up, or something else moves the body, by hand or by a"
             " load; friction is hardly identifiable"
         )
         return
-    if (
-        rig.kind == "motor"
-        and (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED
-    ):
+    if rig.kind == "motor" and (share := derivative(motion, logged).share) > ALL_FOLLOWED:
         yield (
-            f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
-            " of a valve and cylinder: inertia is hardly identifiable; use kind ="
-            ' "velocity"'
+            f"the velocity follows the {name} ({share:.0%} of it is the velocity alone), as of a"
+            ' valve and cylinder: inertia is hardly identifiable; use kind = "velocity"'
         )
 
 
@@ -116,36 +98,25 @@ def _said_of_one_way(up: float) -> str:
     )
 
 
-def _said_of_coasting(found: _Moved) -> str:
-    speed = np.abs(found.motion.v[found.sure])
+def _said_of_coasting(name: str, speed: Array) -> str:
     few = max(2, int(ENDS * len(speed)))
     slower = speed[-few:].mean() < SPEED_LEFT * speed[:few].mean()
     how = "coasts" if slower else "coasts or is carried on at one speed"
     return (
-        f"the body {how}: the {found.name} correlates with neither its speed nor its acceleration,"
+        f"the body {how}: the {name} correlates with neither its speed nor its acceleration,"
         " so the driving force is not identifiable; log a run that is driven"
     )
 
 
-def _moved(log: Log, rig: Rig) -> _Moved:
-    motion = differentiate(log["y"], log.h)
-    name = "u" if rig.kind in ("motor", "velocity") and "u" in log else "F"
-    drive = log.signals.get(name)
-    words = {"u": "command", "F": "force"}[name]
-    return _Moved(motion, moving(motion), log["y"], drive, words)
-
-
-def _is_idle(found: _Moved, drive: Array) -> bool:
+def _is_idle(drive: Array, v: Array, a: Array) -> bool:
     """Whether the drive goes with neither the body's speed nor its change."""
     if np.ptp(drive) == 0.0:
         return True
-    v, a = found.motion.v[found.sure], found.motion.a[found.sure]
     return all(abs(float(np.corrcoef(drive, x)[0, 1])) < GOES_WITH_NEITHER for x in (v, a))
 
 
-def _bears_place_alone(found: _Moved, drive: Array, *, rotary: bool) -> bool:
+def _bears_place_alone(drive: Array, y: Array, v: Array, a: Array, *, rotary: bool) -> bool:
     """Whether the drive is a weight's or a spring's force at each place, and none of friction."""
-    y, v, a = found.y[found.sure], found.motion.v[found.sure], found.motion.a[found.sure]
     spread = float(np.std(drive))
     if spread == 0.0:
         return False

@@ -12,8 +12,7 @@ from identification.frequency.modes import Modes
 from identification.frequency.swinging_load import Load, Rests
 from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING
-from identification.model.plant import Plant
-from identification.signals.differentiate import Motion, differentiate
+from identification.signals.differentiate import differentiate
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import dead_time
@@ -68,16 +67,22 @@ def freed(log: Log, model: Model) -> Freed:
     refuse_missing(log, plant.effects)
     zero_order_hold = model.rig.kind == "motor"
     moved = of_body(with_motor_force(log, plant), plant)
-    motion, late = differentiate(moved["y"], log.h), dead_time(model)
-    d = _direction(motion, plant)
-    opposed, slides = opposing_force(moved, plant, motion.y, motion.v, d), d != 0
-    if zero_order_hold:
-        opposed, slides = _over_period(opposed), slides & _following(slides)
+    motion, late, t = differentiate(moved["y"], log.h), dead_time(model), log["t"]
+    v, least = motion.v, SURE_SLIDING * motion.v_noise
+    up, down = max(plant.friction.dv_p, least), min(plant.friction.dv_n, -least)
+    d = np.where(v > up, 1.0, np.where(v < down, -1.0, 0.0))  # 0: stuck, or lost in the noise
+    opposed, slides = opposing_force(moved, plant, motion.y, v, d), d != 0
+    # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
+    a = np.asarray(np.gradient(v, log.h))
+    if zero_order_hold:  # each over the period that follows
+        opposed = 0.5 * (opposed + np.append(opposed[1:], opposed[-1]))
+        slides = slides & np.append(slides[1:], slides[-1])
+        a = np.diff(v, append=v[-1]) / log.h
+    if late > 0.0:  # at the force's own times, which the body feels so much later
+        opposed = np.interp(t + late, t, opposed)
     y, F = np.asarray(moved["y"]), np.asarray(moved["F"])
     plain = replace(plain_recording(log, zero_order_hold), y=y, F=F)
-    # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
-    a = _acceleration(motion.v, log.h, zero_order_hold)
-    return Freed(plain, motion.v, a, slides, F - _earlier(opposed, late, log))
+    return Freed(plain, v, a, slides, F - opposed)
 
 
 def _nonlinear(model: Model) -> Iterator[Acting]:
@@ -129,33 +134,3 @@ def of_modes(modes: Modes, highest: float) -> BodyForce:
         return np.asarray(np.fft.irfft(np.fft.rfft(v, n) * impedance, n)[: len(v)])
 
     return force
-
-
-def _direction(motion: Motion, plant: Plant) -> Array:
-    """Direction of the motion, 0 within the stick band or where its noise leaves it open, (n,)."""
-    least = SURE_SLIDING * motion.v_noise
-    up, down = max(plant.friction.dv_p, least), min(plant.friction.dv_n, -least)
-    return np.where(motion.v > up, 1.0, np.where(motion.v < down, -1.0, 0.0))
-
-
-def _acceleration(v: Array, h: float, zero_order_hold: bool) -> Array:
-    """Acceleration at every sample, or its mean over the period that follows, (n,)."""
-    if not zero_order_hold:
-        return np.asarray(np.gradient(v, h))
-    return np.diff(v, append=v[-1]) / h
-
-
-def _over_period(x: Array) -> Array:
-    """Mean of every sample and the next, (n,)."""
-    return np.asarray(0.5 * (x + np.append(x[1:], x[-1])))
-
-
-def _following(mask: BoolArray) -> BoolArray:
-    """Whether the next sample has it, (n,)."""
-    return np.append(mask[1:], mask[-1])
-
-
-def _earlier(x: Array, late: float, log: Log) -> Array:
-    """What acts on a body that the force reaches so much later, at the force's own times, (n,)."""
-    t = log["t"]
-    return np.interp(t + late, t, x) if late > 0.0 else x

@@ -117,11 +117,7 @@ def loop_runs(
 
 
 def present_figures(
-    machine: Model,
-    model: Model,
-    found: Design,
-    limits: Limits,
-    rng: np.random.Generator | None,
+    machine: Model, model: Model, found: Design, limits: Limits, rng: np.random.Generator | None
 ) -> tuple[LoopFigures, Traces] | None:
     """The controller that the model's machine has now, on a machine, along the design's motion.
 
@@ -238,7 +234,7 @@ def loop_figures(
         limited=motion.limited,
         force_limit=abs(drive.k_a) * limit if isinstance(drive, Motor) and limit else None,
     )
-    return replace(found, missed=_missed(found, limits, machine))
+    return replace(found, missed=tuple(_missed(found, limits, machine)))
 
 
 def _linear_margins(machine: Model, loop: DrivenLoop, arx: bool) -> MarginValues | None:
@@ -252,37 +248,37 @@ def _linear_margins(machine: Model, loop: DrivenLoop, arx: bool) -> MarginValues
     return margin_values(margin, worst_modulus(plants, law))
 
 
-def _missed(result: LoopFigures, limits: Limits, machine: Model) -> tuple[str, ...]:
+def _missed(result: LoopFigures, limits: Limits, machine: Model) -> Iterator[str]:
     """What a controller does not keep, in words."""
     if not result.stable:
-        return ("the simulated loop runs away",)
-    missed: list[str] = []
+        yield "the simulated loop runs away"
+        return
     if result.margins is None:
-        missed.append("the linear loop is unstable")
+        yield "the linear loop is unstable"
     else:
         if not (result.margins.modulus >= limits.modulus):
             said = f"{result.margins.modulus:.3f}, at least {limits.modulus:g} needed"
-            missed.append(f"modulus margin {said}")
+            yield f"modulus margin {said}"
         samples = result.margins.delay_samples
         if samples is not None and not (samples >= limits.delay):
-            missed.append(f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed")
+            yield f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed"
     if not (result.standstill_relative <= limits.standstill):
-        missed.append(
+        yield (
             f"error at standstill {length(result.standstill, machine.rotary)},"
             f" {100 * result.standstill_relative:.1f} % of the step, at most"
             f" {100 * limits.standstill:g} % allowed"
         )
     if not (result.smooth_relative <= limits.tracking):
-        missed.append(
+        yield (
             f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
             f" amplitude, at most {100 * limits.tracking:g} % allowed"
         )
     if not (result.overshoot <= limits.overshoot):
-        missed.append(
+        yield (
             f"overshoot {100 * result.overshoot:.1f} % of the step, at most"
             f" {100 * limits.overshoot:g} % allowed"
         )
-    return (*missed, *_too_much(result, limits, machine.rotary))
+    yield from _too_much(result, limits, machine.rotary)
 
 
 def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str]:

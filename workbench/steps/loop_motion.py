@@ -1,12 +1,10 @@
 """What the motion of a loop comes to: errors, overshoot, settling, forces, along steps and a smooth
 reference. Nothing here knows what moved, or by which controller."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.loop import LoopRun
 from identification.arrays import Array
@@ -93,61 +91,29 @@ def loop_motion(
     """The motion of a loop; noise: of the position sensor [m]; command_limit: None for none."""
     step, amplitude = float(np.max(steps.r)), float(np.max(np.abs(smooth.r)))
     stable = _stays(steps, step) and _stays(smooth, amplitude)
-    judged, runs = _judged(steps), (steps, smooth)
+    off, h, runs = steps.y - steps.r, float(steps.t[1] - steps.t[0]), (steps, smooth)
+    dwells = list(pairwise([0, *(np.flatnonzero(np.diff(steps.r)) + 1).tolist(), len(off)]))
+    judged = [off[high - round(JUDGED_SHARE * (high - low)) : high] for low, high in dwells]
+    # The height of every step, the error after it, and the samples at which that is large.
+    after = [(float(steps.r[low] - steps.r[low - 1]), off[low:high]) for low, high in dwells[1:]]
+    late = [np.flatnonzero(np.abs(error) > SETTLING_BAND * abs(height)) for height, error in after]
+    u = np.concatenate([np.abs(run.u) for run in runs])
     return LoopMotion(
         stable=stable,
         step=step,
         amplitude=amplitude,
-        standstill=float(np.max(np.abs(steps.r - steps.y)[judged])) if stable else np.inf,
-        overshoot=max(float(np.max(error / height)) for height, error in _after_steps(steps)),
-        settling=_settling(steps),
-        step_rms=float(np.sqrt(np.mean((steps.r - steps.y) ** 2))),
+        standstill=float(np.max(np.abs(np.concatenate(judged)))) if stable else np.inf,
+        overshoot=max(float(np.max(error / height)) for height, error in after),
+        settling=h * max(float(one[-1] + 1) if one.size else 0.0 for one in late),
+        step_rms=float(np.sqrt(np.mean(off**2))),
         smooth_rms=float(np.sqrt(np.mean((smooth.r - smooth.y) ** 2))),
         force_peak=max(float(np.max(np.abs(each.F))) for each in runs),
         command_peak=max(float(np.max(np.abs(each.u))) for each in runs),
-        limited=_limited(runs, command_limit),
+        limited=0.0 if command_limit is None else float(np.mean(u >= command_limit)),
         limit_cycle=limit_cycle(steps, noise) if stable else None,
     )
-
-
-def _limited(runs: Sequence[LoopRun], limit: float | None) -> float:
-    """Share of the samples at which the command is at its limit."""
-    if limit is None:
-        return 0.0
-    return float(np.mean(np.concatenate([np.abs(run.u) >= limit for run in runs])))
 
 
 def _stays(trace: LoopRun, size: float) -> bool:
     """Whether a loop stays near a reference of this size [m]; not where it is lost to NaN."""
     return bool(np.all(np.abs(trace.y) < ESCAPED * size))
-
-
-def _judged(trace: LoopRun) -> NDArray[np.bool_]:
-    """The last half of every dwell, True at its samples."""
-    keep = np.zeros(len(trace.r), dtype=bool)
-    for low, high in _dwells(trace):
-        keep[high - round(JUDGED_SHARE * (high - low)) : high] = True
-    return keep
-
-
-def _dwells(trace: LoopRun) -> list[tuple[int, int]]:
-    """First sample of every level of the reference, and the one after its last."""
-    change = np.flatnonzero(np.diff(trace.r)) + 1
-    return list(pairwise([0, *change.tolist(), len(trace.r)]))
-
-
-def _after_steps(trace: LoopRun) -> list[tuple[float, Array]]:
-    """Height of every step [m] and the error y - r after it [m]."""
-    return [
-        (float(trace.r[low] - trace.r[low - 1]), trace.y[low:high] - trace.r[low:high])
-        for low, high in _dwells(trace)[1:]
-    ]
-
-
-def _settling(trace: LoopRun) -> float:
-    """Longest time [s] from a step until the position stays within `SETTLING_BAND` of it."""
-    h = float(trace.t[1] - trace.t[0])
-    outside = [
-        np.flatnonzero(np.abs(e) > SETTLING_BAND * abs(height)) for height, e in _after_steps(trace)
-    ]
-    return h * max(float(late[-1] + 1) if late.size else 0.0 for late in outside)
