@@ -5,7 +5,7 @@ and slowly, and then a sine, on the same machines, with the noise of the logs: d
 model is not sure of, each with a lag that no log would have shown.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from workbench.documents.model import Model
 from workbench.steps.cascade import feed_forward, reference_limits, unseen_lag
 from workbench.steps.closed_loop import DrivenLoop, noise_of, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
+from workbench.steps.loop_figures import risen_sine
 
 CLEARLY_LESS = 0.8  # of the other's root mean square error
 SURELY_SHARE = 0.9  # of the machines drawn
@@ -67,10 +68,10 @@ class Contest:
 def contest(model: Model, force: ForceLoop | None, one: DrivenLoop, other: DrivenLoop) -> Contest:
     """The first loop against the other."""
     machines = that_may_be(model, np.random.default_rng(CONTEST_SEED), MACHINES_DRAWN)
+    paths = [tuple(path(model, force, each.h) for each in (one, other)) for path in (strokes, sine)]
     rows = []
     for seed, plant in enumerate(machines):
-        each = [_compared(model, plant, (one, other), path(model, force), seed)
-                for path in (strokes, sine)]  # fmt: skip
+        each = [_compared(model, plant, (one, other), path, seed) for path in paths]
         error, most, borne = np.array(each).T
         rows.append((float(np.exp(np.mean(np.log(error)))), float(np.max(most)), np.all(borne)))
     found = np.array(rows, dtype=np.float64).T
@@ -93,37 +94,24 @@ def that_may_be(model: Model, rng: np.random.Generator, count: int) -> tuple[Pla
     )
 
 
-PathOf = Callable[[float], Array]  # of the reference [m], (n,), by its period [s]
-
-
-def strokes(model: Model, force: ForceLoop | None) -> PathOf:
-    """Strokes over the travel as the logs have shown them, and slow ones."""
+def strokes(model: Model, force: ForceLoop | None, h: float) -> Array:
+    """Strokes over the travel as the logs have shown them, and slow ones [m], every h [s], (n,)."""
     middle, half, speed = _reach(model)
     _, hard = reference_limits(model, force, feed_forward(model, force))
     places = [(-half, 1.0), (half, 1.0), (-half, 1.0), (half, SLOW_STROKE), (-half, SLOW_STROKE)]
-
-    def path(h: float) -> Array:
-        here, parts = 0.0, [np.zeros(round(STROKE_DWELL / h))]
-        for there, share in places:
-            parts.append(here + _stroke(there - here, share * speed, hard, h))
-            parts.append(np.full(round(STROKE_DWELL / h), there))
-            here = there
-        return np.asarray(middle + np.concatenate(parts), dtype=np.float64)
-
-    return path
+    here, parts = 0.0, [np.zeros(round(STROKE_DWELL / h))]
+    for there, share in places:
+        parts.append(here + _stroke(there - here, share * speed, hard, h))
+        parts.append(np.full(round(STROKE_DWELL / h), there))
+        here = there
+    return np.asarray(middle + np.concatenate(parts), dtype=np.float64)
 
 
-def sine(model: Model, _: ForceLoop | None) -> PathOf:
-    """A sine over the travel, at most as fast as the logs, come to in half of its first period."""
+def sine(model: Model, _: ForceLoop | None, h: float) -> Array:
+    """A sine over the travel [m], (n,), at most as fast as the logs, come to in half of its first
+    period."""
     middle, half, speed = _reach(model)
-    w = speed / half
-
-    def path(h: float) -> Array:
-        t = h * np.arange(round(SINE_PERIODS * 2.0 * np.pi / w / h), dtype=np.float64)
-        rise = np.clip(t * w / np.pi, 0.0, 1.0)
-        return np.asarray(middle + half * np.sin(w * t) * rise**2 * (3.0 - 2.0 * rise))
-
-    return path
+    return np.asarray(middle + risen_sine(half, speed / half, h, SINE_PERIODS))
 
 
 def _reach(model: Model) -> tuple[float, float, float]:
@@ -147,17 +135,15 @@ def _stroke(distance: float, speed: float, hard: float, h: float) -> Array:
 
 
 def _compared(
-    model: Model, plant: Plant, loops: tuple[DrivenLoop, DrivenLoop], path: PathOf, seed: int
+    model: Model, plant: Plant, loops: Sequence[DrivenLoop], paths: Sequence[Array], seed: int
 ) -> tuple[float, float, bool]:
-    """Error and largest force of the first loop over those of the other, and whether it takes
-    hardly more force than that one, or than the logs have shown."""
-    ours, theirs = (_run(model, plant, each, path(each.h), seed) for each in loops)
-    if ours is None or theirs is None:
-        return (
-            (np.inf, np.inf, False)
-            if ours is None
-            else (LEAST_ERROR_RATIO, LEAST_ERROR_RATIO, True)
-        )
+    """Error and largest force of the first loop over those of the other, each along its path, and
+    whether it takes hardly more force than that one, or than the logs have shown."""
+    ours, theirs = (_run(model, plant, *each, seed) for each in zip(loops, paths, strict=True))
+    if ours is None:
+        return np.inf, np.inf, False
+    if theirs is None:
+        return LEAST_ERROR_RATIO, LEAST_ERROR_RATIO, True
     error, other = (float(np.sqrt(np.mean((run.r - run.y) ** 2))) for run in (ours, theirs))
     most, its = (float(np.max(np.abs(run.F))) for run in (ours, theirs))
     borne = most <= NO_HARDER * max(model.force_peak, its)

@@ -22,7 +22,7 @@ from workbench.documents.design import (
     margin_values,
 )
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
+from workbench.steps.closed_loop import DrivenLoop, driven_loop, limit_on, present_loop, run_driven
 from workbench.steps.linear_loop import plants_of
 from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
 
@@ -150,7 +150,7 @@ def references(
     if machine.speed is not None:  # no faster than the machine has been seen to move
         w = min(w, machine.speed / amplitude)
     rest = np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
-    return levels, _smooth(amplitude, w, h, periods), rest
+    return levels, risen_sine(amplitude, w, h, periods), rest
 
 
 def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Array:
@@ -161,7 +161,7 @@ def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Arr
     )
     w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
-    return np.concatenate([levels, _smooth(amplitude, w, h, SMOOTH_PERIODS)])
+    return np.concatenate([levels, risen_sine(amplitude, w, h, SMOOTH_PERIODS)])
 
 
 def _sizes(machine: Model) -> tuple[float, float]:
@@ -170,7 +170,7 @@ def _sizes(machine: Model) -> tuple[float, float]:
     return STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
 
 
-def _smooth(amplitude: float, w: float, h: float, periods: float) -> Array:
+def risen_sine(amplitude: float, w: float, h: float, periods: float) -> Array:
     """A sine of w [rad/s] that comes to its amplitude [m] in half a period."""
     t = h * np.arange(round(periods * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
@@ -195,6 +195,17 @@ def tested_of(found: Design) -> Structure:
     """The controller that decides: the recommended one, or the first there is."""
     there = [name for name in DESIGNED_STRUCTURES if name in found.controllers]
     return next((name for name in there if name == found.recommended), there[0])
+
+
+def loops_of(model: Model, found: Design) -> dict[str, DrivenLoop]:
+    """The loops of a design's controllers by name, alone and then with the compensator beside."""
+    alone = {n: driven_loop(model, found, one) for n, one in found.controllers.items()}
+    both = {
+        name + COMPENSATED: driven_loop(model, found, one, found.compensator.value)
+        for name, one in found.controllers.items()
+        if takes_compensator(found, name)
+    }
+    return alone | both
 
 
 def takes_compensator(found: Design, name: str) -> bool:

@@ -18,9 +18,9 @@ from workbench.steps.loop_figures import (
     LoopFigures,
     loop_figures,
     loop_runs,
+    loops_of,
     present_figures,
     references,
-    takes_compensator,
 )
 from workbench.steps.loop_motion import SETTLING_BAND
 
@@ -85,14 +85,9 @@ def _no_clear_win(model: Model, found: Design, name: Structure, compensated: boo
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
     """Figures of every loop of a design on its model, and of the present one, without noise."""
     out: dict[str, LoopFigures] = {}
-    arx = found.plant.source == "arx"
-    for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
-        for name, one in found.controllers.items():
-            if compensator is not None and not takes_compensator(found, name):
-                continue
-            loop = driven_loop(model, found, one, compensator)
-            runs = loop_runs(model, loop, references(model, found, loop.h), None)
-            out[name + suffix] = loop_figures(model, loop, runs, Limits(), arx=arx)
+    for name, loop in loops_of(model, found).items():
+        runs = loop_runs(model, loop, references(model, found, loop.h), None)
+        out[name] = loop_figures(model, loop, runs, Limits(), arx=found.plant.source == "arx")
     try:
         now = present_figures(model, model, found, Limits(), None)
     except BadModel:  # `validate` says why

@@ -13,7 +13,7 @@ from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
-from workbench.steps.closed_loop import DrivenLoop, driven_loop, effects_left_out, scheduled_loop
+from workbench.steps.closed_loop import effects_left_out, scheduled_loop
 from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (
     ALMOST,
@@ -26,9 +26,9 @@ from workbench.steps.loop_figures import (
     Traces,
     loop_figures,
     loop_runs,
+    loops_of,
     present_figures,
     references,
-    takes_compensator,
     tested_of,
 )
 from workbench.steps.recommend import in_thousandths, reasons
@@ -83,12 +83,7 @@ def validate(
             continue
         if now is not None:
             figures.setdefault(PRESENT, {})[place], traces[PRESENT, place] = now
-    arx, loops = found.plant.source == "arx", dict[str, DrivenLoop]()
-    for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
-        for name, controller in found.controllers.items():
-            if compensator is not None and not takes_compensator(found, name):
-                continue
-            loops[name + suffix] = driven_loop(model, found, controller, compensator)
+    arx, loops = found.plant.source == "arx", loops_of(model, found)
     for each in found.schedule.controllers if found.schedule else ():
         loops[each + SCHEDULED] = scheduled_loop(model, found, each)
     for name, loop in loops.items():

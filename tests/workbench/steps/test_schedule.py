@@ -130,7 +130,7 @@ def test_the_machines_have_the_lag_that_no_log_would_have_shown_and_strokes_cove
 
 def test_strokes_cover_the_travel() -> None:
     model = case("emps").model
-    r = strokes(model, None)(1e-3)
+    r = strokes(model, None, 1e-3)
     assert np.ptp(r) == pytest.approx(0.9 * (model.travel[1] - model.travel[0]), rel=1e-3)
     v = np.diff(r) / 1e-3
     assert np.max(np.abs(v)) <= 1.01 * (model.travel[1] - model.travel[0])
