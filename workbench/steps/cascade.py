@@ -51,7 +51,9 @@ def tuned_cascade(model: Model, plant: Linear, corners: Plants, goals: Goals) ->
     if not filters:
         return plain
     filtered = tune_cascade(plants, plant.h, m, goals, filters=filters, swings=swings)
-    return better(plain, filtered)
+    if len(filtered.missed) != len(plain.missed):
+        return min((plain, filtered), key=lambda one: len(one.missed))
+    return filtered if filtered.bandwidth > FILTER_EARNS * plain.bandwidth else plain
 
 
 def unseen_lag(model: Model) -> float:
@@ -81,13 +83,6 @@ def effort_of_both(model: Model, plant: tuple[Array, Array], effort: float | Non
     return effort if asked is None else max(effort, asked + 20.0 * math.log10(abs(per)))
 
 
-def better(plain: TunedCascade, filtered: TunedCascade) -> TunedCascade:
-    """The filtered one where it keeps more goals, or as many and earns its place."""
-    if len(filtered.missed) != len(plain.missed):
-        return min((plain, filtered), key=lambda one: len(one.missed))
-    return filtered if filtered.bandwidth > FILTER_EARNS * plain.bandwidth else plain
-
-
 def cascade_controller(
     model: Model, plant: Linear, force: ForceLoop | None, tuned: TunedCascade
 ) -> Controller:
@@ -95,6 +90,9 @@ def cascade_controller(
     rst, gains = tuned.rst, tuned.gains
     ahead = feed_forward(model, force)
     rate, acceleration = reference_limits(model, force, ahead)
+    notes = [f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"]
+    if tuned.series is not None:
+        notes.append(filter_words(tuned.series))
     at = loop_frequencies(plant.A, plant.B, rst)
     return Controller(
         R=tuple(rst.R.tolist()),
@@ -108,7 +106,7 @@ def cascade_controller(
         lag=0.0,
         overshoot=0.0,
         missed=tuned.missed,
-        note="; ".join(_notes(tuned)),
+        note="; ".join(notes),
         W=drive_law(rst, gains.T_n).W,
         cascade=gains,
         series=tuned.series,
@@ -123,14 +121,14 @@ def feed_forward(model: Model, force: ForceLoop | None) -> FeedForward:
     It stays within what a motor gives at its limit, or twice the largest force of the logs.
     """
     p = model.karnopp
-    most = min(_limit_force(model, force), FORCE_BEYOND_LOGS * model.force_peak)
+    most = min(limit_force(model, force), FORCE_BEYOND_LOGS * model.force_peak)
     fastest = model.speed or float(np.ptp(model.travel))
     return FeedForward(
         p.F_cp, p.F_cn, p.F_vp, p.F_vn, BAND_OF_SPEED * fastest, p.m, max(most, p.F_sp, -p.F_sn)
     )
 
 
-def _limit_force(model: Model, force: ForceLoop | None) -> float:
+def limit_force(model: Model, force: ForceLoop | None) -> float:
     """What a motor gives at the limit of its command [N]; infinite where that is not known."""
     command = command_of(model, force)
     if command.force_per_command is None or command.limit is None:
@@ -145,20 +143,13 @@ def reference_limits(
     with the force that the logs have shown, less friction."""
     seen = model.speed or float(np.ptp(model.travel))
     viscous, coulomb = max(ahead.F_vp, ahead.F_vn), max(ahead.F_cp, ahead.F_cn)
-    most = min(model.force_peak, _limit_force(model, force))
+    most = min(model.force_peak, limit_force(model, force))
     rate = SPEED_BEYOND_LOGS * seen
     if viscous > 0.0:
         rate = min(rate, max(SHARE_OF_FORCE * (most - coulomb) / viscous, 0.1 * seen))
     # Where friction takes all that the logs have shown, a tenth of it accelerates.
     left = most - coulomb - viscous * min(seen, rate)
     return rate, SHARE_OF_FORCE * max(left, 0.1 * most) / ahead.m
-
-
-def _notes(tuned: TunedCascade) -> Iterator[str]:
-    """What to know of a cascade, in words."""
-    yield f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"
-    if tuned.series is not None:
-        yield filter_words(tuned.series)
 
 
 def filter_words(one: SeriesFilter) -> str:

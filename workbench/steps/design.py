@@ -33,7 +33,7 @@ from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.reading import versions
-from workbench.steps.cascade import beside_resonance, cascade_controller, tuned_cascade
+from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
 from workbench.steps.identify import check_period
 from workbench.steps.linear_loop import (
     command_of,
@@ -125,7 +125,7 @@ def placed_design(
     _check_period(period, model)
     goals = goals or Goals(effort=effort_limit(model))
     found = _placed(model, asked, goals, (source, period), drawn, structures)
-    command = command_of(model, found.force)
+    h, (low, high) = found.plant.h, model.travel
     controllers: dict[Structure, Controller] = {
         name: _controller(tuned, found.plant, shown(model.rotary))
         for name, tuned in found.tuned.items()
@@ -142,7 +142,9 @@ def placed_design(
         p_pi=controllers.get("p-pi"),
         refused=found.refused,
         recommended="none",
-        compensator=_compensator(model, found.plant.h),
+        compensator=CompensatorValues(
+            N_C, E_T_PER_TRAVEL * (high - low), model.friction, filters_at(h), h
+        ),
         remarks=(
             *model.read,
             *stored_remarks(model),
@@ -150,7 +152,7 @@ def placed_design(
             *found.slower,
         ),
         versions=versions(),
-        command=command,
+        command=command_of(model, found.force),
         present=model.present,
     )
 
@@ -232,25 +234,27 @@ def _placed_at(
     plant, force = linear
     machines = None if drawn is None else drawn(plant, force)
     found: dict[Structure, Tuned] = {}
-    refused: dict[str, str] = {}
+    refused, of_poles = dict[str, str](), goals
     a, b = stiff_body(model, plant, force)
     whole = (np.array(plant.A), np.array(plant.B)) if swings_of(model) else None
     others, demand = corners(model, plant, force), reference_demand(model, force)
-    for name, tune in _POLE_PLACERS.items():
+    if model.resonance is not None:  # on one body, no faster than where two masses are still one
+        most = 2.0 * np.pi * used(model.resonance["frequency"])
+        of_poles = replace(goals, fastest=min(most, goals.fastest or most))
+    placers: dict[Structure, Callable[..., Tuned]] = {"rst": tune_rst, "pid": tune_pid}
+    for name, tune in placers.items():
         if name not in structures:
             continue
         if name == "pid" and not asked.integrator:
             refused[name] = "a PID has an integrator; asked for none"
             continue
-        wanted = replace(asked, whole=whole)
-        if name == "pid" and asked.auxiliary is not None:
-            wanted = replace(wanted, auxiliary=None)
+        auxiliary = None if name == "pid" else asked.auxiliary
+        wanted = replace(asked, whole=whole, auxiliary=auxiliary)
         try:
             tuned = partial(
                 tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
             )
-            slower = _below_resonance_of(model, goals)
-            found[name] = _followable(tuned, slower, None if wanted.dominant else model.speed)
+            found[name] = _followable(tuned, of_poles, None if wanted.dominant else model.speed)
         except BadSpecification as error:
             refused[name] = str(error)
     cascade = None
@@ -263,17 +267,6 @@ def _placed_at(
     if (not found and cascade is None) or ("rst" in refused and by_hand):
         raise BadSpecification(next(iter(refused.values())))
     return _Placed(plant, force, found, refused, cascade=cascade)
-
-
-_POLE_PLACERS: Mapping[Structure, Callable[..., Tuned]] = {"rst": tune_rst, "pid": tune_pid}
-
-
-def _below_resonance_of(model: Model, goals: Goals) -> Goals:
-    """The goals, with poles on one body no faster than where two masses are still one."""
-    if model.resonance is None:
-        return goals
-    most = 2.0 * np.pi * used(model.resonance["frequency"])
-    return replace(goals, fastest=min(most, goals.fastest or most))
 
 
 def _check_period(period: float | None, model: Model) -> None:
@@ -295,11 +288,8 @@ def reference_demand(model: Model, force: ForceLoop | None) -> Demand:
     """
     p, actuator, limit = model.karnopp, model.simulated.actuator, model.rig.control_limit
     low, high = model.travel
-    most, command = model.force_peak, None
+    most, command = min(model.force_peak, limit_force(model, force)), None
     per_jump, per_speed = 0.0, 0.0
-    command_is = command_of(model, force)
-    if command_is.force_per_command is not None and command_is.limit is not None:
-        most = min(most, abs(command_is.force_per_command) * command_is.limit)
     if isinstance(actuator, Actuator) and force is not None:
         command, per_jump = limit, force.k_i
         per_speed = abs(actuator.k2 / actuator.k1)
@@ -360,12 +350,6 @@ def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
         )
     if pid is not None and (said := pid.note or pid.reason):
         yield said
-
-
-def _compensator(model: Model, h: float) -> CompensatorValues:
-    low, high = model.travel
-    e_T = E_T_PER_TRAVEL * (high - low)
-    return CompensatorValues(N_C, e_T, model.friction, filters_at(h), h)
 
 
 def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:

@@ -1,7 +1,7 @@
 """Logs + model -> frequency responses of plant, controller and open loop, and their resonances."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -123,7 +123,7 @@ def respond(
         curves=curves,
         model=taken,
         left_in=left_in,
-        remarks=(*read, *_remarks(logs, card, found, taken), *_of_no_loop(found.f[shut])),
+        remarks=(*read, *_remarks(logs, card, found, taken, found.f[shut])),
     )
 
 
@@ -215,35 +215,29 @@ def _nothing(runs: Sequence[Source], found: MachineResponses) -> str:
 
 
 def _remarks(
-    logs: Sequence[Log], card: str, found: MachineResponses, model: Model | None
-) -> list[str]:
-    """What to know of the curves."""
-    out = []
+    logs: Sequence[Log], card: str, found: MachineResponses, model: Model | None, shut: Array
+) -> Iterator[str]:
+    """What to know of the curves; shut: frequencies (k,) [Hz] at which the open loop is -1."""
     if not found.instrument:
         why = "the reference rests" if "r" in logs[0] else "no reference is logged"
-        out.append(
+        yield (
             f"{why}: the response is that from force to position directly; where noise goes round"
             " a loop it shows the controller's inverse instead"
         )
     if model is not None and model.card != card:
-        out.append(f"the model is of {model.card}, the logs of {card}")
-    return out
+        yield f"the model is of {model.card}, the logs of {card}"
+    if len(shut):
+        yield (
+            f"from {shut[0]:.3g} to {shut[-1]:.3g} Hz the open loop found is -1, which no loop is:"
+            " noise or a force at its limit goes round there, not the reference; no margin is taken"
+            " from it (lay a small multisine on the reference, and keep the command within its"
+            " limits)"
+        )
 
 
 def _unseen(response: Response, where: BoolArray) -> Response:
     """The response as it is seen elsewhere than at these frequencies (k,)."""
     return replace(response, coherence=np.where(where, 0.0, response.coherence))
-
-
-def _of_no_loop(f: Array) -> list[str]:
-    """What to say of frequencies (k,) [Hz] at which the open loop that the logs show is -1."""
-    if not len(f):
-        return []
-    return [
-        f"from {f[0]:.3g} to {f[-1]:.3g} Hz the open loop found is -1, which no loop is: noise or a"
-        " force at its limit goes round there, not the reference; no margin is taken from it (lay a"
-        " small multisine on the reference, and keep the command within its limits)"
-    ]
 
 
 def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
@@ -320,34 +314,29 @@ def response_frame(found: Responded) -> "pd.DataFrame":
     """The columns of response.csv, a row a frequency; NaN where nothing is seen."""
     import pandas as pd
 
-    every, f = found.found, found.found.f
+    curves, f = found.curves, found.found.f
     columns: dict[str, Array] = {"frequency_hz": f}
-    for name, one in (
-        ("plant", every.position), ("velocity", every.velocity),
-        ("plant_with_friction", every.with_friction.times(_by_position(f))),
-        ("controller", every.controller), ("open_loop", found.open_loop),
-    ):  # fmt: skip
-        columns |= _of_response(name, one, f)
-    curves = found.curves
-    for name, curve in (
-        ("plant_model", curves.plant if curves else None),
-        ("controller_card", curves.controller if curves else None),
-    ):
-        values = np.full(len(f), np.nan + 0j) if curve is None else curve
-        columns |= _of_curve(name, values)
+    blank = np.full(len(f), np.nan + 0j)
+    for name, one in _measured_curves(found).items():
+        H, half, coherence = blank, blank.real, blank.real
+        if one is not None:
+            H, half = (np.where(one.seen, x, np.nan) for x in (one.H, one.half_band))
+            coherence = one.coherence
+        columns |= {
+            **_of_curve(name, H),
+            f"{name}_band_db": decibels(1.0 + half),
+            f"{name}_band_deg": np.minimum(np.degrees(half), 180.0),
+            f"{name}_coherence": coherence,
+        }
+    plant, controller = (curves.plant, curves.controller) if curves else (None, None)
+    for name, curve in (("plant_model", plant), ("controller_card", controller)):
+        columns |= _of_curve(name, blank if curve is None else curve)
     return pd.DataFrame(columns)
 
 
 def curve_of(found: Responded, what: Curve) -> Response:
     """One of the curves; raises BadModel where the logs show none."""
-    every = found.found
-    curves = {
-        "plant": every.position,
-        "velocity": every.velocity,
-        "plant_with_friction": every.with_friction.times(_by_position(every.f)),
-        "controller": every.controller,
-        "open_loop": found.open_loop,
-    }
+    curves = _measured_curves(found)
     if what not in curves:
         raise BadModel(f"no curve {what!r}; there are {', '.join(curves)}")
     one = curves[what]
@@ -356,22 +345,16 @@ def curve_of(found: Responded, what: Curve) -> Response:
     return one
 
 
-def _by_position(f: Array) -> ComplexArray:
-    return np.asarray(-1.0 / (2.0 * np.pi * f) ** 2 + 0j)
-
-
-def _of_response(name: str, one: Response | None, f: Array) -> dict[str, Array]:
-    blank = np.full(len(f), np.nan)
-    if one is None:
-        keys = ("magnitude_db", "phase_deg", "band_db", "band_deg", "coherence")
-        return {f"{name}_{key}": blank for key in keys}
-    H = np.where(one.seen, one.H, np.nan)
-    half = np.where(one.seen, one.half_band, np.nan)
+def _measured_curves(found: Responded) -> dict[Curve, Response | None]:
+    """The curves by name, None for one that the logs do not show."""
+    every = found.found
+    by_position = np.asarray(-1.0 / (2.0 * np.pi * every.f) ** 2 + 0j)
     return {
-        **_of_curve(name, H),
-        f"{name}_band_db": decibels(1.0 + half),
-        f"{name}_band_deg": np.minimum(np.degrees(half), 180.0),
-        f"{name}_coherence": one.coherence,
+        "plant": every.position,
+        "velocity": every.velocity,
+        "plant_with_friction": every.with_friction.times(by_position),
+        "controller": every.controller,
+        "open_loop": found.open_loop,
     }
 
 
