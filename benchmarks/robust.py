@@ -101,7 +101,7 @@ def staircase_of_pid(model: Model, seed: int) -> float:
         return np.inf
     loop = driven_loop(model, nominal, nominal.pid, None)
     motion, _ = one_motion(model, nominal, loop.h)
-    own = DrawnMachines(model, (in_loop(model),), {})
+    own = DrawnMachines(model, (in_loop(model),))
     found = outcomes(own, loop, motion, [stream(seed, "robust model")])
     return float(found.values["staircase"][0])
 
@@ -111,7 +111,7 @@ def on_truth(
 ) -> Iterator[tuple[str, Outcomes]]:
     """Each loop on the true machine."""
     drive = None if one.kind == "force" else one.drive
-    truth = DrawnMachines(model, (Plant(one.friction, drive),), {})
+    truth = DrawnMachines(model, (Plant(one.friction, drive),))
     nominal = design(model, source="physical")
     for name, loop in loops(model, found):
         motion, _ = one_motion(model, nominal, loop.h)

@@ -161,13 +161,14 @@ def _rate(found: Experiment, index: int) -> str:
 
 def run_chart(found: Experiment) -> Chart:
     """Position, speed and force along the run, with the limits."""
-    units, seen, limits = shown(found.motion == "rotary"), found.traces, found.limits
-    panels = []
-    for values, name, unit, edges in (
-        (seen.y, "position", units.position, limits.stroke),
-        (seen.v, "speed", units.velocity, (-limits.speed, limits.speed)),
-        (seen.F, "applied force", units.force, (-limits.force, limits.force)),
+    units, limits = shown(found.motion == "rotary"), found.limits
+    seen, panels = found.runs[0], []
+    for key, name, unit, edges in (
+        ("y", "position", units.position, limits.stroke),
+        ("v", "speed", units.velocity, (-limits.speed, limits.speed)),
+        ("F", "applied force", units.force, (-limits.force, limits.force)),
     ):
+        values = np.array([getattr(run, key) for run in found.runs])
         low, high = np.min(values, axis=0), np.max(values, axis=0)
         lines = [Line("the model", seen.t, values[0])]
         if name == "position":

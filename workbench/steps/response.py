@@ -329,8 +329,8 @@ def response_frame(found: Responded) -> "pd.DataFrame":
             f"{name}_coherence": coherence,
         }
     plant, controller = (curves.plant, curves.controller) if curves else (None, None)
-    for name, curve in (("plant_model", plant), ("controller_card", controller)):
-        columns |= _of_curve(name, blank if curve is None else curve)
+    for key, curve in (("plant_model", plant), ("controller_card", controller)):
+        columns |= _of_curve(key, blank if curve is None else curve)
     return pd.DataFrame(columns)
 
 

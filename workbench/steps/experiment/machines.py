@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.experiment.precision import Machine
-from design.loop import LoopNoise, LoopRun
+from design.loop import LoopRun
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
@@ -28,6 +28,7 @@ from workbench.steps.closed_loop import (
     DrivenLoop,
     chambers,
     driven_loop,
+    noise_of,
     present_loop,
     run_plant,
 )
@@ -53,11 +54,7 @@ class Bench:
 
     def run(self, plant: Plant, r: Array, rng: np.random.Generator | None = None) -> LoopRun:
         """The loop on a plant along r [m], (n,) every loop.h; with the sensors' noise by rng."""
-        noise = None
-        if rng is not None:
-            fit = self.model.fit
-            noise = LoopNoise.draw(len(r), fit.noise_y, fit.noise_F, rng)
-        return run_plant(self.model, plant, self.loop, r, noise)
+        return run_plant(self.model, plant, self.loop, r, noise_of(self.model, len(r), rng))
 
     def log(self, run: LoopRun, name: str = "experiment") -> Log:
         """What the machine logs of a run."""

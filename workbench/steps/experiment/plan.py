@@ -32,7 +32,6 @@ from workbench.steps.experiment.planned import (
     Promised,
     Safety,
     Separation,
-    Traces,
     Wanted,
     half_width,
     limits_of,
@@ -66,8 +65,11 @@ def experiment(
     plant = in_loop(model)
     plants = (plant, *drawn_plants(model, draw, CHECKED_PLANTS))
     rivals = _rivals(model, wanted)
-    if rivals:
-        plants = tuple(_without(one, wanted.rivals) for one in plants)
+    if rivals:  # each plant has none of them at first
+        plants = tuple(
+            replace(p, effects=tuple(one for one in p.effects if one.key not in wanted.rivals))
+            for p in plants
+        )
     machines = [bench.machine(one, rivals) for one in plants[: 1 + SEARCHED_PLANTS]]
     keys = tuple(one.key for one in rivals)
     asked = asked_of(wanted.parameters, unknowns(bench.fitted(plants[0]), bench.drive)[0])
@@ -104,7 +106,7 @@ def experiment(
         remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
         versions=versions(),
         r=r[:: max(1, round(bench.loop.law.h / bench.loop.h))],  # where the controller samples
-        traces=_traces(bench, plants[: 1 + SHOWN_PLANTS], r),
+        runs=tuple(bench.run(one, r) for one in plants[: 1 + SHOWN_PLANTS]),
     )
 
 
@@ -116,10 +118,6 @@ def _rivals(model: Model, wanted: Wanted) -> tuple[Acting, ...]:
         own.get(key) or sought(known_effect(key, model.library), plant, limits.stroke)
         for key in wanted.rivals
     )
-
-
-def _without(plant: Plant, keys: Sequence[str]) -> Plant:
-    return replace(plant, effects=tuple(one for one in plant.effects if one.key not in keys))
 
 
 def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[Plant, ...]:
@@ -140,22 +138,9 @@ def _apart(information: Information, keys: Sequence[str]) -> tuple[Separation, .
     return tuple(sorted(found, key=lambda one: one.deviations))
 
 
-def _traces(bench: Bench, plants: Sequence[Plant], r: Array) -> Traces:
-    runs = [bench.run(one, r) for one in plants]
-    return Traces(
-        t=runs[0].t,
-        r=r,
-        y=np.array([one.y for one in runs]),
-        v=np.array([one.v for one in runs]),
-        F=np.array([one.F for one in runs]),
-        u=np.array([one.u for one in runs]),
-    )
-
-
 def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
     out = list(model.read)
-    left_out = effects_left_out(model)
-    if left_out:
+    if left_out := effects_left_out(model):
         out.append(left_out)
     if model.assumed:
         names = ", ".join(model.assumed)

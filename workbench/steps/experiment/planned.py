@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from design.experiment.limits import MotionLimits, Peaks
 from design.experiment.segments import Segment
+from design.loop import LoopRun
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
@@ -72,25 +73,13 @@ class Safety:
 
 
 @dataclass(frozen=True, eq=False)
-class Traces:
-    """What the picture shows, every h: time [s], reference and positions [m] (machines, n), forces
-    [N] and speeds [m/s] likewise; the first machine is the model's."""
-
-    t: Array
-    r: Array
-    y: Array
-    v: Array
-    F: Array
-    u: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Experiment:
     """The run to make next.
 
     h [s]: period of the reference r [m], (n,); criterion: "D" (surest parameters) or "T" (rivals
     discriminated); efficiency: of the best shares of the time, a parameter, that the run's whole
-    pieces reach as their sum; chaotic: share of the run that is sensitive to chance.
+    pieces reach as their sum; chaotic: share of the run that is sensitive to chance; runs: what
+    the picture shows, the first of the model, others of machines drawn.
     """
 
     card: str
@@ -112,7 +101,7 @@ class Experiment:
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
     r: Array
-    traces: Traces
+    runs: tuple[LoopRun, ...]
     schema: Literal["experiment/1"] = field(default="experiment/1")
 
 

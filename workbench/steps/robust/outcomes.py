@@ -4,7 +4,7 @@ a loop comes to on every one: margins, errors, forces, a limit cycle."""
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from design.drawn_loops import DrawnPlants, loop_margins
 from design.linear import ForceGains, commanded_plant, linear_plant
-from design.loop import LoopNoise, LoopRun
+from design.loop import LoopRun
 from identification.arrays import Array
 from identification.errors import BadSpecification, UserError
 from identification.estimation.windowed_run.parameters import plant_with, values_of
@@ -22,7 +22,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import DrivenLoop, limit_on, run_plant
+from workbench.steps.closed_loop import DrivenLoop, limit_on, noise_of, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.loop_figures import Limits
 from workbench.steps.loop_motion import loop_motion
@@ -30,11 +30,10 @@ from workbench.steps.loop_motion import loop_motion
 
 @dataclass(frozen=True, eq=False)
 class DrawnMachines:
-    """A model, the plants drawn around it, and by what they were widened: relative deviations."""
+    """A model, and the plants drawn around it."""
 
     model: Model
     plants: tuple[Plant, ...]
-    drift: Mapping[str, float]
 
     def linear(self, h: float, force: ForceLoop | None, probability: float) -> DrawnPlants:
         """The linear plants as a law that asks for force sees them every h [s]; see `each_linear`.
@@ -77,7 +76,6 @@ def drawn_machines(
     model: Model, rng: np.random.Generator, count: int, drift: Mapping[str, float] | None = None
 ) -> DrawnMachines:
     """So many machines, drawn from the errors of the model's parameters, and by `drift_found`."""
-    drift = dict(drift or {})
     errors, drift_rng = rng.spawn(2)
     plants = drawn_plants(model, errors, count)
     if drift:
@@ -88,7 +86,7 @@ def drawn_machines(
             plant_with(plant, names, values_of(plant, names) * row)
             for plant, row in zip(plants, factors, strict=True)
         )
-    return DrawnMachines(model, plants, drift)
+    return DrawnMachines(model, plants)
 
 
 def drift_found(models: Sequence[Mapping[str, Estimate]]) -> dict[str, float]:
@@ -118,11 +116,6 @@ def _squared_step(old: Estimate | None, new: Estimate | None) -> float | None:
         return None
     unsure = sum(((one.sd or 0.0) / (one.value or 1.0)) ** 2 for one in (old, new))
     return math.log(new.value / old.value) ** 2 - unsure
-
-
-def some_of(machines: DrawnMachines, count: int) -> DrawnMachines:
-    """The first `count` of the machines."""
-    return replace(machines, plants=machines.plants[:count])
 
 
 SLOW_SHARE = 0.5  # of the narrowest stick band, at which a slow ramp moves
@@ -186,16 +179,7 @@ class Outcomes:
 
 def limits_by_name(limits: Limits, staircase: float | None = None) -> dict[str, float]:
     """The limits of `validate` by measure, that of the staircase [m] where one is asked for."""
-    out = {
-        "modulus": limits.modulus,
-        "delay": limits.delay,
-        "standstill": limits.standstill,
-        "tracking": limits.tracking,
-        "overshoot": limits.overshoot,
-        "force": limits.force,
-        "command": BARELY,
-        "limit_cycle": 0.0,
-    }
+    out = {**asdict(limits), "command": BARELY, "limit_cycle": 0.0}
     return out if staircase is None else {**out, "staircase": staircase}
 
 
@@ -249,8 +233,7 @@ def _on_one(
     """The measures of `outcomes` on one plant, margins left out."""
 
     def run(r: Array) -> LoopRun:
-        noise = LoopNoise.draw(len(r), model.fit.noise_y, model.fit.noise_F, rng)
-        return run_plant(model, plant, loop, r, noise)
+        return run_plant(model, plant, loop, r, noise_of(model, len(r), rng))
 
     try:
         steps, smooth, slow = run(motion.steps), run(motion.smooth), run(motion.slow)

@@ -24,9 +24,8 @@ from workbench.steps.robust.outcomes import (
     limits_by_name,
     outcomes,
     slow_ramp,
-    some_of,
 )
-from workbench.steps.robust.search import Candidate, Placing, Searched, searched, spread_of
+from workbench.steps.robust.search import Candidate, Placing, searched
 
 ROBUST_STAGES = {
     "nominal design": (0.0, 0.1),
@@ -129,18 +128,28 @@ def robust_design(
     limits = limits_by_name(wanted.limits, wanted.staircase)
     machines = drawn_machines(model, search, wanted.draws, wanted.drift)
     motion, speed = one_motion(model, nominal)
-    found = searched(
-        machines, Placing(asked, goals, "physical", where[1]), motion, limits,
-        wanted.probability, search, report,
+    chosen, tried = searched(
+        machines, Placing(asked, goals, where[1]), motion, limits, wanted.probability, search,
+        report,
     )  # fmt: skip
     judges = drawn_machines(model, anew, wanted.draws, wanted.drift)
-    promises = _promises(model, judges, found.chosen, nominal, limits, noise, report)
-    missed = _missed(promises[ROBUST], wanted.probability)
+    promises = _promises(model, judges, chosen, nominal, limits, noise, report)
+    words, kept = {one.name: one.words for one in MEASURES}, promises[ROBUST]
+    missed = tuple(
+        f"{words[name]}: within its limit on {100 * one.share:.0f} % of the machines drawn,"
+        f" {100 * wanted.probability:g} % asked"
+        for name, one in kept.measures.items()
+        if one.share is not None and one.share < wanted.probability
+    )
+    choice = Recommendation("none", False, "; ".join(missed))
+    if not missed:
+        why = _why(chosen, kept, wanted.draws, tried)
+        choice = Recommendation(chosen.name, chosen.compensator, why)
     return Robust(
-        design=_chosen(model, found, promises[ROBUST], wanted, missed),
+        design=with_choice(model, chosen.design, choice),
         asked=wanted,
         promises=promises,
-        tried=found.tried,
+        tried=tried,
         speed=speed,
         missed=missed,
         remarks=tuple(_remarks(model, wanted)),
@@ -170,12 +179,12 @@ def _promises(
     now = _present(model)
     if now is not None:
         loops[PRESENT] = ("none", False, now)
-    seeds = rng.spawn(len(machines.plants))
+    seeds, few = rng.spawn(len(machines.plants)), machines.plants[:MOST_BESIDE]
     out = {}
     for i, (name, (controller, compensator, loop)) in enumerate(loops.items()):
         report("what it promises", i / len(loops))
         motion, _ = one_motion(model, nominal, loop.h)
-        judges = machines if name == ROBUST else some_of(machines, MOST_BESIDE)
+        judges = machines if name == ROBUST else DrawnMachines(model, few)
         found = outcomes(judges, loop, motion, seeds)
         out[name] = promise_of(controller, compensator, found, limits)
     return out
@@ -192,42 +201,23 @@ def promise_of(
     controller: str, compensator: bool, found: Outcomes, limits: Mapping[str, float]
 ) -> Promise:
     """The outcomes as shares and quantiles."""
-    within, spread = found.within(limits), spread_of(found)
-    measures = {
-        name: Spread(
-            *own, limits.get(name), float(np.mean(within[name])) if name in within else None
-        )
-        for name, own in spread.items()
-    }
+    within, measures = found.within(limits), dict[str, Spread]()
+    for name in (one.name for one in MEASURES if one.name in found.values):
+        low, middle, high = np.quantile(found.values[name], (0.05, 0.5, 0.95), method="nearest")
+        share = float(np.mean(within[name])) if name in within else None
+        measures[name] = Spread(float(low), float(middle), float(high), limits.get(name), share)
     every = np.all(list(within.values()), axis=0)
     return Promise(controller, compensator, measures, float(np.mean(every)), found)
 
 
-def _missed(promise: Promise, probability: float) -> tuple[str, ...]:
-    words = {one.name: one.words for one in MEASURES}
-    return tuple(
-        f"{words[name]}: within its limit on {100 * one.share:.0f} % of the machines drawn,"
-        f" {100 * probability:g} % asked"
-        for name, one in promise.measures.items()
-        if one.share is not None and one.share < probability
-    )
-
-
-def _chosen(
-    model: Model, found: Searched, promise: Promise, wanted: RobustAsked, missed: tuple[str, ...]
-) -> Design:
-    """The design with its choice and the promise as the reason."""
-    one = found.chosen
-    called = one.name.upper() + (" with the compensator" if one.compensator else "")
+def _why(chosen: Candidate, promise: Promise, draws: int, tried: int) -> str:
+    """The promise as the reason of a choice."""
+    called = chosen.name.upper() + (" with the compensator" if chosen.compensator else "")
     least = min((m.share for m in promise.measures.values() if m.share is not None), default=1.0)
-    said = (
-        f"{called}: of {wanted.draws} machines drawn each limit is met by at least"
-        f" {100 * least:.0f} %, all of them by {100 * promise.every:.0f} %; the best of"
-        f" {found.tried} loops tried"
+    return (
+        f"{called}: of {draws} machines drawn each limit is met by at least {100 * least:.0f} %,"
+        f" all of them by {100 * promise.every:.0f} %; the best of {tried} loops tried"
     )
-    if missed:
-        return with_choice(model, one.design, Recommendation("none", False, "; ".join(missed)))
-    return with_choice(model, one.design, Recommendation(one.name, one.compensator, said))
 
 
 def _remarks(model: Model, wanted: RobustAsked) -> list[str]:

@@ -15,18 +15,11 @@ from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
 from identification.progress import Progress
-from workbench.documents.design import CompensatorValues, Controller, Design, From, Structure
+from workbench.documents.design import CompensatorValues, Controller, Design, Structure
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
 from workbench.steps.design import POLES_PLACED, placed_design
-from workbench.steps.robust.outcomes import (
-    MEASURES,
-    DrawnMachines,
-    Motion,
-    Outcomes,
-    outcomes,
-    some_of,
-)
+from workbench.steps.robust.outcomes import DrawnMachines, Motion, Outcomes, outcomes
 
 SPEEDS_TRIED = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
 # The whole compensator's e_T and its filters' time constants, in units of the usual ones.
@@ -63,36 +56,25 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Placing:
-    """What is asked of the poles and margins; the linear plant and the period [s] to place on, None
-    where they are chosen."""
+    """What is asked of the poles and margins, and the period [s], None where it is chosen."""
 
     asked: Asked
     goals: Goals
-    source: From | None = None
     period: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Searched:
-    """The candidate chosen, how many were tried, and whether it kept every limit in the search."""
-
-    chosen: Candidate
-    tried: int
-    passed: bool
 
 
 def searched(
     machines: DrawnMachines, placing: Placing, motion: Motion, limits: dict[str, float],
     probability: float, rng: np.random.Generator, report: Progress,
-) -> Searched:  # fmt: skip
-    """The best of all candidates by their loops on the machines.
+) -> tuple[Candidate, int]:  # fmt: skip
+    """The best of all candidates by their loops on the machines, and how many there were.
 
     limits: by measure. Raises BadSpecification where no loop can be placed at all.
     """
     model = machines.model
     every = list(candidates(machines, placing, probability, report))
     seeds = rng.spawn(len(machines.plants))
-    sorted_by = some_of(machines, min(FEW, len(machines.plants)))
+    sorted_by = replace(machines, plants=machines.plants[:FEW])
     tried: list[Candidate] = []
     for i, one in enumerate(every):
         report("loops on a few machines", i / len(every))
@@ -107,8 +89,7 @@ def searched(
     for i, one in enumerate(tried[:FINALISTS]):
         report("loops on all machines", i / FINALISTS)
         best.append(replace(one, found=outcomes(machines, one.loop(model), motion, seeds)))
-    chosen = min(best, key=rank)
-    return Searched(chosen, len(every), _short(chosen, limits, probability) == 0.0)
+    return min(best, key=rank), len(every)
 
 
 def candidates(
@@ -136,7 +117,7 @@ def candidates(
         try:
             found = placed_design(
                 machines.model, one, goals=replace(placing.goals, fastest=top),
-                source=placing.source, period=period,
+                source="physical", period=period,
                 drawn=lambda plant, force: machines.linear(plant.h, force, probability),
             )  # fmt: skip
         except BadSpecification as error:
@@ -193,12 +174,3 @@ def _cost(one: Candidate, model: Model) -> float:
     floors |= {"staircase": STAIR_FLOOR * max(model.fit.noise_y, 1e-12), "settling": 1e-6}
     medians = [max(float(np.median(one.found.values[n])), floors[n]) for n in WEIGHED]
     return float(np.mean(np.log(medians))) if np.all(np.isfinite(medians)) else np.inf
-
-
-def spread_of(found: Outcomes) -> dict[str, tuple[float, float, float]]:
-    """5 %, median and 95 % of each measure over the machines."""
-    out = {}
-    for name in (one.name for one in MEASURES if one.name in found.values):
-        low, middle, high = np.quantile(found.values[name], (0.05, 0.5, 0.95), method="nearest")
-        out[name] = (float(low), float(middle), float(high))
-    return out

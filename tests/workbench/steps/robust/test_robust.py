@@ -135,7 +135,7 @@ def test_a_machine_that_runs_away_keeps_no_limit() -> None:
     kept = found().design
     loop = driven_loop(model, kept, kept.controllers[found().promises[ROBUST].controller], None)
     wild = replace(model.simulated.friction, m=1e-3)
-    machines = DrawnMachines(model, (Plant(wild, model.simulated.actuator),), {})
+    machines = DrawnMachines(model, (Plant(wild, model.simulated.actuator),))
     step = np.repeat([0.0, 0.05], 500)
     got = outcomes(machines, loop, Motion(step, step, step), np.random.default_rng(0).spawn(1))
     share = got.within(limits_by_name(Limits()))
