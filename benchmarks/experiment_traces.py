@@ -27,8 +27,7 @@ from identification.progress import quiet
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from workbench.steps.experiment.plan import experiment
-from workbench.steps.experiment.planned import Wanted
-from workbench.steps.experiment.rivals import rivals_of
+from workbench.steps.experiment.planned import Wanted, rivals_of
 
 STRENGTH = 0.2
 POOR, WORSE = 5.0, 5.0  # s of the poor log, and times its noise

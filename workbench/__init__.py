@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from workbench.interface.effects import check_effects as check_effects
     from workbench.interface.effects import effects as effects
     from workbench.steps.experiment.planned import Wanted as Wanted
-    from workbench.steps.identify_sources import Options as Options
+    from workbench.steps.identify import Options as Options
     from workbench.steps.loop_figures import Limits as Limits
     from workbench.steps.robust.robust import RobustAsked as RobustAsked
 
@@ -45,7 +45,7 @@ _HOMES = {
     "NotIdentifiable": "identification.errors",
     "UserError": "identification.errors",
     "Wanted": "workbench.steps.experiment.planned",
-    "Options": "workbench.steps.identify_sources",
+    "Options": "workbench.steps.identify",
     "Limits": "workbench.steps.loop_figures",
     "RobustAsked": "workbench.steps.robust.robust",
 }

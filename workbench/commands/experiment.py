@@ -78,8 +78,7 @@ def command(given: ExperimentOptions) -> int:
     from workbench.report.next_steps import after_experiment
     from workbench.report.view import show
     from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment
-    from workbench.steps.experiment.planned import Wanted
-    from workbench.steps.experiment.rivals import read_rivals
+    from workbench.steps.experiment.planned import Wanted, read_rivals
     from workbench.steps.present import with_card
 
     known, model_file = library(given.effects), given.model_file

@@ -49,7 +49,8 @@ def command(
     from workbench.report.next_steps import after_identify, check_of_refused
     from workbench.report.reports import identified_view
     from workbench.report.view import show
-    from workbench.steps.identify_sources import Options, identify_sources
+    from workbench.steps.identify import Options
+    from workbench.steps.identify_sources import identify_sources
 
     velocity = card_of_velocity(card)
     if velocity:

@@ -61,9 +61,9 @@ from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 from workbench.steps.experiment.plan import EXPERIMENT_STAGES
 from workbench.steps.experiment.plan import experiment as plan_experiment
-from workbench.steps.experiment.planned import Wanted
-from workbench.steps.experiment.rivals import read_rivals, rivals_of
-from workbench.steps.identify_sources import Options, identify_sources
+from workbench.steps.experiment.planned import Wanted, read_rivals, rivals_of
+from workbench.steps.identify import Options
+from workbench.steps.identify_sources import identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
 from workbench.steps.present import present_of_card

@@ -42,8 +42,8 @@ from workbench.report.trace_words import trace_sentence
 from workbench.report.view import Section, report_notes
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.missing_force import missing_force
 from workbench.steps.predict import fitted_run
+from workbench.steps.predicted_force import missing_force
 from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import Traced, trace_document, trace_sources
 from workbench.steps.validate import validate, validation_document

@@ -53,8 +53,8 @@ from workbench.report.view import Section, View, lines_section, report_notes, ta
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
-from workbench.steps.missing_force import missing_force
 from workbench.steps.predict import fitted_run
+from workbench.steps.predicted_force import missing_force
 from workbench.steps.validate import Validation, validation_document
 
 

@@ -51,6 +51,11 @@ def tuned_cascade(model: Model, plant: Linear, corners: Plants, goals: Goals) ->
     if not filters:
         return plain
     filtered = tune_cascade(plants, plant.h, m, goals, filters=filters, swings=swings)
+    return better(plain, filtered)
+
+
+def better(plain: TunedCascade, filtered: TunedCascade) -> TunedCascade:
+    """The filtered one where it keeps more goals, or as many and earns its place."""
     if len(filtered.missed) != len(plain.missed):
         return min((plain, filtered), key=lambda one: len(one.missed))
     return filtered if filtered.bandwidth > FILTER_EARNS * plain.bandwidth else plain

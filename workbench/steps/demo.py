@@ -10,13 +10,13 @@ import numpy as np
 from identification.effects._library import built_in
 from identification.errors import BadCard
 from identification.model.karnopp import NAMES
+from identification.progress import Progress
 from workbench.cards.card import Card
 from workbench.cards.recipe import Recipe
 from workbench.documents.design import Design
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.steps.design import design
-from workbench.steps.identify import Progress
 from workbench.steps.loop_figures import Traces
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import Traced, trace_sources

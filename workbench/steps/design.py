@@ -3,11 +3,9 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from design.cascade import TunedCascade
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
 from design.filters import filters_at
@@ -124,68 +122,9 @@ def placed_design(
     asked = asked or Asked()
     _check_period(period, model)
     goals = goals or Goals(effort=effort_limit(model))
-    found = _placed(model, asked, goals, (source, period), drawn, structures)
-    h, (low, high) = found.plant.h, model.travel
-    controllers: dict[Structure, Controller] = {
-        name: _controller(tuned, found.plant, shown(model.rotary))
-        for name, tuned in found.tuned.items()
-    }
-    if found.cascade is not None:
-        controllers["p-pi"] = cascade_controller(model, found.plant, found.force, found.cascade)
-    return Design(
-        card=model.card,
-        motion=model.rig.motion,
-        plant=found.plant,
-        force=found.force,
-        rst=controllers.get("rst"),
-        pid=controllers.get("pid"),
-        p_pi=controllers.get("p-pi"),
-        refused=found.refused,
-        recommended="none",
-        compensator=CompensatorValues(
-            N_C, E_T_PER_TRAVEL * (high - low), model.friction, filters_at(h), h
-        ),
-        remarks=(
-            *model.read,
-            *stored_remarks(model),
-            *bandwidth_remarks([one.dominant[0] for one in controllers.values()], model.rig),
-            *found.slower,
-        ),
-        versions=versions(),
-        command=command_of(model, found.force),
-        present=model.present,
-    )
-
-
-class _Placed(NamedTuple):
-    """Controllers at one period; slower: why not at a shorter one, in words."""
-
-    plant: Linear
-    force: ForceLoop | None
-    tuned: Mapping[Structure, Tuned]
-    refused: Mapping[str, str]
-    slower: tuple[str, ...] = ()
-    cascade: TunedCascade | None = None
-
-    @property
-    def missed(self) -> tuple[str, ...]:
-        """What the controller misses that misses the fewest goals."""
-        every = [one.missed for one in self.tuned.values()]
-        return min([*every, *([self.cascade.missed] if self.cascade else [])], key=len)
-
-
-def _placed(
-    model: Model, asked: Asked, goals: Goals, where: tuple[From | None, float | None],
-    drawn: DrawnFor | None, structures: Sequence[Structure],
-) -> _Placed:  # fmt: skip
-    """The controllers at the period, or the first of `periods` at which one keeps every goal.
-
-    where: the linear plant and the period asked for.
-    """
-    source, period = where
     first, _ = linear_of(model, source, period)
-    tried: list[_Placed] = []
-    said: list[str] = []
+    tried: list[Design] = []
+    slower: list[str] = []  # why not at a shorter period
     refusal: BadSpecification | None = None
     every = (first.h,) if period is not None or first.source == "arx" else periods(model)
     for h in every:
@@ -194,15 +133,21 @@ def _placed(
             found = _placed_at(model, asked, goals, linear, drawn, structures)
         except BadSpecification as error:
             refusal = refusal or error
-            said.append(f"not every {1e3 * h:.4g} ms: {error}")
+            slower.append(f"not every {1e3 * h:.4g} ms: {error}")
             continue
-        if not found.missed:
-            return found._replace(slower=tuple(said))
+        missed = _least_missed(found)
+        if not missed:
+            return replace(found, remarks=(*found.remarks, *slower))
         tried.append(found)
-        said.append(f"not every {1e3 * h:.4g} ms: {', '.join(found.missed)}")
+        slower.append(f"not every {1e3 * h:.4g} ms: {', '.join(missed)}")
     if not tried:
         raise refusal or BadSpecification("no sampling period to try; give --design-period")
-    return min(tried, key=lambda one: len(one.missed))
+    return min(tried, key=lambda one: len(_least_missed(one)))
+
+
+def _least_missed(found: Design) -> tuple[str, ...]:
+    """What the controller misses that misses the fewest goals."""
+    return min((one.missed for one in found.controllers.values()), key=len)
 
 
 def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -> Tuned:
@@ -230,10 +175,11 @@ def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -
 def _placed_at(
     model: Model, asked: Asked, goals: Goals, linear: tuple[Linear, ForceLoop | None],
     drawn: DrawnFor | None, structures: Sequence[Structure],
-) -> _Placed:  # fmt: skip
+) -> Design:  # fmt: skip
+    """The controllers on a linear plant, above its force loop."""
     plant, force = linear
     machines = None if drawn is None else drawn(plant, force)
-    found: dict[Structure, Tuned] = {}
+    found: dict[Structure, Controller] = {}
     refused, of_poles = dict[str, str](), goals
     a, b = stiff_body(model, plant, force)
     whole = (np.array(plant.A), np.array(plant.B)) if swings_of(model) else None
@@ -254,19 +200,52 @@ def _placed_at(
             tuned = partial(
                 tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
             )
-            found[name] = _followable(tuned, of_poles, None if wanted.dominant else model.speed)
+            followed = _followable(tuned, of_poles, None if wanted.dominant else model.speed)
+            found[name] = _controller(followed, plant, shown(model.rotary))
         except BadSpecification as error:
             refused[name] = str(error)
-    cascade = None
     if "p-pi" in structures:
         try:
             cascade = tuned_cascade(model, plant, others, goals)
+            found["p-pi"] = cascade_controller(model, plant, force, cascade)
         except BadSpecification as error:
             refused["p-pi"] = str(error)
     by_hand = asked.dominant is not None or asked.auxiliary is not None
-    if (not found and cascade is None) or ("rst" in refused and by_hand):
+    if not found or ("rst" in refused and by_hand):
         raise BadSpecification(next(iter(refused.values())))
-    return _Placed(plant, force, found, refused, cascade=cascade)
+    return _design_of(model, linear, found, refused)
+
+
+def _design_of(
+    model: Model, linear: tuple[Linear, ForceLoop | None],
+    controllers: Mapping[Structure, Controller], refused: Mapping[str, str],
+) -> Design:  # fmt: skip
+    """The controllers as a design, with the compensator beside them; none is recommended yet."""
+    plant, force = linear
+    low, high = model.travel
+    filters, h = filters_at(plant.h), plant.h
+    return Design(
+        card=model.card,
+        motion=model.rig.motion,
+        plant=plant,
+        force=force,
+        rst=controllers.get("rst"),
+        pid=controllers.get("pid"),
+        p_pi=controllers.get("p-pi"),
+        refused=refused,
+        recommended="none",
+        compensator=CompensatorValues(
+            N_C, E_T_PER_TRAVEL * (high - low), model.friction, filters, h
+        ),
+        remarks=(
+            *model.read,
+            *stored_remarks(model),
+            *bandwidth_remarks([one.dominant[0] for one in controllers.values()], model.rig),
+        ),
+        versions=versions(),
+        command=command_of(model, force),
+        present=model.present,
+    )
 
 
 def _check_period(period: float | None, model: Model) -> None:

@@ -1,6 +1,5 @@
 """A model's machine as it is thought to be, and as it may be: plants drawn by what is not sure."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +10,8 @@ from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import in_the_loop
 from workbench.steps.drift import active_model
 
-NO_BAND_SHARE, USUAL_BAND_SHARE = (
-    1e-3,
-    0.03,
-)  # of the logs' speed: a band that none has, and a usual one
+NO_BAND_SHARE = 1e-3  # of the logs' speed: a band that none has
+USUAL_BAND_SHARE = 0.03  # the same of a usual one
 UNIDENTIFIED_SPREAD = 0.3  # log of a value that no log identifies, one sigma
 
 
@@ -29,10 +26,9 @@ def in_loop(model: Model) -> Plant:
 def lost_bands(model: Model) -> dict[str, float]:
     """Bands narrower than a thousandth of the logs' speed, with what is assumed in their place."""
     speed, nine = model.speed or 0.0, model.karnopp
-    ways = {"dv_p": (nine.dv_p, 1.0), "dv_n": (nine.dv_n, -1.0)}
     return {
         name: sign * USUAL_BAND_SHARE * speed
-        for name, (band, sign) in ways.items()
+        for name, band, sign in (("dv_p", nine.dv_p, 1.0), ("dv_n", nine.dv_n, -1.0))
         if abs(band) < NO_BAND_SHARE * speed
     }
 
@@ -45,8 +41,12 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     drawn = rng.multivariate_normal(
         known.values, known.covariance, count, check_valid="ignore", method="svd"
     )
-    lost = lost_bands(model)
-    assumed = {**_assumed(model, known.untold), **lost}
+    every = {**model.friction, **(model.actuator or {})}
+    assumed = {
+        name: used(one)
+        for name, one in every.items()
+        if name in known.untold and name != "k_a" and used(one) != 0.0
+    } | lost_bands(model)
     free = np.exp(UNIDENTIFIED_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
     sets = np.hstack([drawn, free * np.array(list(assumed.values()))])
@@ -54,14 +54,3 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     effects = {one.key for one in plant.effects}
     indices = [i for n, i in last.items() if "." not in n or n.split(".")[0] in effects]
     return tuple(plant_with(plant, [names[i] for i in indices], row[indices]) for row in sets)
-
-
-def _assumed(model: Model, unidentified: Mapping[str, str]) -> dict[str, float]:
-    """Values that simulations use of the friction and actuator parameters that no log
-    identifies."""
-    every = {**model.friction, **(model.actuator or {})}
-    return {
-        name: used(one)
-        for name, one in every.items()
-        if name in unidentified and name != "k_a" and used(one) != 0.0
-    }

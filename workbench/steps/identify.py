@@ -6,7 +6,7 @@ plant model, since a force loop has unity gain; where there is no force, the com
 between, since that is what moves the body. A log from a closed loop is fitted directly.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -27,7 +27,7 @@ from identification.model.inverse_model import ForceError, Smoothing, force_erro
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, actuator_units
 from identification.model.surroundings import Surroundings
-from identification.progress import KeepGoing, without_end
+from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.effect_values import relabelled
@@ -44,7 +44,6 @@ from workbench.documents.reading import versions
 from workbench.logs.sources import Source
 from workbench.steps.drift import active_model
 
-Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
@@ -72,7 +71,7 @@ def identify(
     card: str,
     rig: Rig,
     options: Options | None = None,
-    on_progress: Progress | None = None,
+    on_progress: Progress = quiet,
     keep_going: KeepGoing = without_end,
 ) -> tuple[Model, KarnoppFit]:
     """The model of one machine from its runs, and the fit it comes from.
@@ -166,11 +165,6 @@ def _correlation(fit: KarnoppFit) -> ParameterCorrelation:
     return ParameterCorrelation(fit.free, tuple(tuple(row) for row in matrix.tolist()))
 
 
-def speed_of(log: Log) -> float:
-    """What 1 % of the measured speeds exceed [m/s]."""
-    return float(np.quantile(np.abs(differentiate(log["y"], log.h).v), FAST))
-
-
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit held have their assumed value."""
     units = friction_units(rig.motion)
@@ -218,7 +212,7 @@ def log_entry(
         position_rms=position_rms if np.isfinite(position_rms or 0.0) else None,
         force_rms=force_rms,
         chi_square=chi_square,
-        speed=speed_of(log),
+        speed=float(np.quantile(np.abs(differentiate(log["y"], log.h).v), FAST)),
         period=source.period,
     )
 
@@ -238,19 +232,16 @@ def _force_error(logs: Sequence[Log], fit: KarnoppFit, rig: Rig) -> ForceError |
 
 def closed_loop_remarks(logs: Sequence[Log]) -> list[str]:
     """A line for each log that was taken in a position loop."""
-    out = list[str]()
-    for log in logs:
-        if "r" in log and np.ptp(log["r"]) > 0:
-            together = float(np.corrcoef(log["r"], log["y"])[0, 1])
-            if together > TRACKS:
-                out.append(
-                    MinorRemark(
-                        f"{log.name}: logged in a closed loop (r and y correlate by"
-                        f" {together:.2f}); the ARX plant is fitted directly, so noise fed back may"
-                        " bias it"
-                    )
-                )
-    return out
+    moved = [log for log in logs if "r" in log and np.ptp(log["r"]) > 0]
+    together = [(log.name, float(np.corrcoef(log["r"], log["y"])[0, 1])) for log in moved]
+    return [
+        MinorRemark(
+            f"{name}: logged in a closed loop (r and y correlate by {by:.2f}); the ARX plant is"
+            " fitted directly, so noise fed back may bias it"
+        )
+        for name, by in together
+        if by > TRACKS
+    ]
 
 
 def arx_or_reason(

@@ -9,21 +9,19 @@ from identification.errors import NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
-from identification.progress import KeepGoing, without_end
+from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.documents.model import Model
 from workbench.documents.plausible import model_remarks
 from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identifiable_by_log import identifiability_of_runs
-from workbench.steps.identify import Options, Progress, identify
+from workbench.steps.identify import Options, identify
 from workbench.steps.other_kind import looks_like_velocity
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
-
-__all__ = ["Identified", "Options", "identify_sources"]
 
 BROKEN = 2.0  # times what a log promised before the fit, above which an interval is reported
 
@@ -46,7 +44,7 @@ def identify_sources(
     seed: int = 0,
     *,
     posterior: bool = False,
-    on_progress: Progress | None = None,
+    on_progress: Progress = quiet,
     keep_going: KeepGoing = without_end,
 ) -> Identified:
     """The model of the machine that the sources are of.
@@ -86,9 +84,9 @@ def identify_sources(
 
 def broken_promises(model: Model) -> tuple[str, ...]:
     """A line where intervals are far wider than the logs promised before the fit."""
-    wider = []
+    wider, known = [], {**model.friction, **(model.actuator or {})}
     for one in model.identifiability:
-        found = {**model.friction, **(model.actuator or {})}.get(one.name)
+        found = known.get(one.name)
         if not found or one.within is None or not found.value or found.sd is None:
             continue
         half = NORMAL_95 * found.sd / abs(found.value)
@@ -99,24 +97,22 @@ def broken_promises(model: Model) -> tuple[str, ...]:
     why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
     return (
         f"intervals are wider than predicted from the logs (in brackets): {', '.join(wider)};"
-        f" {why}, or"
-        " their noise is not the sensors' alone",
+        f" {why}, or their noise is not the sensors' alone",
     )
 
 
 def _posterior_samples(
-    sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
+    sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress
 ) -> "Posterior":
     from identification.estimation.posterior import sample_posterior
 
-    report = on_progress or (lambda _stage, _share: None)
     around = fit.surroundings
     return sample_posterior(
         replace(fit, effects=() if not around.none else fit.effects),
         [around.taken_out(source.log) for source in sources.runs],
         np.random.default_rng(seed),
         rig=sources.rig,
-        on_progress=lambda share: report("posterior", share),
+        on_progress=lambda share: on_progress("posterior", share),
     )
 
 

@@ -113,16 +113,12 @@ def change_over(model: Model, over: Over) -> float:
     """By which share the mean Coulomb friction changes over its range; of the direction viscous
     friction, by which the linear plant differs, and no more than its errors allow."""
     if over == "direction":
-        return _apart(model.friction["F_vp"], model.friction["F_vn"])
+        one, other = model.friction["F_vp"], model.friction["F_vn"]
+        unsure = 2.0 * float(np.hypot(one.sd or 0.0, other.sd or 0.0))
+        a, b = used(one), used(other)
+        return max(abs(a - b) - unsure, 0.0) / max(0.5 * (a + b), 1e-300)
     low, high = range_over(model, over)
     if not (high > low and any(_is_over(one, over) for one in in_the_loop(model))):
         return 0.0
     levels = levels_over(model, over)(np.linspace(low, high, LOOKED_AT_FOR_CHANGE))
     return float(np.ptp(levels) / max(float(np.mean(levels)), 1e-300))
-
-
-def _apart(one: Estimate, other: Estimate) -> float:
-    """By which share two frictions surely differ."""
-    a, b = used(one), used(other)
-    unsure = 2.0 * float(np.hypot(one.sd or 0.0, other.sd or 0.0))
-    return max(abs(a - b) - unsure, 0.0) / max(0.5 * (a + b), 1e-300)

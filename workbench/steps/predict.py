@@ -13,17 +13,15 @@ from identification.estimation.regression.held_command import with_period
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
-from identification.model.plant import Motor
-from identification.model.size import Size
-from identification.model.surroundings import Surroundings
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import of_body, with_motor_force
-from workbench.documents.model import Model, used
+from workbench.documents.model import Model
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import (
     force_by_model,
+    of_one_instant,
     refuse_missing,
     seen_moving,
     with_applied_force,
@@ -70,7 +68,7 @@ class Prediction:
         """Root mean square of measured less simulated position; None without a run."""
         if self.refused is not None:
             return None
-        return _rms(self.position_measured - self.position_simulated)
+        return float(np.sqrt(np.mean((self.position_measured - self.position_simulated) ** 2)))
 
     @property
     def force_predicted_rms(self) -> float | None:
@@ -105,9 +103,10 @@ def predict(
     how = Smoothing(held=model.rig.kind == "motor")
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
-    driven = as_driven(model, log, chosen)
-    run, refused = _run(model, driven, body, chosen, restarts)
-    simulated, other = (run, None) if chosen == "command" else _commanded(model, body, restarts)
+    run, refused = _run(model, log, body, chosen, restarts)
+    simulated, other = (run if chosen == "command" else None), None
+    if chosen == "force" and model.actuator is not None and "u" in body:
+        simulated, other = _run(model, body, body, "command", restarts)
     return Prediction(
         t=log["t"],
         force_applied=applied,
@@ -120,7 +119,7 @@ def predict(
         refused=refused,
         remarks=(
             *_assumed(model, ran=run is not None),
-            *([] if other is None else [f"force, simulated: {other}"]),
+            *([f"force, simulated: {other}"] if other else []),
         ),
     )
 
@@ -201,7 +200,8 @@ def _run(
     if refused is not None:
         return None, refused
     try:
-        run = free_run(model.simulated, log, measured_start(body), drive, restarts=restarts)
+        driven, start = as_driven(model, log, drive), measured_start(body)
+        run = free_run(model.simulated, driven, start, drive, restarts=restarts)
     except BadModel as error:  # the force is predicted all the same
         return None, f"no free run: {error}"
     return run, None
@@ -258,25 +258,6 @@ def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
     )
 
 
-def of_one_instant(log: Log, model: Model) -> Log:
-    """The log with its force at the instants of its position, where its columns are apart and no
-    effect of the model says so."""
-    if model.lag is None or "input_delay" in model.effects:
-        return log
-    drive = model.simulated.actuator
-    gives = drive.k_a if isinstance(drive, Motor) else None
-    return Surroundings(lag=Size(used(model.lag)), gives=gives).of_one_instant(log)
-
-
-def _commanded(
-    model: Model, body: Log, restarts: tuple[IntArray, Array, Array] | None
-) -> tuple[FreeRun | None, str | None]:
-    """The run by the command beside that by force, where there are actuator and command."""
-    if model.actuator is None or "u" not in body:
-        return None, None
-    return _run(model, as_driven(model, body, "command"), body, "command", restarts)
-
-
 def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:
     """Samples, positions and velocities of the measured state every `window` [s]."""
     step = max(1, round(window / log.h))
@@ -286,13 +267,9 @@ def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:
     return at, motion.y[at], v[at]
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def _rms_where(values: Array) -> float | None:
     found = values[np.isfinite(values)]
-    return _rms(found) if found.size else None
+    return float(np.sqrt(np.mean(found**2))) if found.size else None
 
 
 def prediction_frame(found: Sequence[Prediction]) -> "pd.DataFrame":

@@ -1,15 +1,22 @@
-"""Force that a model needs for a measured motion, on a log of its card."""
+"""Force that a model needs for a measured motion on a log of its card, and that which it lacks."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadLog
+from identification.estimation.latent_force import LatentForces, latent_forces
+from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.structure_fit import ABOVE_BAND
 from identification.log import Log, Rig
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.karnopp import VISCOUS_NAMES
-from identification.model.plant import Plant
+from identification.model.plant import Motor, Plant
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
 from identification.simulation.inverse_dynamics import force_needed
@@ -44,6 +51,35 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
             f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
         )
     return log.with_signals(F=force)
+
+
+def of_one_instant(log: Log, model: Model) -> Log:
+    """The log with its force at the instants of its position, where its columns are apart and no
+    effect of the model says so."""
+    if model.lag is None or "input_delay" in model.effects:
+        return log
+    drive = model.simulated.actuator
+    gives = drive.k_a if isinstance(drive, Motor) else None
+    return Surroundings(lag=Size(used(model.lag)), gives=gives).of_one_instant(log)
+
+
+def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
+    """The latent force of a model on logs of its machine; None where no body slides, and where two
+    masses swing behind each other, of which the one body of a latent force is none. A slope by
+    which friction falls with speed is no viscous friction, so it is among what is missing."""
+    if model.resonance is not None:
+        return None
+    held, imposed = model.rig.kind == "motor", model.prescribed_motion
+    given = [of_one_instant(with_applied_force(log, model.rig), model) for log in logs]
+    moved = [
+        motion_log(log, held=held, by_command=False, rotary=model.rotary, imposed=imposed)
+        for log in given
+    ]
+    plants = [seen_moving(model, log) for log in given]
+    plant = max(plants, key=lambda one: one.friction.dv_p - one.friction.dv_n)
+    p = plant.friction
+    found = latent_forces(plant, moved, ABOVE_BAND * max(p.dv_p, -p.dv_n))
+    return found if any(np.any(one.slides) for one in found.logs) else None
 
 
 def refuse_missing(log: Log, effects: Iterable[Acting]) -> None:

@@ -22,12 +22,11 @@ from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import Motor
 from identification.model.size import Size
-from identification.progress import KeepGoing, without_end
+from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
 from workbench.documents.reading import as_number
 from workbench.logs.sources import Source, Sources, fingerprints
-from workbench.steps.identify import Progress
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.linear_force import (
     freed,
@@ -128,7 +127,7 @@ def respond(
 
 
 def identified_or_not(
-    sources: Sources, seed: int, on_progress: Progress | None = None,
+    sources: Sources, seed: int, on_progress: Progress = quiet,
     keep_going: KeepGoing = without_end,
 ) -> tuple[Model | None, str | None]:  # fmt: skip
     """The model that the logs themselves give, or None and why they give none."""

@@ -56,19 +56,15 @@ def scheduled(
     if not names:
         raise BadModel("the design has no PID and no P-PI to schedule; add --structure")
     each = [_designed_at(model, over, value, found, (asked, goals), names) for value in at]
-    rows = tuple(_row(local(model, over, value), model, over) for value in at)
+    # Of a direction each controller has its own friction fed forward anyway.
+    here = [model if over == "direction" else local(model, over, value) for value in at]
+    rows = tuple((p.F_cp, p.F_cn, p.F_vp, p.F_vn) for p in (one.karnopp for one in here))
     controllers: dict[Structure, ScheduledController] = {
         name: ScheduledController(tuple(one[name] for one in each), False, "") for name in names
     }
     table = GainSchedule(over, at, rows, controllers)
     judged = {name: _judged(model, replace(found, schedule=table), name) for name in names}
     return replace(found, schedule=replace(table, controllers=judged))
-
-
-def _row(here: Model, model: Model, over: Over) -> tuple[float, float, float, float]:
-    """What is fed forward of friction at a point: of a direction each has its own anyway."""
-    p = model.karnopp if over == "direction" else here.karnopp
-    return p.F_cp, p.F_cn, p.F_vp, p.F_vn
 
 
 def _points(model: Model, over: Over) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """Training and test runs -> trace: what the model lacks, errors before and after, and the model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,27 +13,21 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import actuator_units
-from identification.progress import KeepGoing, without_end
+from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
-from identification.tracing.result import Errors, FoundEffect, FreeCurve, Trace
+from identification.tracing.result import FoundEffect, FreeCurve, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
-from workbench.documents.model import FitSummary, LogEntry, Model
+from workbench.documents.model import FitSummary, Model
 from workbench.documents.plausible import model_remarks
 from workbench.documents.reading import plain, versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
-from workbench.steps.identify import (
-    arx_or_reason,
-    log_entry,
-    resonance_of,
-    surrounding_effects,
-)
+from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines
 
 TRACE_SCHEMA = "trace/1"
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -69,7 +63,7 @@ def named_logs(
 
 def trace_sources(
     train: Sources, test: Sources | None, library: Library, seed: int = 0,
-    on_progress: Progress | None = None, *, keep_going: KeepGoing = without_end,
+    on_progress: Progress = quiet, *, keep_going: KeepGoing = without_end,
 ) -> Traced:  # fmt: skip
     """The trace of the machine that the sources are of; keep_going: whether it is to go on.
 
@@ -123,7 +117,10 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
         actuator = {"k_a": Estimate(rig.force_per_command, unit, reason="given by the card")}
     errors = found.after["train"]
     plant, reason = arx_or_reason([source.log for source in sources.runs])
-    chi = _chi_square(errors, found)
+    chi = 1.0  # mean square of the equation's residual over that of the sensors' noise
+    if errors.force_rms is not None and found.noise_force > 0:
+        chi = (errors.force_rms / found.noise_force) ** 2
+    starts = [(float(one.log["y"][0]), 0.0, float(one.log["F"][0])) for one in sources.runs]
     return Model(
         card=sources.card.name,
         rig=rig,
@@ -144,7 +141,10 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
             remarks=found.remarks,
             command_period=found.command_period,
         ),
-        log=tuple(_entry(source, errors, chi) for source in sources.runs),
+        log=tuple(
+            log_entry(source, start, errors.position_rms, None, chi)
+            for source, start in zip(sources.runs, starts, strict=True)
+        ),
         versions=versions(),
         effects={
             **surrounding_effects(found.surroundings, rig),
@@ -154,18 +154,6 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
         resonance=resonance_of(found.surroundings, rig),
         library=library,
     )
-
-
-def _chi_square(errors: Errors, found: Trace) -> float:
-    """Mean square of the equation of motion's residual over that of the sensors' noise."""
-    if errors.force_rms is None or not found.noise_force > 0:
-        return 1.0
-    return (errors.force_rms / found.noise_force) ** 2
-
-
-def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
-    start = (float(source.log["y"][0]), 0.0, float(source.log["F"][0]))
-    return log_entry(source, start, errors.position_rms, None, chi)
 
 
 def effect_estimates(found: FoundEffect, rig: Rig) -> dict[str, Estimate]:

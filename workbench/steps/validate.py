@@ -95,6 +95,7 @@ def validate(
     judged = tested_of(found)
     first = {name: places["model"] for name, places in figures.items()}
     with_it = found.recommendation is not None and found.recommendation.compensator
+    read: dict[str, Model | Design | None] = {"model": model, "design": found, "plant": plant}
     return Validation(
         card=model.card,
         judged=judged,
@@ -102,7 +103,7 @@ def validate(
         limits=limits,
         figures=figures,
         remarks=(
-            *_as_read(model, found, plant),
+            *(f"{name}: {line}" for name, one in read.items() if one for line in one.read),
             *unseen,
             *_remarks(figures, judged, found, (model, plant)),
         ),
@@ -110,14 +111,6 @@ def validate(
         why=reasons(judged, with_it, first, shown(model.rotary)),
         design=design_digest(found),
     ), traces
-
-
-def _as_read(model: Model, found: Design, plant: Model | None) -> Iterator[str]:
-    """What to say of the files, with the name of the one that is meant."""
-    for name, lines in (("model", model.read), ("design", found.read)):
-        yield from (f"{name}: {line}" for line in lines)
-    if plant is not None:
-        yield from (f"plant: {line}" for line in plant.read)
 
 
 def _remarks(

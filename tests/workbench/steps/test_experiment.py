@@ -25,8 +25,13 @@ from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import bench_of
 from workbench.steps.experiment.plan import experiment
-from workbench.steps.experiment.planned import Experiment, Wanted, experiment_document, limits_of
-from workbench.steps.experiment.rivals import read_rivals
+from workbench.steps.experiment.planned import (
+    Experiment,
+    Wanted,
+    experiment_document,
+    limits_of,
+    read_rivals,
+)
 from workbench.steps.present import present
 
 pytestmark = pytest.mark.slow

@@ -181,11 +181,11 @@ def promised(
         found.append(fit.estimates)
     plant = bench.fitted(plants[0])
     names = names_of(plant, bench.drive)
-    values = dict(zip(names, values_of(plant, names).tolist(), strict=True))
-    units = {**bench.model.friction, **(bench.model.actuator or {})}
-    out = []
-    for name, value in values.items():
-        now = _estimate(bench.model, name)
+    model, out = bench.model, []
+    of_effects = ((f"{key}.{n}", e) for key, own in model.effects.items() for n, e in own.items())
+    known = {**model.friction, **(model.actuator or {}), **dict(of_effects)}
+    for name, value in zip(names, values_of(plant, names).tolist(), strict=True):
+        now = known[name]
         relative = [
             half / abs(one[name].value or 1.0)
             for one in found
@@ -193,21 +193,8 @@ def promised(
         ]
         identified_share = len(relative) / len(plants)
         after = abs(value) * float(np.median(relative)) if identified_share >= 0.5 else None
-        unit = now.unit if now is not None else units[name].unit
-        out.append(
-            Promised(
-                name, unit, value, None if now is None else half_width(now), after, identified_share
-            )
-        )
+        out.append(Promised(name, now.unit, value, half_width(now), after, identified_share))
     return tuple(out)
-
-
-def _estimate(model: Model, name: str) -> Estimate | None:
-    """The model's estimate of a parameter, effects' as key.name."""
-    if "." in name:
-        key, own = name.split(".")
-        return model.effects[key].get(own)
-    return {**model.friction, **(model.actuator or {})}.get(name)
 
 
 def made_safe(

@@ -1,14 +1,21 @@
-"""What an experiment is: the document `experiment/1`, and what is asked of it."""
+"""What an experiment is: the document `experiment/1`, and what is asked of it.
 
+Of effects it is to discriminate those that a trace could not.
+"""
+
+import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from design.experiment.limits import MotionLimits, Peaks
 from design.experiment.segments import Segment
 from design.loop import LoopRun
 from identification.arrays import Array
+from identification.effects._library import Library
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
@@ -20,6 +27,7 @@ FASTER_THAN_LOGS = (
 )
 STRONGER_THAN_LOGS = 1.2  # the same of the force
 USUAL_SECONDS = 20.0
+SAID_EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
 
 
 @dataclass(frozen=True)
@@ -120,6 +128,39 @@ def limits_of(model: Model, wanted: Wanted) -> MotionLimits:
         force=wanted.force or STRONGER_THAN_LOGS * model.force_peak,
         command=wanted.command or math.inf,
     )
+
+
+def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
+    """Keys of the effects that a trace.json leaves open: its rivals where it calls them
+    inseparable, else every effect of the library that the machine's signals allow.
+
+    Raises BadModel where the file is no trace, or leaves nothing open.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BadModel(f"{path}: cannot be read as trace.json ({error}); give one") from None
+    if not isinstance(found, dict) or found.get("schema") != "trace/1":
+        raise BadModel(f"{path}: no schema 'trace/1'; give the trace.json of 'workbench trace'")
+    if found.get("verdict") not in ("inseparable", "unknown"):
+        raise BadModel(
+            f"{path}: its verdict is {found.get('verdict')!r}; there are rivals to discriminate"
+            " where it is 'inseparable' or 'unknown'"
+        )
+    return rivals_of(found, model, library)
+
+
+def rivals_of(found: Mapping[str, Any], model: Model, library: Library) -> tuple[str, ...]:
+    """The same of what trace.json holds."""
+    if found["verdict"] == "unknown":
+        usable = (key for key, one in library.items() if not one.signals)
+        return tuple(key for key in usable if key not in model.effects)
+    keys = [str(one["key"]) for one in found["effects"]]
+    for one in found["rivals"]:
+        equal = SAID_EQUAL.match(str(one["why_not"]))
+        if equal:
+            keys += [equal[1], str(one["key"])]
+    return tuple(key for key in dict.fromkeys(keys) if key in library)
 
 
 def half_width(estimate: Estimate) -> float | None:

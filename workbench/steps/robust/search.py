@@ -97,7 +97,6 @@ def candidates(
 ) -> Iterator[Candidate]:
     """Every loop that is tried. Raises BadSpecification where none can be placed."""
     refusal: BadSpecification | None = None
-    placed = 0
     asked = placing.asked
     wanted = [
         (replace(asked, integrator=integrator), speed)
@@ -124,10 +123,8 @@ def candidates(
             refusal = refusal or error
             continue
         fastest.setdefault(one.integrator, found)
-        for candidate in _of_design(machines.model, found):
-            placed += 1
-            yield candidate
-    if not placed:
+        yield from _of_design(machines.model, found)
+    if not fastest:
         raise refusal or BadSpecification("no loop could be placed; give --poles W_N,ZETA")
 
 
