@@ -148,8 +148,10 @@ def axis_test(
     travel = friction_along(found)
     estimates["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
     own = {name: Allowed(*ends, "card") for name, ends in sources.card.limits.items()}
-    allowed = {**_of_past(earlier), **own}
-    allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
+    earlier_values = earlier.values if earlier else {}
+    past = {name: [value for _, value in every] for name, every in earlier_values.items()}
+    usual = {"explained": Allowed(LEAST_EXPLAINED, 1.0, "usual")}
+    allowed = {**usual, **limits_of(past), **own}
     runs = len(sources.runs)
     longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
     return AxisTest(
@@ -229,11 +231,6 @@ def _deviation(travel: Travel) -> float | None:
     return max(sizes, default=None)
 
 
-def _of_past(earlier: Earlier | None) -> dict[str, Allowed]:
-    past = earlier.values if earlier else {}
-    return limits_of({name: [value for _, value in every] for name, every in past.items()})
-
-
 def judged(name: str, estimate: Estimate, allowed: Allowed | None) -> Quantity:
     """A quantity with its light and, where it is not green, the reason in a sentence."""
     meaning = MEANING_OF[name]
@@ -253,9 +250,8 @@ def judged(name: str, estimate: Estimate, allowed: Allowed | None) -> Quantity:
     unsure = ", though not significantly by this log" if outside else " within its interval"
     if allowed.source == "usual":
         unsure = ": something else acts"
-    return Quantity(
-        name, meaning, estimate, allowed, light, _said(meaning, estimate, allowed, unsure)
-    )
+    said = _said(meaning, estimate, allowed, unsure)
+    return Quantity(name, meaning, estimate, allowed, light, said)
 
 
 def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> str:
@@ -266,11 +262,8 @@ def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> st
     if estimate.unit == "1":
         unit, factor = "%", 100.0
     side = "above" if above else "below"
-    whose = {
-        "card": "the card's",
-        "registry": f"its last {allowed.logs} logs'",
-        "usual": "the usual",
-    }
+    last = f"its last {allowed.logs} logs'"
+    whose = {"card": "the card's", "registry": last, "usual": "the usual"}
     moved = ""
     if allowed.mean and estimate.unit not in ("1", "") and "constant" not in meaning:
         moved = f" ({100 * (value / allowed.mean - 1):+.0f} % of their mean)"

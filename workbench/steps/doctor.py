@@ -18,13 +18,7 @@ from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_time
-from identification.signals.clean import (
-    LONGEST_GAP,
-    even_clock,
-    limits,
-    prepare,
-    repair,
-)
+from identification.signals.clean import LONGEST_GAP, even_clock, limits, prepare, repair
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
@@ -158,6 +152,8 @@ def checked_log(path: Path, card: Card) -> CheckedLog:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)
     bad += [one for name in LIMITED if name in raw for one in limits(raw, name)]
+    spec = card.signals.get("u")
+    units = [unit for unit in ("V", "A") if spec is not None and conversion(spec.unit, unit)]
     return CheckedLog(
         file=path.name,
         rig=rig,
@@ -165,7 +161,7 @@ def checked_log(path: Path, card: Card) -> CheckedLog:
         bad=tuple(dict.fromkeys(bad)),
         refused=refused,
         remarks=tuple(remarks),
-        command_unit=_command_unit(card),
+        command_unit=units[0] if units else "",  # nothing for a share, or where none is logged
         raw=raw,
         runs=runs,
     )
@@ -205,14 +201,6 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     )
 
 
-def _command_unit(card: Card) -> str:
-    """V or A, and nothing for a share or where no command is logged."""
-    spec = card.signals.get("u")
-    if spec is None:
-        return ""
-    return next((unit for unit in ("V", "A") if conversion(spec.unit, unit)), "")
-
-
 def _as_far_as_it_goes(raw: Log, path: Path, card: Card) -> tuple[Log, ...]:
     """A refused log on an even clock, where that can be had."""
     try:
@@ -237,8 +225,8 @@ def _sensor(name: str, x: Array) -> SensorState:
     good = x[np.isfinite(x)]
     if len(good) < 4:
         return SensorState(name, 0.0, 0.0, 0.0, 0.0)
-    return SensorState(name, float(good.min()), float(good.max()), local_noise(good),
-                       resolution(good))  # fmt: skip
+    low, high = float(good.min()), float(good.max())
+    return SensorState(name, low, high, local_noise(good), resolution(good))
 
 
 def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
@@ -251,7 +239,8 @@ def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
     if "u" in log and "F" in log and np.ptp(log["u"]) > 0.0:
         smooth = {key: low_pass(log[key], log.h, motion.cutoff) for key in ("u", "F")}
         one = np.ones(len(log))
-        if np.allclose(log["F"], log["u"] * _ratio(log), rtol=1e-6):  # of a motor
+        most = int(np.argmax(np.abs(log["u"])))
+        if np.allclose(log["F"], log["u"] * (log["F"][most] / log["u"][most]), rtol=1e-6):  # motor
             target, on = motion.a, "motion"
             others = np.column_stack([motion.v, np.sign(motion.v), one])
         else:
@@ -265,11 +254,6 @@ def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
         found = lead(log["r"], log["y"])
         out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))
     return tuple(out)
-
-
-def _ratio(log: Log) -> float:
-    at = int(np.argmax(np.abs(log["u"])))
-    return float(log["F"][at] / log["u"][at]) if log["u"][at] != 0.0 else 0.0
 
 
 def doctor_document(found: Examined, card: str) -> dict[str, Any]:

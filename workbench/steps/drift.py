@@ -194,10 +194,8 @@ def _same_machine(model: Model, sources: Sources) -> None:
 
 
 def _seen(one: Tested) -> Seen:
-    test = one.test
-    return Seen(
-        one.source.file, one.source.sha256, test.verdict, _ratio(test.single), _ratio(test.mean)
-    )
+    source, test = one.source, one.test
+    return Seen(source.file, source.sha256, test.verdict, _ratio(test.single), _ratio(test.mean))
 
 
 def _ratio(found: Statistic | None) -> float | None:

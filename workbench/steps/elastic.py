@@ -36,22 +36,17 @@ def with_response(model: Model, file: Path | None) -> Model:
     peaks = sorted(written["peaks"], key=lambda one: float(one["frequency"]["value"]))
     for low, high in pairwise(peaks):
         if (low["kind"], high["kind"]) == ("anti-resonance", "resonance"):
-            return replace(model, resonance=_of_pair(model, low, high))
+            anti, top = _estimate(low["frequency"]), _estimate(high["frequency"])
+            m, unit = model.karnopp.m, model.friction["m"].unit
+            first = m * (used(anti) / used(top)) ** 2
+            pair = {"frequency": top, "anti_resonance": anti, "damping": _estimate(high["damping"])}
+            masses = {"m_1": Estimate(first, unit), "m_2": Estimate(m - first, unit)}
+            return replace(model, resonance=pair | masses)
     kinds = ", ".join(one["kind"] for one in peaks) or "none"
     raise BadModel(
         f"{file}: no anti-resonance with a resonance above it (peaks: {kinds}), as two masses have"
         " them; log a run that moves the machine there, or design without --response"
     )
-
-
-def _of_pair(model: Model, low: dict[str, Any], high: dict[str, Any]) -> dict[str, Estimate]:
-    anti, top = _estimate(low["frequency"]), _estimate(high["frequency"])
-    m, unit = model.karnopp.m, model.friction["m"].unit
-    first = m * (used(anti) / used(top)) ** 2
-    return {
-        "frequency": top, "anti_resonance": anti, "damping": _estimate(high["damping"]),
-        "m_1": Estimate(first, unit), "m_2": Estimate(m - first, unit),
-    }  # fmt: skip
 
 
 def _estimate(written: dict[str, Any]) -> Estimate:

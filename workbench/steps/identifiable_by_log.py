@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.estimates import Events, silent_reason
@@ -86,13 +85,14 @@ def ways_of(
 ) -> Ways:
     """What moved, in which direction, from the measured motion."""
     sides = [_side(logs, events, rests, sign) for sign in (1.0, -1.0)]
+    ways = [one.signals["d"] for one in logs]
     stretches = [b - a for own in rests for a, b in own]
     h = logs[0].log.h
     crossings = [2 * one.starts for one in sides]
     return Ways(
         positive=sides[0],
         negative=sides[1],
-        reversals=sum(_reversals(one.signals["d"]) for one in logs),
+        reversals=sum(int(np.count_nonzero(np.diff(d[d != 0]))) for d in ways),
         rests=len(stretches),
         rested=float(sum(stretches)) * h,
         events=Events(
@@ -111,18 +111,15 @@ def _side(
     sign: float,
 ) -> Way:
     speed = np.concatenate([np.abs(one.signals["v"])[one.signals["d"] == sign] for one in logs])
-    starts = 0
-    for one, own in zip(logs, rests, strict=True):
-        after = [b for _, b in own if b < len(one.log)]
-        starts += int(np.sum(one.signals["d"][after] == sign)) if after else 0
+    starts = sum(
+        one.signals["d"][after] == sign
+        for one, own in zip(logs, rests, strict=True)
+        for _, after in own
+        if after < len(one.log)
+    )
     slow, fast = np.quantile(speed, [SLOW_SPEED, QUICK_SPEED]) if len(speed) else (0.0, 0.0)
     breakaway_count = sum(int(np.sum(one.direction == sign)) for one in events)
-    return Way(len(speed) * logs[0].log.h, float(slow), float(fast), starts, breakaway_count)
-
-
-def _reversals(d: Array) -> int:
-    sure = d[d != 0]
-    return int(np.count_nonzero(sure[1:] != sure[:-1]))
+    return Way(len(speed) * logs[0].log.h, float(slow), float(fast), int(starts), breakaway_count)
 
 
 def identifiable_by_log(
@@ -154,39 +151,27 @@ def identifiable_by_log(
             one = fit.estimates[name]
             why = one.reason or "the force follows the command as a linear actuator's"
             out.append(Identifiable(name, one.value is not None, why))
-    elif commanded(recorded.plain) and not recorded.held:
-        why = "the force does not follow the command as a linear actuator's"
-        out += [Identifiable(name, False, why) for name in ("k1", "k2")]
     elif not recorded.held:
-        out += [
-            Identifiable(name, False, "no command is logged", MEND["k"]) for name in ("k1", "k2")
-        ]
+        why, add = "no command is logged", MEND["k"]
+        if commanded(recorded.plain):
+            why, add = "the force does not follow the command as a linear actuator's", ""
+        out += [Identifiable(name, False, why, add) for name in ("k1", "k2")]
     return tuple(out)
 
 
 def _identifiable(
-    name: str,
-    found: Estimate,
-    fit: KarnoppFit,
-    ways: Ways,
-    run: Tellable | None,
-    *,
-    prescribed: bool,
-) -> Identifiable:
+    name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None,
+    *, prescribed: bool,
+) -> Identifiable:  # fmt: skip
     """By what a parameter is identified, and within what share of it."""
-    half = _half(found)
+    assert found.value is not None and found.low is not None and found.high is not None
+    half = 0.5 * (found.high - found.low) / abs(found.value)
     if fit.imposed:
         which = "the force equation" if prescribed else "the equation of motion alone"
         return Identifiable(name, True, f"to {half:.1%} by {which}", within=half)
     within = run.within if run is not None and run.can else half
     why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"
     return Identifiable(name, True, why, within=within)
-
-
-def _half(found: Estimate) -> float:
-    """Half an estimate's interval over its value."""
-    assert found.value is not None and found.low is not None and found.high is not None
-    return 0.5 * (found.high - found.low) / abs(found.value)
 
 
 def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:

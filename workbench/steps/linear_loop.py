@@ -24,6 +24,7 @@ LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
 WHOLE_SAMPLE = 1e-3  # of a sample, up to which a delay counts as whole
 MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
 SWING_UNSURE = 0.02  # of a resonance, that it may lie beside its estimate, at least
+Body = tuple[float, float, tuple[Swing, ...]]  # mass, viscous friction, elastic parts
 
 
 def command_of(model: Model, force: ForceLoop | None) -> Command:
@@ -54,7 +55,7 @@ def linear_of(
         raise NotIdentifiable(f"no physical plant to design on: m: {model.friction['m'].reason}")
     h = periods(model)[0] if period is None else period
     force = _force_loop(model, h)
-    a, b = _physical(*_nominal(model), h, model, force)
+    a, b = _physical(_nominal(model), h, model, force)
     why = _why_physical(model, force)
     m, viscous = model.friction["m"], _viscous(model)
     linear = Linear(
@@ -115,10 +116,8 @@ def plants_of(
     per = gain.k_a if isinstance(gain, Motor) else 1.0
     if arx and own is not None and own.input == "F" and abs(own.h - h) < 1e-6 * own.h:
         return [(np.array(own.A), per * np.array(own.B))]
-    plants = [
-        _physical(*_nominal(machine), h, machine, force),
-        *(_physical(m, f, h, machine, force, s) for m, f, s in _corner_bodies(machine)),
-    ]
+    bodies = [_nominal(machine), *_corner_bodies(machine)]
+    plants = [_physical(body, h, machine, force) for body in bodies]
     return [(a, per * b) for a, b in plants]
 
 
@@ -131,18 +130,23 @@ def swings_of(model: Model) -> tuple[Swing, ...]:
     return (Swing.of_two_masses(*(used(two[name]) for name in names)),)
 
 
-def _physical(
-    m: float, f: float, h: float, model: Model, force: ForceLoop | None,
-    swings: tuple[Swing, ...] | None = None,
+def _physical(body: Body, h: float, model: Model, force: ForceLoop | None) -> tuple[Array, Array]:
+    """The sampled plant of the model's machine with this body."""
+    actuator, (m, f, swings) = model.simulated.actuator, body
+    a, b = sampled(m, f, h, actuator, force, swings)
+    return a, b if isinstance(actuator, Actuator) else delayed(b, dead_time(model) / h)
+
+
+def sampled(
+    m: float, f: float, h: float, actuator: Actuator | Motor | None, force: ForceLoop | None,
+    swings: tuple[Swing, ...] = (),
 ) -> tuple[Array, Array]:  # fmt: skip
-    """The sampled plant of a body; swings: its elastic parts, by default the model's."""
-    actuator = model.simulated.actuator
-    swings = swings_of(model) if swings is None else swings
+    """The plant (A, B) of a body every h [s], by the reference of the force loop, the command of an
+    actuator without one, or else the force. Raises BadSpecification where the loop is unstable."""
+    if not isinstance(actuator, Actuator):
+        return elastic_plant(m, f, h, swings) if swings else linear_plant(m, f, h)
     gains = None if force is None else ForceGains(force.k_i, force.T_i)
     ratio = 1 if force is None else max(1, round(h / force.h))
-    if not isinstance(actuator, Actuator):
-        a, b = elastic_plant(m, f, h, swings) if swings else linear_plant(m, f, h)
-        return a, delayed(b, dead_time(model) / h)
     if swings:
         return elastic_plant(m, f, h, swings, actuator, gains, ratio)
     if gains is None:
@@ -154,7 +158,8 @@ def stiff_body(model: Model, plant: Linear, force: ForceLoop | None) -> tuple[Ar
     """The design's plant without elastic parts, on which poles are placed."""
     if plant.source == "arx" or not swings_of(model):
         return np.array(plant.A), np.array(plant.B)
-    return _physical(*_nominal(model), plant.h, model, force, ())
+    m, f, _ = _nominal(model)
+    return _physical((m, f, ()), plant.h, model, force)
 
 
 def dead_time(model: Model) -> float:
@@ -186,10 +191,10 @@ def _force_loop(model: Model, h: float) -> ForceLoop | None:
     return ForceLoop(gains.k_i, gains.T_i, h / ratio)
 
 
-def _nominal(model: Model) -> tuple[float, float]:
-    """Mass and the mean of both viscous coefficients."""
+def _nominal(model: Model) -> Body:
+    """Mass, the mean of both viscous coefficients, and the elastic parts."""
     p = model.karnopp
-    return p.m, 0.5 * (p.F_vp + p.F_vn)
+    return p.m, 0.5 * (p.F_vp + p.F_vn), swings_of(model)
 
 
 def _viscous(model: Model) -> Estimate:
@@ -242,10 +247,10 @@ def corners(
     """
     if plant.source == "arx":
         return ()
-    return tuple(_physical(m, f, plant.h, model, force, s) for m, f, s in _corner_bodies(model))
+    return tuple(_physical(body, plant.h, model, force) for body in _corner_bodies(model))
 
 
-def _corner_bodies(model: Model) -> list[tuple[float, float, tuple[Swing, ...]]]:
+def _corner_bodies(model: Model) -> list[Body]:
     """Mass, viscous friction and elastic parts at the corners of their intervals."""
     ends = [_ends(model.friction[name]) for name in ("F_vp", "F_vn")]
     least, most = min(low for low, _ in ends), max(high for _, high in ends)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +52,6 @@ class Validation:
     versions: Mapping[str, str]
     why: str = ""
     design: str = ""
-    schema: Literal["validation/1"] = "validation/1"
 
 
 def validate(
@@ -181,4 +180,4 @@ def validation_document(found: Validation) -> dict[str, Any]:
     for name, places in found.figures.items():
         for place, one in places.items():
             document["figures"][name][place]["passed"] = one.passed
-    return {"schema": document.pop("schema"), **document}
+    return {"schema": "validation/1", **document}

@@ -144,8 +144,6 @@ class VelocityValidation:
     limits: Limits
     figures: Mapping[str, VelocityFigures]
     versions: Mapping[str, str]
-    kind: str = "velocity"
-    schema: str = "velocity-validation/1"
 
 
 def validate_velocity(
@@ -250,5 +248,4 @@ def _smooth(law: ValveController, step: float) -> tuple[Array, float]:
 
 def velocity_validation_document(found: VelocityValidation) -> dict[str, Any]:
     """validation.json of such a rig."""
-    out = asdict(found)
-    return {"schema": out.pop("schema"), "kind": out.pop("kind"), **out}
+    return {"schema": "velocity-validation/1", "kind": "velocity", **asdict(found)}

@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -110,7 +110,6 @@ class Experiment:
     versions: Mapping[str, str]
     r: Array
     runs: tuple[LoopRun, ...]
-    schema: Literal["experiment/1"] = field(default="experiment/1")
 
 
 def limits_of(model: Model, wanted: Wanted) -> MotionLimits:
@@ -176,7 +175,7 @@ def experiment_document(found: Experiment) -> dict[str, Any]:
     safety = ("machines", "exceeding", "scale", "peaks")
     document: dict[str, Any] = plain(
         {
-            "schema": found.schema,
+            "schema": "experiment/1",
             "card": found.card,
             "motion": found.motion,
             "criterion": found.criterion,

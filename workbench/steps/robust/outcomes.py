@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.drawn_loops import DrawnPlants, loop_margins
-from design.linear import ForceGains, commanded_plant, linear_plant
 from design.loop import LoopRun
 from identification.arrays import Array
 from identification.errors import BadSpecification, UserError
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Motor, Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, noise_of, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
+from workbench.steps.linear_loop import sampled
 from workbench.steps.loop_figures import Limits
 from workbench.steps.loop_motion import loop_motion
 
@@ -57,15 +57,9 @@ class DrawnMachines:
     def _linear(
         self, plant: Plant, h: float, force: ForceLoop | None
     ) -> tuple[Array, Array] | None:
-        m, f = plant.friction.m, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
-        own, drive = self.model.simulated.actuator, plant.actuator
+        p, own, drive = plant.friction, self.model.simulated.actuator, plant.actuator
         try:
-            if isinstance(drive, Actuator) and force is not None:
-                gains, ratio = ForceGains(force.k_i, force.T_i), max(1, round(h / force.h))
-                return linear_plant(m, f, h, drive, gains, ratio)
-            if isinstance(drive, Actuator):
-                return commanded_plant(m, f, h, drive)
-            a, b = linear_plant(m, f, h)
+            a, b = sampled(p.m, 0.5 * (p.F_vp + p.F_vn), h, drive, force)
         except BadSpecification:
             return None
         gain = drive.k_a / own.k_a if isinstance(drive, Motor) and isinstance(own, Motor) else 1.0
