@@ -294,7 +294,7 @@ def effort_limit(model: Model) -> float | None:
 
 def _controller(tuned: Tuned, plant: Linear, units: Shown) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
-    found = Controller(
+    return Controller(
         R=tuple(rst.R.tolist()),
         S=tuple(rst.S.tolist()),
         T=tuple(rst.T.tolist()),
@@ -308,10 +308,10 @@ def _controller(tuned: Tuned, plant: Linear, units: Shown) -> Controller:
         missed=tuned.missed,
         gains=None if pid is None else pid.gains,
         note="; ".join(_notes(tuned, units)),
+        # Where all of a controller forgot at once what a limit cut off, loops went on at the limit
+        # for ever after large steps (EMPS at 4 V, both ways half of the time).
+        W=drive_law(rst, 1.0 / tuned.dominant[0]).W,
     )
-    # Where all of a controller forgot at once what a limit cut off, loops went on at the limit for
-    # ever after large steps (EMPS at 4 V, both ways half of the time).
-    return replace(found, W=drive_law(rst, 1.0 / tuned.dominant[0]).W)
 
 
 def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:

@@ -21,7 +21,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.documents.reading import as_number, read_result, versions
+from workbench.documents.reading import as_number, plain, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
 
@@ -242,9 +242,9 @@ def _of_run(one: Tested) -> dict[str, Any]:
         "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
         "not_judged": dict(test.not_judged),
         "could_have_seen": detectable_sizes(test),
-        "single": _statistic(test.single),
-        "alone": _statistic(test.alone),
-        "mean": _statistic(test.mean),
+        "single": plain(test.single),
+        "alone": plain(test.alone),
+        "mean": plain(test.mean),
         "chi_square": test.chi_square,
         "chi_square_allowed": test.allowed,
     }
@@ -263,7 +263,3 @@ def _number(shift: Shift) -> dict[str, Any]:
         "after": as_number(reported_estimate(shift.after, shift.unit, shift.after_sd)),
         "change": as_number(Estimate(shift.change, "1", shift.sd, shift.low, shift.high)),
     }
-
-
-def _statistic(found: Statistic | None) -> dict[str, Any] | None:
-    return None if found is None else asdict(found)

@@ -121,7 +121,9 @@ def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
     units = {name: fit.estimates[name].unit for name in found.names}
     estimates = {name: Estimate(None, unit, reason=found.verdict) for name, unit in units.items()}
     spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
-    bounds = _bounds(fit)
+    bounds = {n: (-np.inf, 0.0) if n in NEGATIVE else (0.0, np.inf) for n in fit.estimates}
+    for acting in fit.effects:
+        bounds |= {f"{acting.key}.{p.name}": (p.low, p.high) for p in acting.effect.params}
     for name, (low, median, high) in found.interval().items():
         estimates[name] = reported_estimate(
             median, units[name], spread[name], interval=(low, high), bounds=bounds[name]
@@ -139,11 +141,3 @@ def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
         "ess": dict(found.ess),
         "parameters": plain(estimates),
     }
-
-
-def _bounds(fit: KarnoppFit) -> dict[str, tuple[float, float]]:
-    """Where each parameter can lie, by name (an effect's as key.name)."""
-    out = {name: (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf) for name in fit.estimates}
-    for acting in fit.effects:
-        out |= {f"{acting.key}.{p.name}": (p.low, p.high) for p in acting.effect.params}
-    return out

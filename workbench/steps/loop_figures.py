@@ -106,14 +106,15 @@ class Traces:
     rest: LoopRun
 
 
-def loop_runs(
-    machine: Model,
-    loop: DrivenLoop,
-    reference: tuple[Array, Array, Array],
-    rng: np.random.Generator | None,
-) -> Traces:
-    """The runs of a loop on a machine, along `references` of loop.h; rng None: no noise."""
-    return Traces(*(run_driven(machine, loop, r, rng) for r in reference))
+def tried_loop(
+    machine: Model, model: Model, found: Design, loop: DrivenLoop, limits: Limits,
+    rng: np.random.Generator | None, *, arx: bool = False,
+) -> tuple[LoopFigures, Traces]:  # fmt: skip
+    """What a loop comes to on a machine along the motion of a design on its model; rng None: no
+    noise; arx: margins on the machine's ARX plant."""
+    motion = references(model, found, loop.h)
+    runs = Traces(*(run_driven(machine, loop, r, rng) for r in motion))
+    return _figures(machine, loop, runs, limits, arx), runs
 
 
 def present_figures(
@@ -126,9 +127,7 @@ def present_figures(
     now = model.present
     if now is None:
         return None
-    loop = present_loop(model, now)
-    runs = loop_runs(machine, loop, references(model, found, loop.h), rng)
-    return loop_figures(machine, loop, runs, limits), runs
+    return tried_loop(machine, model, found, present_loop(model, now), limits, rng)
 
 
 def references(
@@ -214,10 +213,9 @@ def takes_compensator(found: Design, name: str) -> bool:
     return found.controllers[name].feed_forward is None
 
 
-def loop_figures(
-    machine: Model, loop: DrivenLoop, run: Traces, limits: Limits, *, arx: bool = False
+def _figures(
+    machine: Model, loop: DrivenLoop, run: Traces, limits: Limits, arx: bool
 ) -> LoopFigures:
-    """What the runs of a loop on a machine come to; arx: margins on the machine's ARX plant."""
     drive = machine.simulated.actuator
     driven = drive is not None
     limit = limit_on(machine, loop) if driven else None
@@ -289,12 +287,7 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> Iterator[str
             f"overshoot {100 * result.overshoot:.1f} % of the step, at most"
             f" {100 * limits.overshoot:g} % allowed"
         )
-    yield from _too_much(result, limits, machine.rotary)
-
-
-def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str]:
-    """Force beyond what the logs have shown, command at its limit, in words."""
-    units, seen = shown(rotary), result.force_seen
+    units, seen = shown(machine.rotary), result.force_seen
     if seen > 0 and not (result.force_peak <= limits.force * seen):
         yield (
             f"peak force {result.force_peak:.4g} {units.force}, the logs show {seen:.4g} at most,"

@@ -16,11 +16,9 @@ from workbench.steps.loop_figures import (
     PRESENT,
     Limits,
     LoopFigures,
-    loop_figures,
-    loop_runs,
     loops_of,
     present_figures,
-    references,
+    tried_loop,
 )
 from workbench.steps.loop_motion import SETTLING_BAND
 
@@ -85,9 +83,9 @@ def _no_clear_win(model: Model, found: Design, name: Structure, compensated: boo
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
     """Figures of every loop of a design on its model, and of the present one, without noise."""
     out: dict[str, LoopFigures] = {}
+    arx = found.plant.source == "arx"
     for name, loop in loops_of(model, found).items():
-        runs = loop_runs(model, loop, references(model, found, loop.h), None)
-        out[name] = loop_figures(model, loop, runs, Limits(), arx=found.plant.source == "arx")
+        out[name], _ = tried_loop(model, model, found, loop, Limits(), None, arx=arx)
     try:
         now = present_figures(model, model, found, Limits(), None)
     except BadModel:  # `validate` says why

@@ -222,7 +222,7 @@ def truth(
     motion, command = (rig.motion, rig.command_unit) if rig else ("linear", "V")
     friction, actuator = friction_units(motion), actuator_units(motion, command)
     drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else None
-    return {
+    known = {
         "schema": "truth/1",
         "card": name,
         "friction": {n: _exact(getattr(recipe.plant.friction, n), friction[n]) for n in NAMES},
@@ -235,19 +235,14 @@ def truth(
         "seed": recipe.seed if seed is None else seed,
         "duration_s": recipe.duration,
         "h_s": recipe.h,
-        "loop": _loop(recipe.loop) if recipe.loop else None,
-        **(
-            {"controller": written(controller, around_of(rig))}
-            if controller and rig and recipe.by_card
-            else {}
-        ),
+        "loop": None,
     }
-
-
-def _loop(loop: recipes.LoopSpec) -> dict[str, Any]:
-    """The loop of a recipe as the truth has it."""
-    found = loop.model_dump(exclude={"position": {"kind"}})
-    return {"control_limit": found.pop("control_limit_v"), **found}
+    if recipe.loop:
+        loop = recipe.loop.model_dump(exclude={"position": {"kind"}})
+        known["loop"] = {"control_limit": loop.pop("control_limit_v"), **loop}
+    if controller and rig and recipe.by_card:
+        known["controller"] = written(controller, around_of(rig))
+    return known
 
 
 def _exact(value: float, unit: str) -> dict[str, Any]:

@@ -24,12 +24,10 @@ from workbench.steps.loop_figures import (
     Limits,
     LoopFigures,
     Traces,
-    loop_figures,
-    loop_runs,
     loops_of,
     present_figures,
-    references,
     tested_of,
+    tried_loop,
 )
 from workbench.steps.recommend import in_thousandths, reasons
 
@@ -86,11 +84,10 @@ def validate(
     for each in found.schedule.controllers if found.schedule else ():
         loops[each + SCHEDULED] = scheduled_loop(model, found, each)
     for name, loop in loops.items():
-        reference = references(model, found, loop.h)
         figures[name] = {}
         for place, machine in plants.items():
-            traces[name, place] = run = loop_runs(machine, loop, reference, rng)
-            figures[name][place] = loop_figures(machine, loop, run, limits, arx=arx)
+            tried = tried_loop(machine, model, found, loop, limits, rng, arx=arx)
+            figures[name][place], traces[name, place] = tried
     judged = tested_of(found)
     first = {name: places["model"] for name, places in figures.items()}
     with_it = found.recommendation is not None and found.recommendation.compensator

@@ -1,6 +1,7 @@
 """Model -> robust design: what it promises of the machines that there may be, and beside which."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -176,9 +177,9 @@ def _promises(
     if own is not None and own.controller != "none":
         one = Candidate(nominal, own.controller, own.compensator)
         loops[NOMINAL] = (one.name, one.compensator, one.loop(model))
-    now = _present(model)
-    if now is not None:
-        loops[PRESENT] = ("none", False, now)
+    if model.present is not None:
+        with suppress(BadModel):  # `validate` says why
+            loops[PRESENT] = ("none", False, present_loop(model, model.present))
     seeds, few = rng.spawn(len(machines.plants)), machines.plants[:MOST_BESIDE]
     out = {}
     for i, (name, (controller, compensator, loop)) in enumerate(loops.items()):
@@ -188,13 +189,6 @@ def _promises(
         found = outcomes(judges, loop, motion, seeds)
         out[name] = promise_of(controller, compensator, found, limits)
     return out
-
-
-def _present(model: Model) -> DrivenLoop | None:
-    try:
-        return None if model.present is None else present_loop(model, model.present)
-    except BadModel:  # `validate` says why
-        return None
 
 
 def promise_of(
