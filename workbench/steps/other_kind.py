@@ -15,6 +15,7 @@ from identification.velocity.rivals import HeldOut, clearly_better, held_out
 from identification.velocity.valve_estimates import units, valve_estimates
 from workbench.cards.readable import length
 from workbench.documents.model import Model
+from workbench.steps.identify import decimated
 from workbench.steps.predict import predict
 
 COMPARED_EVERY = 0.01  # s, which is enough to decide a kind by and takes a second or two
@@ -89,10 +90,8 @@ def _every(log: Log) -> int:
 def _slower(log: Log) -> Log:
     """The log at the samples compared, its command the mean until the next one."""
     k = _every(log)
-    count = len(log) // k
-    mean = log["u"][: count * k].reshape(count, k).mean(axis=1)
-    taken = {name: log[name][: count * k : k] for name in ("t", "y")}
-    return Log(log.name, {**taken, "u": mean})
+    u, y = decimated(log["u"], log["y"], k)
+    return Log(log.name, {"t": log["t"][: len(y) * k : k], "y": y, "u": u})
 
 
 def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list[Array]:

@@ -107,6 +107,9 @@ def predict(
     simulated, other = (run if chosen == "command" else None), None
     if chosen == "force" and model.actuator is not None and "u" in body:
         simulated, other = _run(model, body, body, "command", restarts)
+    # The velocity as the inverse model takes it, and where it is significant.
+    motion = differentiate(body["y"], body.h, how.cutoff, how.method)
+    p, sure = seen_moving(model, body).friction, np.abs(motion.v) > SURE_SLIDING * motion.v_noise
     return Prediction(
         t=log["t"],
         force_applied=applied,
@@ -114,7 +117,7 @@ def predict(
         force_simulated=blank if simulated is None else simulated.F,
         position_measured=log["y"],
         position_simulated=blank if run is None else run.shown,
-        sliding=_sliding(body, model, how),
+        sliding=((motion.v > p.dv_p) | (motion.v < p.dv_n)) & sure,
         drive=chosen,
         refused=refused,
         remarks=(
@@ -215,15 +218,6 @@ def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
     what = "force and run" if ran else "force"
     said = f"{what} by assumed values of what is not identifiable: {', '.join(names)}"
     return (said,) if names else ()
-
-
-def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
-    """Samples whose velocity, as the inverse model takes it, lies outside the stick band, and is
-    significant."""
-    motion = differentiate(log["y"], log.h, how.cutoff, how.method)
-    v, p = motion.v, seen_moving(model, log).friction
-    sure = np.abs(v) > SURE_SLIDING * motion.v_noise
-    return np.asarray(((v > p.dv_p) | (v < p.dv_n)) & sure)
 
 
 def default_drive(model: Model, log: Log) -> Drive:

@@ -5,7 +5,7 @@ friction decides. A few machines sort the candidates, all of them test the best 
 promised at last is counted on machines drawn anew, so that the choice has no part in it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,12 +36,11 @@ WEIGHED = ("standstill", "tracking", "settling", "staircase")
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One of a design's controllers, with or without its compensator, and what came of it."""
+    """One of a design's controllers, with or without its compensator."""
 
     design: Design
     name: Structure
     compensator: bool
-    found: Outcomes | None = None
 
     @property
     def controller(self) -> Controller:
@@ -74,22 +73,20 @@ def searched(
     model = machines.model
     every = list(candidates(machines, placing, probability, report))
     seeds = rng.spawn(len(machines.plants))
-    sorted_by = replace(machines, plants=machines.plants[:FEW])
-    tried: list[Candidate] = []
-    for i, one in enumerate(every):
-        report("loops on a few machines", i / len(every))
-        found = outcomes(sorted_by, one.loop(model), motion, seeds)
-        tried.append(replace(one, found=found))
 
-    def rank(one: Candidate) -> tuple[float, float]:
-        return _short(one, limits, probability), _cost(one, model)
+    def ranked(tried: Sequence[Candidate], on: DrawnMachines, stage: str) -> list[Candidate]:
+        """The best first: by the shares of machines that keep each limit, then by the motion."""
+        ranks = []
+        for i, one in enumerate(tried):
+            report(stage, i / len(tried))
+            found = outcomes(on, one.loop(model), motion, seeds)
+            ranks.append((_short(found, limits, probability), _cost(found, model)))
+        order = sorted(range(len(tried)), key=lambda i: ranks[i])
+        return [tried[i] for i in order]
 
-    tried.sort(key=rank)
-    best: list[Candidate] = []
-    for i, one in enumerate(tried[:FINALISTS]):
-        report("loops on all machines", i / FINALISTS)
-        best.append(replace(one, found=outcomes(machines, one.loop(model), motion, seeds)))
-    return min(best, key=rank), len(every)
+    few = replace(machines, plants=machines.plants[:FEW])
+    best = ranked(every, few, "loops on a few machines")[:FINALISTS]
+    return ranked(best, machines, "loops on all machines")[0], len(every)
 
 
 def candidates(
@@ -157,17 +154,15 @@ def compensators(
             )
 
 
-def _short(one: Candidate, limits: dict[str, float], probability: float) -> float:
+def _short(found: Outcomes, limits: dict[str, float], probability: float) -> float:
     """By how much the shares of machines that keep each limit fall short of the probability."""
-    assert one.found is not None
-    within = one.found.within(limits)
+    within = found.within(limits)
     return float(sum(max(probability - float(np.mean(k)), 0.0) for k in within.values()))
 
 
-def _cost(one: Candidate, model: Model) -> float:
+def _cost(found: Outcomes, model: Model) -> float:
     """Mean logarithm of what is weighed, each the median over the machines."""
-    assert one.found is not None
     floors = dict.fromkeys(WEIGHED, ERROR_FLOOR)
     floors |= {"staircase": STAIR_FLOOR * max(model.fit.noise_y, 1e-12), "settling": 1e-6}
-    medians = [max(float(np.median(one.found.values[n])), floors[n]) for n in WEIGHED]
+    medians = [max(float(np.median(found.values[n])), floors[n]) for n in WEIGHED]
     return float(np.mean(np.log(medians))) if np.all(np.isfinite(medians)) else np.inf
