@@ -20,7 +20,6 @@ from identification.estimation.recorded_logs import (
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.regression.standstill import (
     MEAN,
-    Breakaways,
     breakaways,
     rest_stretches,
 )
@@ -78,48 +77,34 @@ class Ways:
     events: Events
 
 
-def ways_of(
-    logs: Sequence[MotionLog],
-    events: Sequence[Breakaways],
-    rests: Sequence[Sequence[tuple[int, int]]],
-) -> Ways:
-    """What moved, in which direction, from the measured motion."""
-    sides = [_side(logs, events, rests, sign) for sign in (1.0, -1.0)]
-    ways = [one.signals["d"] for one in logs]
-    stretches = [b - a for own in rests for a, b in own]
-    h = logs[0].log.h
-    crossings = [2 * one.starts for one in sides]
+def _ways(logs: Sequence[MotionLog], m: float) -> Ways:
+    """What moved, in which direction, from the measured motion; m: mass, or its first estimate."""
+    h, ways = logs[0].log.h, [one.signals["d"] for one in logs]
+    events = [breakaways(one, m) for one in logs]
+    rests = [(one, at) for one in logs for at in rest_stretches(one, samples(MEAN, one.log.h))]
+    sides = []
+    for sign in (1.0, -1.0):
+        speed = np.concatenate([np.abs(one.signals["v"])[one.signals["d"] == sign] for one in logs])
+        slow, fast = np.quantile(speed, [SLOW_SPEED, QUICK_SPEED]) if len(speed) else (0.0, 0.0)
+        starts = sum(
+            one.signals["d"][after] == sign for one, (_, after) in rests if after < len(one.log)
+        )
+        count = sum(int(np.sum(one.direction == sign)) for one in events)
+        sides.append(Way(len(speed) * h, float(slow), float(fast), int(starts), count))
+    up, down = sides
     return Ways(
-        positive=sides[0],
-        negative=sides[1],
+        positive=up,
+        negative=down,
         reversals=sum(int(np.count_nonzero(np.diff(d[d != 0]))) for d in ways),
-        rests=len(stretches),
-        rested=float(sum(stretches)) * h,
+        rests=len(rests),
+        rested=float(sum(end - begin for _, (begin, end) in rests)) * h,
         events=Events(
-            breakaways=(sides[0].breakaways, sides[1].breakaways),
-            crossings=(crossings[0], crossings[1]),
-            sliding=(round(sides[0].seconds / h), round(sides[1].seconds / h)),
-            fastest=(sides[0].fast, sides[1].fast),
+            breakaways=(up.breakaways, down.breakaways),
+            crossings=(2 * up.starts, 2 * down.starts),
+            sliding=(round(up.seconds / h), round(down.seconds / h)),
+            fastest=(up.fast, down.fast),
         ),
     )
-
-
-def _side(
-    logs: Sequence[MotionLog],
-    events: Sequence[Breakaways],
-    rests: Sequence[Sequence[tuple[int, int]]],
-    sign: float,
-) -> Way:
-    speed = np.concatenate([np.abs(one.signals["v"])[one.signals["d"] == sign] for one in logs])
-    starts = sum(
-        one.signals["d"][after] == sign
-        for one, own in zip(logs, rests, strict=True)
-        for _, after in own
-        if after < len(one.log)
-    )
-    slow, fast = np.quantile(speed, [SLOW_SPEED, QUICK_SPEED]) if len(speed) else (0.0, 0.0)
-    breakaway_count = sum(int(np.sum(one.direction == sign)) for one in events)
-    return Way(len(speed) * logs[0].log.h, float(slow), float(fast), int(starts), breakaway_count)
 
 
 def identifiable_by_log(
@@ -134,17 +119,19 @@ def identifiable_by_log(
     prescribed = led_by_rig(recorded)
     out = []
     for name in NAMES:
-        found = fit.estimates.get(name)
+        found, by_run = fit.estimates.get(name), open_run and name not in FIVE
+        lacks = None  # a path that a rig leads has no breakaways, however it is run
+        if by_run or not prescribed:
+            lacks = silent_reason(name, ways.events, recorded.name)
         if found is None:
-            out.append(
-                Identifiable(name, False, "fixed at a value that does not matter for this log")
-            )
-        elif open_run and name not in FIVE:
-            out.append(_if_followed(name, recorded, ways, fit, found))
-        elif found.value is not None:
+            why = "fixed at a value that does not matter for this log"
+            out.append(Identifiable(name, False, why))
+        elif by_run and lacks is None:  # no promise, where the run may be followed or not
+            why = _events(name, ways, fit)
+            out.append(Identifiable(name, False, why, MEND[name[:3]], only_if=OPEN))
+        elif found.value is not None and not by_run:
             out.append(_identifiable(name, found, fit, ways, run.get(name), prescribed=prescribed))
-        else:  # a path that a rig leads has no breakaways, however it is run
-            lacks = None if prescribed else silent_reason(name, ways.events, recorded.name)
+        else:
             out.append(_not_identifiable(name, found, recorded.name, lacks))
     if fit.actuator is not None and "k1" in fit.estimates:
         for name in ("k1", "k2"):
@@ -188,16 +175,6 @@ def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:
         return f"{ways.reversals} reversals"
     way = (ways.positive, ways.negative)[side]
     return f"{way.seconds:.3g} s of motion that way"
-
-
-def _if_followed(
-    name: str, recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, found: Estimate
-) -> Identifiable:
-    """What only a run identifies that may be followed: no promise, where the log has the events."""
-    lacks = silent_reason(name, ways.events, recorded.name)
-    if lacks is not None:
-        return _not_identifiable(name, found, recorded.name, lacks)
-    return Identifiable(name, False, _events(name, ways, fit), MEND[name[:3]], only_if=OPEN)
 
 
 def _not_identifiable(name: str, found: Estimate, log: str, lacks: str | None) -> Identifiable:
@@ -254,9 +231,7 @@ def identifiability_of_runs(
         m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
     except (BadLog, NotIdentifiable) as error:
         return RunsIdentifiability(motion, reason=str(error))
-    events = [breakaways(one, m) for one in recorded.logs]
-    rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
-    ways = ways_of(recorded.logs, events, rests)
+    ways = _ways(recorded.logs, m)
     seen = identifiable_by_log(recorded, ways, first.fit, open_run=first.open)
     shown = None
     if effects and not led_by_rig(recorded):

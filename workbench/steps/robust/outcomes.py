@@ -52,18 +52,19 @@ class DrawnMachines:
         Their input is the reference of the force loop, the command of an actuator without one, or
         else the force that the model's motor would give: another k_a is another gain.
         """
-        return tuple(self._linear(plant, h, force) for plant in self.plants)
-
-    def _linear(
-        self, plant: Plant, h: float, force: ForceLoop | None
-    ) -> tuple[Array, Array] | None:
-        p, own, drive = plant.friction, self.model.simulated.actuator, plant.actuator
-        try:
-            a, b = sampled(p.m, 0.5 * (p.F_vp + p.F_vn), h, drive, force)
-        except BadSpecification:
-            return None
-        gain = drive.k_a / own.k_a if isinstance(drive, Motor) and isinstance(own, Motor) else 1.0
-        return a, gain * b
+        own, out = self.model.simulated.actuator, list[tuple[Array, Array] | None]()
+        for plant in self.plants:
+            p, drive = plant.friction, plant.actuator
+            gain = 1.0
+            if isinstance(drive, Motor) and isinstance(own, Motor):
+                gain = drive.k_a / own.k_a
+            try:
+                a, b = sampled(p.m, 0.5 * (p.F_vp + p.F_vn), h, drive, force)
+            except BadSpecification:
+                out.append(None)
+                continue
+            out.append((a, gain * b))
+        return tuple(out)
 
 
 def drawn_machines(
