@@ -146,7 +146,13 @@ def axis_test(
     if earlier is not None and earlier.estimates is not None:
         estimates |= earlier.estimates
     travel = friction_along(found)
-    estimates["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
+    # The largest deviation of either direction from its own mean [N].
+    apart = [
+        float(np.nanmax(np.abs(one - np.nanmean(one))))
+        for one in (travel.positive, travel.negative)
+        if np.count_nonzero(np.isfinite(one)) > 1
+    ]
+    estimates["along_travel"] = Estimate(max(apart, default=None), units["along_travel"])
     own = {name: Allowed(*ends, "card") for name, ends in sources.card.limits.items()}
     earlier_values = earlier.values if earlier else {}
     past = {name: [value for _, value in every] for name, every in earlier_values.items()}
@@ -219,16 +225,6 @@ def friction_along(found: AxisEquation) -> Travel:
         columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0) / enough)]
     up, up_sd, down, down_sd = columns
     return Travel(0.5 * (edges[1:] + edges[:-1]), up, down, up_sd, down_sd)
-
-
-def _deviation(travel: Travel) -> float | None:
-    """Largest deviation of either direction from its own mean along the travel [N]."""
-    sizes = [
-        float(np.nanmax(np.abs(one - np.nanmean(one))))
-        for one in (travel.positive, travel.negative)
-        if np.count_nonzero(np.isfinite(one)) > 1
-    ]
-    return max(sizes, default=None)
 
 
 def judged(name: str, estimate: Estimate, allowed: Allowed | None) -> Quantity:

@@ -16,12 +16,11 @@ from design.tracking import Plants
 from design.tune import Goals
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from identification.model.plant import Motor
 from workbench.cards.readable import number
 from workbench.documents.design import Controller, Design, Linear, Recommended, margin_values
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
-from workbench.steps.linear_loop import command_of, delayed, swings_of
+from workbench.steps.linear_loop import command_of, delayed, law_to_force, swings_of
 
 FILTER_EARNS = 1.1  # times the bandwidth without it, from which a notch or a low-pass is proposed
 BAND_OF_SPEED = 0.01  # of the fastest speed seen, within which Coulomb friction comes on
@@ -73,16 +72,12 @@ def unseen_lag(model: Model) -> float:
 def effort_of_both(model: Model, plant: tuple[Array, Array], effort: float | None) -> float | None:
     """The largest |S_up| [dB] that a design allows, or that of the present controller if larger:
     what noise asks of the drive now it may ask."""
-    now = model.present
-    if effort is None or now is None or now.force is not None:
+    now = law_to_force(model)
+    if effort is None or now is None:
         return effort
-    drive = model.simulated.actuator
-    per = drive.k_a if isinstance(drive, Motor) and now.output == "command" else 1.0
-    if now.output == "command" and not isinstance(drive, Motor):
-        return effort
-    A, B = plant
+    (law, per), (A, B) = now, plant
     try:
-        asked = margins(A, per * B, now.law.rst).S_up_max_db
+        asked = margins(A, per * B, law.rst).S_up_max_db
     except BadSpecification:  # it is unstable on this plant, or of another period
         return effort
     return effort if asked is None else max(effort, asked + 20.0 * math.log10(abs(per)))

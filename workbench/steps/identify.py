@@ -186,10 +186,8 @@ def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
             if "k1" in fit.estimates:
                 return {name: fit.estimates[name] for name in ("k1", "k2")}
             why = "a linear actuator explains only a part of the force; the value is a regression's"
-            return {
-                "k1": Estimate(None, units["k1"], reason=why, assumed=k1),
-                "k2": Estimate(None, units["k2"], reason=why, assumed=k2),
-            }
+            values = {"k1": k1, "k2": k2}
+            return {n: Estimate(None, units[n], reason=why, assumed=v) for n, v in values.items()}
         case _:
             return None
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from design.drive_law import DriveLaw
 from design.elastic import Swing, elastic_plant
 from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
 from identification.arrays import Array
@@ -95,6 +96,17 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
         actuator = "the actuator" if identified else "an actuator of assumed k1 and k2"
         inside = f"with {actuator} and its force loop"
     return f"{known}: {body}, {inside}, sampled exactly"
+
+
+def law_to_force(model: Model) -> tuple[DriveLaw, float] | None:
+    """The law that the machine has now, and by which its output becomes a force; None where there
+    is none, or a force loop or an actuator stands between."""
+    now, drive = model.present, model.simulated.actuator
+    if now is None or now.force is not None:
+        return None
+    if now.output == "force":
+        return now.law, 1.0
+    return (now.law, drive.k_a) if isinstance(drive, Motor) else None
 
 
 def unknown_viscous(model: Model) -> list[str]:

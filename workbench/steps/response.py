@@ -20,7 +20,6 @@ from identification.frequency.stretches import ComplexArray, hold
 from identification.frequency.swinging_load import swinging_load
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from identification.model.plant import Motor
 from identification.model.size import Size
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.cards.parameter_units import shown
@@ -36,7 +35,7 @@ from workbench.steps.linear_force import (
     plain_recording,
     stiffness_of,
 )
-from workbench.steps.linear_loop import dead_time
+from workbench.steps.linear_loop import dead_time, law_to_force
 from workbench.steps.predicted_force import with_applied_force
 
 if TYPE_CHECKING:
@@ -178,18 +177,14 @@ def curves_of(model: Model, f: Array) -> Curves:
 def _law_of_card(model: Model, f: Array) -> ComplexArray | None:
     """The card's controller from position to the force that counters it [N/m], with its hold; None
     where there is none, or a force loop stands between."""
-    now = model.present
-    drive = model.simulated.actuator
-    if now is None or now.force is not None:
+    now = law_to_force(model)
+    if now is None:
         return None
-    if now.output == "command" and not isinstance(drive, Motor):
-        return None
-    per = drive.k_a if isinstance(drive, Motor) and now.output == "command" else 1.0
-    z = np.exp(2j * np.pi * f * now.law.h)
-    rst = now.law.rst
+    law, per = now
+    z = np.exp(2j * np.pi * f * law.h)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = per * evaluate(rst.R, z) / evaluate(rst.S, z) * hold(f, now.law.h)
-    return np.where(f < 0.5 / now.law.h, found, np.nan)
+        found = per * evaluate(law.rst.R, z) / evaluate(law.rst.S, z) * hold(f, law.h)
+    return np.where(f < 0.5 / law.h, found, np.nan)
 
 
 def _open_loop(found: MachineResponses, curves: Curves | None) -> Response | None:

@@ -1,6 +1,6 @@
 """Model of a rig whose velocity follows the command -> design, and its validation in simulation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -182,12 +182,13 @@ def _figures(
         noise = model.fit.noise_y * rng.standard_normal(len(r))
         return run_valve_loop(law, valve, r, noise, model.command_peak, model.travel)
 
-    stairs, dwell = _stairs(law, step)
-    standstill, overshoot = _along_stairs(run(stairs), dwell, step)
-    r, amplitude = _smooth(law, step)
-    smooth = run(r)
-    late = slice(len(r) // 3, None)
-    tracking = float(np.sqrt(np.mean((smooth.y - r)[late] ** 2))) / amplitude
+    standstill, overshoot = _along_stairs(law, step, run)
+    # A sine that the valve can follow, three periods of it; it comes up in half of the first.
+    w = min(SMOOTH_OF_LOOP * law.k_p, SMOOTH_OF_SPEED * law.fastest / step)
+    t = np.arange(0.0, 6.0 * np.pi / w, law.h)
+    r = step * np.minimum(w * t / np.pi, 1.0) * np.sin(w * t)
+    smooth, late = run(r), slice(len(r) // 3, None)
+    tracking = float(np.sqrt(np.mean((smooth.y - r)[late] ** 2))) / step
     limited = float(np.mean(np.abs(smooth.u) >= law.limit))
     A, B = valve_plant(valve.delay, valve.lag, law.h)
     try:
@@ -220,15 +221,14 @@ def _missed(
         yield f"the command is at its limit in {100 * limited:.2g} % of the smooth reference"
 
 
-def _stairs(law: ValveController, step: float) -> tuple[Array, int]:
-    """Steps up, down and back [m], and the samples of each."""
-    dwell = max(SHORTEST_STEP, 2.0 * step / law.fastest + STEP_LENGTH / law.k_p)
-    count = round(dwell / law.h)
-    return np.concatenate([[0.0], np.repeat([step, 0.0, -step, 0.0], count)]), count
-
-
-def _along_stairs(found: ValveLoopRun, dwell: int, step: float) -> tuple[float, float]:
-    """Largest error in the last half of a step, and overshoot, relative to the step."""
+def _along_stairs(
+    law: ValveController, step: float, run: Callable[[Array], ValveLoopRun]
+) -> tuple[float, float]:
+    """Largest error in the last half of a step [m] up, down and back, and overshoot, relative to
+    the step."""
+    seconds = max(SHORTEST_STEP, 2.0 * step / law.fastest + STEP_LENGTH / law.k_p)
+    dwell = round(seconds / law.h)
+    found = run(np.concatenate([[0.0], np.repeat([step, 0.0, -step, 0.0], dwell)]))
     standstill = overshoot = 0.0
     for begin in range(1, len(found.r) - dwell + 1, dwell):
         y, target = found.y[begin : begin + dwell], found.r[begin]
@@ -236,14 +236,6 @@ def _along_stairs(found: ValveLoopRun, dwell: int, step: float) -> tuple[float, 
         standstill = max(standstill, float(np.max(np.abs(y[dwell // 2 :] - target))) / step)
         overshoot = max(overshoot, float(np.max((y - target) * np.sign(rise))) / step)
     return standstill, overshoot
-
-
-def _smooth(law: ValveController, step: float) -> tuple[Array, float]:
-    """A sine that the valve can follow, three periods of it, and its amplitude [m]."""
-    w = min(SMOOTH_OF_LOOP * law.k_p, SMOOTH_OF_SPEED * law.fastest / step)
-    t = np.arange(0.0, 6.0 * np.pi / w, law.h)
-    # From rest: the amplitude comes up within the first half of a period.
-    return step * np.minimum(w * t / np.pi, 1.0) * np.sin(w * t), step
 
 
 def velocity_validation_document(found: VelocityValidation) -> dict[str, Any]:
