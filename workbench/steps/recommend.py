@@ -57,10 +57,8 @@ def recommended(model: Model, found: Design) -> Recommendation:
     stays = _present_as_good(taken, figures)
     present_said = "; the present controller is as good, keep it" if stays else ""
     if not stays and (unclear := _no_clear_win(model, found, alone, better)):
-        stays, present_said = (
-            True,
-            f"; {unclear}: no clear win over the present controller, keep it",
-        )
+        stays = True
+        present_said = f"; {unclear}: no clear win over the present controller, keep it"
     why = f"{said}: {_decisive(alone, found, figures)}{present_said}"
     return Recommendation(alone, better, why, stays)
 

@@ -2,7 +2,9 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
@@ -204,32 +206,18 @@ def made_safe(
 
     Raises BadModel where none of them can be followed.
     """
-    seeds, scale = rng.spawn(len(plants)), 1.0
-    smaller, (worst, exceeding) = r, _extremes(bench, plants, r, limits, seeds)
-    for _ in range(SAFETY_PASSES):
+    seeds, scale, smaller = rng.spawn(len(plants)), 1.0, r
+    for again in range(1 + SAFETY_PASSES):
+        if again:
+            scale *= SMALLER_SCALE
+            smaller = limits.home + scale * (r - limits.home)
+        found: list[Peaks] = []  # of the plants that can be followed
+        for plant, own in zip(plants, seeds, strict=True):
+            with suppress(UserError):
+                found.append(peaks(bench.run(plant, smaller, own)))
+        exceeding = len(plants) - sum(not one.exceeded(limits) for one in found)
         if exceeding == 0:
             break
-        scale *= SMALLER_SCALE
-        smaller = limits.home + scale * (r - limits.home)
-        worst, exceeding = _extremes(bench, plants, smaller, limits, seeds)
-    if worst is None:
+    if not found:
         raise BadModel("none of the drawn machines can be simulated in this loop; check the model")
-    return smaller, Safety(len(plants), worst, exceeding, scale)
-
-
-def _extremes(
-    bench: Bench, plants: Sequence[Plant], r: Array, limits: MotionLimits,
-    seeds: Sequence[np.random.Generator],
-) -> tuple[Peaks | None, int]:  # fmt: skip
-    """The extremes of all plants along r, and how many exceed a limit or cannot be followed."""
-    worst: Peaks | None = None
-    exceeding = 0
-    for plant, rng in zip(plants, seeds, strict=True):
-        try:
-            own = peaks(bench.run(plant, r, rng))
-        except UserError:
-            exceeding += 1
-            continue
-        exceeding += bool(own.exceeded(limits))
-        worst = own if worst is None else worst.or_more(own)
-    return worst, exceeding
+    return smaller, Safety(len(plants), reduce(Peaks.or_more, found), exceeding, scale)
