@@ -9,13 +9,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from types import FrameType
 
 import click
 
 from workbench.output import progress
+from workbench.threads import one_thread
 
 Clock = Callable[[], float]  # s
 Stages = Mapping[str, tuple[float, float]]
@@ -131,23 +132,23 @@ class Course:
 
 
 @contextmanager
-def watched(course: Course) -> Iterator[None]:
-    """Within the block the bar moves by itself, and the first Ctrl-C ends with the best so far.
-
-    A second one aborts, as does one where somebody else handles it.
-    """
-    with moving(course), _first_ctrl_c(course):
+def working(label: str) -> Iterator[None]:
+    """Within the block a bar of that label, and one thread for linear algebra."""
+    with one_thread(), progress(label):
         yield
 
 
 @contextmanager
-def running(
-    label: str, stages: Stages, *, as_json: bool = False, budget: float = math.inf
-) -> Iterator[Course]:
-    """A course behind a bar of that label, `watched`; mute with JSON."""
-    with progress(label, 1.0, as_json=as_json) as bar:
-        course = Course(bar, stages, time.monotonic, budget, bar.describe)
-        with watched(course):
+def running(label: str, stages: Stages, budget: float | None = None) -> Iterator[Course]:
+    """The same of a course, whose bar moves by itself.
+
+    budget [s]: after which it is to end; with one, also without end, the first Ctrl-C ends it with
+    the best so far. A second one aborts, as does one where somebody else handles it.
+    """
+    with one_thread(), progress(label, 1.0) as bar:
+        seconds = math.inf if budget is None else budget
+        course = Course(bar, stages, time.monotonic, seconds, bar.describe)
+        with moving(course), nullcontext() if budget is None else _first_ctrl_c(course):
             yield course
 
 

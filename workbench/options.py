@@ -2,16 +2,33 @@
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from workbench.ending import StatusCommand
 from workbench.files import shipped_cards
-from workbench.screen import debug_option, verbose_option
-from workbench.signature import argument, option
+from workbench.screen import shared_options
+from workbench.signature import argument, by_signature, option
+
+EVENTS = "Accepted as everywhere; events are JSON."  # --json of commands that report events
+
+
+def command(
+    group: click.Group | None = None, name: str | None = None, *,
+    json: str = "Print the result as JSON.", **how: Any,
+) -> Callable[[Callable[..., Any]], click.Command]:  # fmt: skip
+    """A command, or one of a group, with the options that its function's parameters say.
+
+    json: help of --json; how: as `StatusCommand` has it.
+    """
+    make = group.command if group else partial(click.command, cls=StatusCommand)
+    shared = partial(shared_options, json=json)
+    return lambda function: make(name, **how)(by_signature(function, shared))
 
 
 class Finite(click.FloatRange):
@@ -83,8 +100,8 @@ MACHINES_OPTION = option(  # of what serves the page: the folder of all machines
     "Folder of the machines, as of 'watch'; dropped logs lie in it too.",
     default=Path("machines"), metavar="FOLDER",
 )  # fmt: skip
-EVENTS_OPTION = option(  # of commands that report events as JSON
-    "Accepted as everywhere; events are JSON.", "--json", beside=(verbose_option, debug_option)
+OUT_OPTION = option(
+    "Folder for the results.  [default: runs/<time>-<command>]", metavar="DIR", last=True
 )
 MODEL_ARGUMENT = argument("MODEL")
 LOG_ARGUMENT = argument("LOG", shell_complete=complete_file)

@@ -13,42 +13,34 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Self
 
 import click
 
 from identification.errors import UserError
 from workbench.ending import Step, refused_with
-from workbench.screen import SCREEN_LINES, SCREEN_WIDTH, Screen, debug_option, listed, screen
+from workbench.screen import (
+    JSON,
+    SCREEN_LINES,
+    SCREEN_WIDTH,
+    VERBOSE,
+    Screen,
+    is_given,
+    listed,
+    screen,
+)  # fmt: skip
 from workbench.screen import Row as Row
-from workbench.screen import as_text as as_text
-from workbench.screen import is_verbose as is_verbose
-from workbench.screen import table as table
-from workbench.screen import verbose_option as verbose_option
-from workbench.signature import decorated, option
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-# Options of every command, as defaults of their parameters; the first brings --verbose.
-JSON_OPTION = option("Print the result as JSON.", "--json", beside=(verbose_option, debug_option))
-OUT_OPTION = option("Folder for the results.  [default: runs/<time>-<command>]", metavar="DIR")
 MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
 
 
-class Bar(Protocol):
-    """A bar of progress: called with a step, it moves on; `describe` says what goes on."""
+class Bar:
+    """A bar of progress, here one that nobody sees: called with a step, it moves on."""
 
     def __call__(self, step: float) -> None: ...
 
     def describe(self, words: str) -> None:
-        """Say these words behind the bar's own."""
-
-
-class NoBar:
-    """What is shown where nobody looks."""
-
-    def __call__(self, step: float) -> None: ...
-
-    def describe(self, words: str) -> None: ...
+        """Say these words behind the bar's own: what goes on."""
 
 
 class BadOutput(UserError):
@@ -181,13 +173,6 @@ def write_whole(path: Path, text: str, option: str) -> None:
             part.unlink(missing_ok=True)
 
 
-def output_options(command: Command) -> Command:
-    """The options of every command: `as_json: bool` (--json), `out: Path | None` (--out), and
-    --verbose."""
-    with_out = decorated(command, "out", OUT_OPTION, Path | None)
-    return decorated(with_out, "as_json", JSON_OPTION, bool)
-
-
 def strict(value: object) -> object:
     """The value as plain JSON types; NaN and infinity become None.
 
@@ -219,18 +204,17 @@ def dumps(result: object) -> str:
     return json.dumps(strict(result), indent=2, allow_nan=False)
 
 
-def emit(
-    result: object, as_json: bool, view: Callable[[], Screen | str], then: Step | None = None
-) -> None:
-    """Print `result` as JSON, or what `view()` returns, on one screen unless --verbose is given.
+def emit(result: object, view: Callable[[], Screen | str], then: Step | None = None) -> None:
+    """Print `result` where --json is given, else what `view()` returns: one screen of it unless
+    --verbose is given.
 
     then: the command to type next, as JSON the key `next`, else what the screen ends with.
     """
-    if as_json:
+    if is_given(JSON):
         next_one = {"next": then.command} if then and isinstance(result, Mapping) else {}
         click.echo(dumps({**result, **next_one} if isinstance(result, Mapping) else result))
         return
-    verbose, shown = is_verbose(), view()
+    verbose, shown = is_given(VERBOSE), view()
     width = _width(verbose)
     last = then.lines(SCREEN_WIDTH, None if verbose else MOST_OF_A_STEP) if then else []
     found = screen(listed(shown.splitlines())) if isinstance(shown, str) else shown
@@ -247,18 +231,19 @@ def _width(verbose: bool) -> int | None:
 
 
 @contextmanager
-def progress(label: str, total: float | None = None, *, as_json: bool = False) -> Iterator[Bar]:
-    """A bar on standard error; mute without a terminal or with JSON.
+def progress(label: str, total: float | None = None) -> Iterator[Bar]:
+    """A bar on standard error; mute without a terminal, with --json, and in a notebook, where its
+    traces would stay.
 
     total: what the advances add up to; None shows that something goes on.
     """
-    if as_json or not sys.stderr.isatty():
-        yield NoBar()
+    if is_given(JSON) or "ipykernel" in sys.modules or not sys.stderr.isatty():
+        yield Bar()
         return
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    class Shown(NoBar):
+    class Shown(Bar):
         def __init__(self, bar: Progress, task: TaskID) -> None:
             self.bar, self.task = bar, task
 

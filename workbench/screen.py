@@ -14,35 +14,30 @@ Row = tuple[str, ...]
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 SCREEN_LINES, SCREEN_WIDTH = 40, 100
-VERBOSE = "--verbose"
-VERBOSE_GIVEN = "workbench.verbose"  # in the context of a command, that --verbose is given
+VERBOSE, JSON = "--verbose", "--json"
 # How a screen that is too full is made to fit, step by step: the lines that a text may have, the
 # entries to which a list is cut at most, and whether only lists that yield are cut.
 TIGHTER = ((8, 1, True), (8, 3, False), (4, 2, False), (2, 1, False), (1, 0, False))
 
 
-def verbose_option(command: Command) -> Command:
-    """The option `--verbose` of every command; `emit` asks for it, so no function takes it."""
-    return click.option(
-        VERBOSE, is_flag=True, expose_value=False, callback=_whole,
-        help="Print all there is to say, not one screen of it.",
-    )(command)  # fmt: skip
+def shared_options(command: Command, json: str = "Print the result as JSON.") -> Command:
+    """The options of every command: whoever prints asks for them, so no function takes them."""
+    said = {"--debug": "", VERBOSE: "Print all there is to say, not one screen of it.", JSON: json}
+    for name, text in said.items():
+        command = click.option(
+            name, is_flag=True, expose_value=False, callback=_noted, help=text, hidden=not text
+        )(command)
+    return command
 
 
-def debug_option(command: Command) -> Command:
-    """The option `--debug` of every command, which `workbench.cli` looks for."""
-    return click.option("--debug", is_flag=True, expose_value=False, hidden=True)(command)
+def _noted(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    ctx.meta[f"workbench{param.opts[0]}"] = value
 
 
-def _whole(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
-    if value:
-        ctx.meta[VERBOSE_GIVEN] = True
-
-
-def is_verbose() -> bool:
-    """Whether the command that runs has --verbose."""
+def is_given(name: str) -> bool:
+    """Whether the command that runs has this one of `shared_options`."""
     context = click.get_current_context(silent=True)
-    return context is not None and bool(context.meta.get(VERBOSE_GIVEN))
+    return context is not None and bool(context.meta.get(f"workbench{name}"))
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,25 @@
 """A command's options said where its function takes them, as the defaults of its parameters.
 
-    @click.command(cls=StatusCommand)
-    @by_signature
+    @options.command(epilog="Example: workbench drawn run1.csv")
     def command(logs: tuple[str, ...] = argument("LOG...", required=True),
                 seed: int = option("Of the machines drawn.", type=click.IntRange(min=0), default=0)
     ) -> None: ...
 
 What an annotation says is not said again: a `Path` is one, a tuple may be given several times, a
-`bool` is a flag, a `Literal` a choice. Name and order of the options are those of the parameters.
+`bool` is a flag, a `Literal` a choice; a dataclass stands for the options that its fields say. Name
+and order of the options are those of the parameters.
 """
 
 import inspect
 import types
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 import click
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-Values = TypeVar("Values")
 Decorator = Callable[[Any], Any]
 
 
@@ -29,28 +27,28 @@ Decorator = Callable[[Any], Any]
 class _Said:
     """A parameter as it was said: an option's own names, or none; what click gets of it.
 
-    beside: options that come after it and that no function takes.
+    last: whether it stands behind the options of every command.
     """
 
     names: tuple[str, ...]
     how: Mapping[str, Any]
     is_argument: bool
-    beside: tuple[Decorator, ...] = ()
+    last: bool = False
 
-    def decorators(self, name: str, annotation: object) -> tuple[Decorator, ...]:
+    def decorator(self, name: str, annotation: object) -> Decorator:
         """What click makes of the parameter of that name and annotation."""
         how = {**_by_annotation(annotation, self.is_argument), **self.how}
         if self.is_argument:
-            return (click.argument(name, **how),)
+            return click.argument(name, **how)
         names = self.names or (f"--{name.replace('_', '-')}",)
-        return (click.option(*names, name, **how), *self.beside)
+        return click.option(*names, name, **how)
 
 
-def option(said: str, *names: str, beside: tuple[Decorator, ...] = (), **how: Any) -> Any:
-    """An option with this help; names: where it is not called as its parameter; how: as click has
-    it. A default is shown."""
+def option(said: str, *names: str, last: bool = False, **how: Any) -> Any:
+    """An option with this help; names: where it is not called as its parameter; last: it stands
+    behind the options of every command; how: as click has it. A default is shown."""
     shown = {"show_default": True} if "default" in how else {}
-    return _Said(names, {"help": said or None, **shown, **how}, is_argument=False, beside=beside)
+    return _Said(names, {"help": said or None, **shown, **how}, is_argument=False, last=last)
 
 
 def argument(metavar: str | None = None, **how: Any) -> Any:
@@ -58,33 +56,33 @@ def argument(metavar: str | None = None, **how: Any) -> Any:
     return _Said((), {"metavar": metavar, **how}, is_argument=True)
 
 
-def by_signature(command: Command) -> Command:
-    """The function with the options and arguments that its parameters' defaults say."""
-    for name, one in reversed([*inspect.signature(command).parameters.items()]):
-        if isinstance(one.default, _Said):
-            command = decorated(command, name, one.default, one.annotation)
-    return command
+def by_signature(function: Callable[..., Any], shared: Decorator) -> Callable[..., Any]:
+    """The function with the options and arguments that its parameters' defaults say, and the
+    options that every command shares."""
+    parameters = inspect.signature(function).parameters
+    grouped: dict[str, Any] = {
+        name: one.annotation for name, one in parameters.items() if is_dataclass(one.annotation)
+    }
 
+    @wraps(function)
+    def command(**given: Any) -> Any:
+        own = {
+            name: group(**{key: given.pop(key) for key in group.__annotations__})
+            for name, group in grouped.items()
+        }
+        return function(**own, **given)
 
-def by_fields(values: type[Values]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The same of the fields of a class, of which the function takes one as its first argument."""
-
-    def with_fields(function: Callable[..., Any]) -> Callable[..., Any]:
-        @wraps(function)
-        def command(**given: Any) -> Any:
-            own = values(**{name: given.pop(name) for name in values.__annotations__})
-            return function(own, **given)
-
-        for name, annotation in reversed([*values.__annotations__.items()]):
-            command = decorated(command, name, getattr(values, name), annotation)
-        return command
-
-    return with_fields
-
-
-def decorated(command: Command, name: str, said: Any, annotation: object) -> Command:
-    """The function with one more option or argument, before those that it has."""
-    for decorator in reversed(said.decorators(name, annotation)):
+    said = list[tuple[str, _Said, object]]()
+    for name, one in parameters.items():
+        if name in grouped:
+            fields = grouped[name].__annotations__.items()
+            said += [(key, getattr(grouped[name], key), kind) for key, kind in fields]
+        else:
+            said.append((name, one.default, one.annotation))
+    said.sort(key=lambda one: one[1].last)
+    decorators = [one.decorator(name, kind) for name, one, kind in said]
+    decorators.insert(len(said) - sum(one.last for _, one, _ in said), shared)
+    for decorator in reversed(decorators):
         command = decorator(command)
     return command
 

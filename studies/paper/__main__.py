@@ -9,21 +9,23 @@ import click
 from studies.paper.document import paper_document, paper_view
 from studies.paper.report import paper_report
 from studies.paper.study import study
+from workbench import options
 from workbench.cli import verdict
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import OutputFolder, emit, progress
+from workbench.signature import option
 
 
-@click.command(epilog="Example: python -m studies.paper --out paper")
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True,
-    help="First of the noise's seeds; what is tuned is tuned on this one + 100.",
-)  # fmt: skip
-@click.option(
-    "--runs", type=click.IntRange(min=1, max=50), default=3, show_default=True,
-    help="Seeds over which every figure is a mean.",
-)  # fmt: skip
-@output_options
-def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
+@options.command(epilog="Example: python -m studies.paper --out paper")
+def command(
+    seed: int = option(
+        "First of the noise's seeds; what is tuned is tuned on this one + 100.",
+        type=click.IntRange(min=0), default=1,
+    ),
+    runs: int = option(
+        "Seeds over which every figure is a mean.", type=click.IntRange(min=1, max=50), default=3
+    ),
+    out: Path | None = options.OUT_OPTION,
+) -> None:  # fmt: skip
     """Run the paper in simulation: its figures and printed numbers beside ours, and our design.
 
     Identifies the rig before and after its drift from simulated logs, compares old, new and no
@@ -32,7 +34,7 @@ def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
     one to two minutes.
     """
     with OutputFolder("paper", out, now=datetime.now()) as folder:
-        with progress("paper", 1.0, as_json=as_json) as advance:
+        with progress("paper", 1.0) as advance:
             done = 0.0
 
             def report(_stage: str, share: float) -> None:
@@ -44,7 +46,7 @@ def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
         document = paper_document(found)
         folder.write_json("paper.json", document)
         folder.write_text("report.html", paper_report(found))
-    emit({**document, "out": folder.final}, as_json, lambda: paper_view(found, folder.final))
+    emit({**document, "out": folder.final}, lambda: paper_view(found, folder.final))
 
 
 def main() -> int:

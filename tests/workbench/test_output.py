@@ -15,8 +15,9 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workbench.output import BadOutput, OutputFolder, dumps, emit, output_options, progress, strict
-from workbench.screen import screen, tabled
+from workbench import options
+from workbench.output import BadOutput, OutputFolder, dumps, emit, progress, strict
+from workbench.screen import JSON, is_given, screen, tabled
 
 NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 JSON_LIKE = st.recursive(
@@ -182,23 +183,26 @@ def test_dumps_never_writes_nan(value: object) -> None:
 
 
 def test_emit_json_builds_no_table(capsys: pytest.CaptureFixture[str]) -> None:
-    emit({"m": math.nan}, True, lambda: pytest.fail("table built"))
+    @options.command()
+    def command() -> None:
+        emit({"m": math.nan}, lambda: pytest.fail("table built"))
+
+    command.main(["--json"], standalone_mode=False)
     assert json.loads(capsys.readouterr().out) == {"m": None}
 
 
 def test_emit_shows_units_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [("dv_p", "0.001 [m/s] :m:")]
-    emit({}, False, lambda: screen(tabled(("name", "value [m/s]"), rows)))
+    emit({}, lambda: screen(tabled(("name", "value [m/s]"), rows)))
     shown = capsys.readouterr().out
     assert "value [m/s]" in shown
     assert "0.001 [m/s] :m:" in shown
 
 
 def test_options_reach_the_command() -> None:
-    @click.command()
-    @output_options
-    def command(as_json: bool, out: Path | None) -> None:
-        click.echo(f"{as_json} {out!r}")
+    @options.command()
+    def command(out: Path | None = options.OUT_OPTION) -> None:
+        click.echo(f"{is_given(JSON)} {out!r}")
 
     def run(*arguments: str) -> str:
         return CliRunner().invoke(command, arguments, catch_exceptions=False).output.strip()
@@ -216,8 +220,13 @@ def test_progress_is_mute(
     as_json: bool,
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
-    with progress("fit", 3, as_json=as_json) as advance:
-        advance(1)
+
+    @options.command()
+    def command() -> None:
+        with progress("fit", 3) as advance:
+            advance(1)
+
+    command.main(["--json"] if as_json else [], standalone_mode=False)
     assert capsys.readouterr() == ("", "")
 
 

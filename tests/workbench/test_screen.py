@@ -12,7 +12,7 @@ from tests.screens import one_screen
 from workbench import cli
 from workbench.ending import step
 from workbench.output import emit
-from workbench.screen import Part, Screen, instead, listed, more, screen, tabled, verbose_option
+from workbench.screen import Part, Screen, instead, listed, more, screen, shared_options, tabled
 
 WORDS = st.text("abc de", min_size=1, max_size=300)
 CELLS = st.text("abc de", max_size=60)
@@ -67,13 +67,12 @@ def test_what_is_behind_verbose_stands_in_its_place() -> None:
 
 
 @click.command()
-@verbose_option
-@click.option("--json", "as_json", is_flag=True)
-def shows(as_json: bool) -> None:
+@shared_options
+def shows() -> None:
     """A command with more to say than a screen holds."""
     lines = [f"line {n}" for n in range(80)]
     logs = [f"measured/{n:02}.csv" for n in range(60)]
-    emit({"lines": lines}, as_json, lambda: screen(listed(lines)), step("why", "trace", *logs))
+    emit({"lines": lines}, lambda: screen(listed(lines)), step("why", "trace", *logs))
 
 
 def test_the_option_reaches_the_screen_and_leaves_json_alone() -> None:

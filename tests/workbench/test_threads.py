@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from workbench.interface import calls
+from workbench.course import working
 from workbench.threads import one_thread, one_thread_by_default
 
 ASKED = (
@@ -38,7 +38,7 @@ def test_python_has_one_within_a_call_and_its_own_after() -> None:
         before = threads()
         with one_thread():
             assert threads() == {1}
-        with calls._bar("working"):
+        with working("working"):
             assert threads() == {1}
         assert threads() == before
 

@@ -6,21 +6,19 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand, Step, step
-from workbench.output import JSON_OPTION, OUT_OPTION, results
-from workbench.signature import by_signature, option
+from workbench.ending import Step, step
+from workbench.output import results
+from workbench.signature import option
 
 if TYPE_CHECKING:
     from workbench.steps.axis_test import AxisTest
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     done="green",
     refusal="yellow or red, or nothing is identifiable from the log; the first line says why",
     epilog="Example: workbench axis-test run1.csv --card bench-a/card.toml --registry registry.db",
 )
-@by_signature
 def command(
     log: str = options.LOG_ARGUMENT,
     card: str = options.CARD_OPTION,
@@ -32,8 +30,7 @@ def command(
         "The machine's name in the registry.  [default: the card's]", metavar="NAME"
     ),
     seed: int = options.SEED_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> int:  # fmt: skip
     """Test an axis by one log: friction and breakaway each way, mass, constant force, backlash.
 
@@ -41,29 +38,17 @@ def command(
     logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side, or
     nothing to test against. Writes axis_test.json, and report.html to be printed on one page.
     """
-    from workbench.logs.sources import read_sources
-    from workbench.report.axis_test import axis_view
+    from workbench.interface.logs import axis_test
     from workbench.report.next_steps import check_of_refused
     from workbench.report.view import show
-    from workbench.steps.axis_test import axis_test
 
-    sources = read_sources([log], card)
-    name = machine or sources.card.name
-    earlier = None
-    if where is not None:
-        from workbench.jobs.axis_history import earlier_of
-        from workbench.registry.store import Registry
-
-        with Registry(where, create=False) as registry:
-            earlier = earlier_of(registry, name, sources, seed)
-    elif machine is not None:
+    if where is None and machine is not None:
         raise click.UsageError("--machine is a name in a registry; give --registry too.")
     with results("axis-test", out, check_of_refused([log], card)) as folder:
-        test = axis_test(sources, earlier, name)
-        view = axis_view(test)
-        view.write(folder)
-    show(view, folder.final, as_json, after_axis_test(test, log, card, where))
-    return 0 if test.light == "green" else 1
+        found = axis_test(log, card, registry=where, machine=machine, seed=seed)
+        found.view.write(folder)
+    show(found.view, folder.final, after_axis_test(found.found, log, card, where))
+    return 0 if found.light == "green" else 1
 
 
 def after_axis_test(test: "AxisTest", log: str, card: str, where: str | None) -> Step | None:

@@ -1,14 +1,13 @@
 """`workbench demo`: the whole chain on a shipped recipe, and one folder with all its results."""
 
-import time
 from pathlib import Path
 
 import click
 
-from workbench.course import Course, moving
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
-from workbench.signature import by_signature, option
+from workbench import options
+from workbench.course import running
+from workbench.output import emit, results
+from workbench.signature import option
 from workbench.steps.stages import TRACE_STAGES
 
 RECIPE = "demo"
@@ -16,19 +15,16 @@ DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.ite
 DEMO_STAGES["designing"] = (0.85, 1.0)
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="the effect is not found, or the recommended controller does not meet the limits",
     epilog="Example: workbench demo --out demo",
 )
-@by_signature
 def command(
     seed: int = option(
         "Of the search and the simulated check; the log is of the recipe's own seed.",
         type=click.IntRange(min=0), default=0,
     ),
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> int:  # fmt: skip
     """Run the whole chain on a shipped recipe and write a report.
 
@@ -48,10 +44,8 @@ def command(
 
     card = load_card(card_path(RECIPE))
     with results("demo", out) as folder:
-        with progress("demo", 1.0, as_json=as_json) as bar:
-            course = Course(bar, DEMO_STAGES, time.monotonic, describe=bar.describe)
-            with moving(course), fits_compiled_ahead():
-                found = demonstrate(card, folder.path, seed, course.report)
+        with running("demo", DEMO_STAGES) as course, fits_compiled_ahead():
+            found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
         rotary = traced.model.rotary
         traced_view(traced).write(folder)
@@ -69,5 +63,5 @@ def command(
         "out": folder.final,
     }
     then = after_demo(found, folder.final, seed)
-    emit(result, as_json, lambda: demo_view(found, folder.final), then)
+    emit(result, lambda: demo_view(found, folder.final), then)
     return 0 if then is None else 1

@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from workbench import options
-from workbench.course import running
-from workbench.ending import StatusCommand, step
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import by_fields, option
+from workbench.ending import step
+from workbench.output import results
+from workbench.signature import option
 
 if TYPE_CHECKING:
-    from design.tune import Asked
     from workbench.documents.design import Structure
     from workbench.documents.model import Model
     from workbench.steps.loop_figures import Limits
@@ -90,17 +88,14 @@ class DesignOptions:
     )
     card: str | None = options.PRESENT_CARD_OPTION
     effects: tuple[Path, ...] = options.EFFECTS_OPTION
-    as_json: bool = JSON_OPTION
-    out: Path | None = OUT_OPTION
+    out: Path | None = options.OUT_OPTION
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="the model carries no design, or no controller meets the goals (design.json then says"
     " what each misses, and recommends none)",
     epilog="Example: workbench design runs/.../model.json --poles 20,0.9",
 )
-@by_fields(DesignOptions)
 def command(given: DesignOptions) -> int:
     """Design PID and RST controllers by pole placement, and P-PI cascades, with their margins.
 
@@ -110,51 +105,50 @@ def command(given: DesignOptions) -> int:
     With --robust: the poles, the integrator and the compensator that do best over the machines that
     the model's errors (and the machine's drift so far) allow; robust.json holds what that promises.
     """
-    from design.tune import Asked
-    from workbench.cards.own_effects import library
-    from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
+    from workbench.interface.models import load_model
     from workbench.steps.elastic import with_response
     from workbench.steps.present import with_card
 
-    model_file = given.model_file
-    if is_velocity_model(model_file):
+    if is_velocity_model(given.model_file):
         options.refuse_for_velocity(*NOT_FOR_VELOCITY)
         return _velocity(given)
-    model = with_card(read_model(model_file, library(given.effects)), given.card)
-    asked = Asked(
-        options.parse_poles(given.poles), options.parse_auxiliary(given.auxiliary), given.integrator
-    )
+    model = with_card(load_model(given.model_file, given.effects), given.card)
     _refuse_beside(given)
     if given.robust:
-        return _robust(given, model, asked)
-    return _nominal(given, with_response(model, given.response_file), asked)
+        return _robust(given, model)
+    return _nominal(given, with_response(model, given.response_file))
 
 
-def _nominal(given: DesignOptions, model: "Model", asked: "Asked") -> int:
-    from design.tune import Goals
+def _nominal(given: DesignOptions, model: "Model") -> int:
+    from design.tune import Asked, Goals
+    from workbench.interface.loops import design
     from workbench.report.next_steps import after_design, without_design
-    from workbench.report.reports import design_view
     from workbench.report.view import show
-    from workbench.steps.design import design, effort_limit
-    from workbench.steps.schedule import scheduled
+    from workbench.steps.design import effort_limit
 
-    goals = Goals(given.modulus, given.delay, effort_limit(model))
+    asked, goals = _asked(given), Goals(given.modulus, given.delay, effort_limit(model))
     with results("design", given.out, without_design(model, given.card)) as folder:
-        with progress("designing", as_json=given.as_json):
-            found = design(
-                model, asked, goals=goals, source=given.source, period=given.design_period,
-                structures=given.structures or None,
-            )  # fmt: skip
-            if given.over:
-                found = scheduled(model, found, given.over, asked, goals)
-        view = design_view(found, model.rotary)
-        view.write(folder)
-    then = after_design(
-        found, given.model_file, asked.dominant is not None, _repeated_options(given)
-    )
-    show(view, folder.final, given.as_json, then)
+        found = design(model, goals=goals, structures=given.structures or None, **asked)
+        if given.over:
+            poles = Asked(asked["poles"], asked["auxiliary"], given.integrator)
+            found = found.scheduled(given.over, poles, goals)
+        found.view.write(folder)
+    options_kept = _repeated_options(given)
+    then = after_design(found.design, given.model_file, given.poles is not None, options_kept)
+    show(found.view, folder.final, then)
     return 1 if found.recommended == "none" else 0
+
+
+def _asked(given: DesignOptions) -> dict[str, Any]:
+    """What a nominal and a robust design are asked alike."""
+    return {
+        "poles": options.parse_poles(given.poles),
+        "auxiliary": options.parse_auxiliary(given.auxiliary),
+        "integrator": given.integrator,
+        "source": given.source,
+        "period": given.design_period,
+    }
 
 
 def _velocity(given: DesignOptions) -> int:
@@ -174,7 +168,7 @@ def _velocity(given: DesignOptions) -> int:
         view.write(folder)
     design_file = folder.final / "design.json"
     then = step("the loop in simulation", "validate", given.model_file, design_file)
-    show(view, folder.final, given.as_json, then)
+    show(view, folder.final, then)
     return 0
 
 
@@ -198,25 +192,22 @@ def _limits(given: DesignOptions) -> "Limits":
     )
 
 
-def _robust(given: DesignOptions, model: "Model", asked: "Asked") -> int:
+def _robust(given: DesignOptions, model: "Model") -> int:
     from workbench.documents.design_file import design_document
+    from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
-    from workbench.report.robust import robust_view
     from workbench.report.view import show
-    from workbench.steps.robust.robust import ROBUST_STAGES, RobustAsked, robust_design
+    from workbench.steps.robust.robust import RobustAsked
 
     drift = _drift(given.where, given.machine) if given.machine else None
     wanted = RobustAsked(
         given.draws, given.probability, _limits(given), given.staircase, drift, given.seed
     )
-    where = (given.source, given.design_period)
     with results("design", given.out, without_design(model, None)) as folder:
-        with running("robust design", ROBUST_STAGES, as_json=given.as_json) as course:
-            found = robust_design(model, wanted, asked, where=where, report=course.report)
-        view = robust_view(found, model.rotary)
-        view.write(folder)
-    design, then = design_document(found.design), after_robust(found, given.model_file)
-    show(view, folder.final, given.as_json, then, design=design)
+        found = robust_design(model, wanted, **_asked(given))
+        found.view.write(folder)
+    design, then = design_document(found.found.design), after_robust(found.found, given.model_file)
+    show(found.view, folder.final, then, design=design)
     return 0 if found.passed else 1
 
 

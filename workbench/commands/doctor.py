@@ -8,21 +8,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand, step
-from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
-from workbench.signature import argument, by_signature, option
+from workbench.ending import step
+from workbench.output import emit, progress, results
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.steps.doctor import Examined
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="nothing can be identified from the log as it is, or something of the installation"
     " does not work",
     epilog="Example: workbench doctor run1.csv --card card.toml --out check",
 )
-@by_signature
 def command(
     log: str | None = argument(shell_complete=options.complete_file),
     card: str | None = option(
@@ -35,8 +33,7 @@ def command(
     effects_shown: bool = option(
         "Also which effects of the library the log could show (takes longer)."
     ),
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> int:  # fmt: skip
     """Check a log before any fit: clock, sensors, bad samples, motion, and what is identifiable.
 
@@ -47,15 +44,15 @@ def command(
     if log is None:
         if card is not None or out is not None:
             raise click.UsageError("LOG is missing: give a log beside --card and --out.")
-        return _installation(where, as_json)
+        return _installation(where)
     if card is None:
         raise click.UsageError(
             f"--card is missing: give the card of {log}; 'workbench init {log}' proposes one."
         )
-    return _log(log, card, effects_shown, as_json, out)
+    return _log(log, card, effects_shown, out)
 
 
-def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | None) -> int:
+def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path, find_data
     from workbench.report.doctor import doctor_picture, doctor_view
@@ -64,7 +61,7 @@ def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | No
 
     card = load_card(card_path(card_name), with_recipe=False)
     path = find_data(name, card)
-    with progress("looking", as_json=as_json):
+    with progress("looking"):
         found: Examined = examine(path, card, effects=effects)
     document = doctor_document(found, card.name)
     if out is not None:
@@ -72,11 +69,11 @@ def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | No
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
     then = after_doctor(found, name, card_name, out)
-    emit({**document, "out": out}, as_json, lambda: doctor_view(found, out), then)
+    emit({**document, "out": out}, lambda: doctor_view(found, out), then)
     return 0 if then is None else 1
 
 
-def _installation(where: str | None, as_json: bool) -> int:
+def _installation(where: str | None) -> int:
     from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
     from workbench.report.installation import installation_view
@@ -91,7 +88,7 @@ def _installation(where: str | None, as_json: bool) -> int:
     result = {"schema": "installation/1", **vars(found), "registry": registry, "wrong": wrong}
     asked = ("--registry", shown(named)) if named else ()
     then = step("once that is put right", "doctor", *asked) if wrong else None
-    emit(result, as_json, lambda: installation_view(found, registry, wrong), then)
+    emit(result, lambda: installation_view(found, registry, wrong), then)
     return 1 if wrong else 0
 
 

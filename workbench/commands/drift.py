@@ -5,19 +5,16 @@ from pathlib import Path
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import by_signature, option
+from workbench.output import results
+from workbench.signature import option
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     done="no drift; or INCONCLUSIVE, where no test alarmed but a change that matters is below the"
     " minimum detectable change (the first line says so)",
     refusal="drift, a changed structure, or no log from which anything is identifiable",
     epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json",
 )
-@by_signature
 def command(
     model_file: Path = options.MODEL_ARGUMENT,
     logs: tuple[str, ...] = options.LOGS_ARGUMENT,
@@ -39,8 +36,7 @@ def command(
     ),
     seed: int = options.SEED_OPTION,
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> int:  # fmt: skip
     """Test new logs against the active model: has the machine changed, and in which parameters?
 
@@ -48,8 +44,8 @@ def command(
     slowly. Writes drift.json and report.html.
     """
     from identification.drift.drift_test import DriftSettings
-    from workbench.cards.own_effects import library
-    from workbench.documents.model_file import read_model
+    from workbench.course import working
+    from workbench.interface.models import load_model
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_view
     from workbench.report.next_steps import after_drift, check_of_refused
@@ -57,11 +53,11 @@ def command(
     from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
-    model = read_model(model_file, library(effects))
+    model = load_model(model_file, effects)
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)
     with results("drift", out, check_of_refused(logs, card)) as folder:
-        with progress("testing", as_json=as_json):
+        with working("testing"):
             found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed
             )
@@ -71,5 +67,5 @@ def command(
     if state_file:
         write_stream(state_file, found.stream)
     then = after_drift(found, logs, card)
-    show(view, folder.final, as_json, then)
+    show(view, folder.final, then)
     return 0 if then is None else 1

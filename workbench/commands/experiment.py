@@ -3,13 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import click
-
 from workbench import options
-from workbench.course import running
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, results
-from workbench.signature import by_fields, option
+from workbench.output import results
+from workbench.signature import option
 
 SEARCH_SECONDS = 30.0
 
@@ -54,16 +50,13 @@ class ExperimentOptions:
     seed: int = options.SEED_OPTION
     card: str | None = options.PRESENT_CARD_OPTION
     effects: tuple[Path, ...] = options.EFFECTS_OPTION
-    as_json: bool = JSON_OPTION
-    out: Path | None = OUT_OPTION
+    out: Path | None = options.OUT_OPTION
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="a simulated machine, drawn from the model's uncertainty, exceeds a limit",
     epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20",
 )
-@by_fields(ExperimentOptions)
 def command(given: ExperimentOptions) -> int:
     """Find the run to make next: the reference, within the machine's limits, that is most
     informative.
@@ -71,32 +64,25 @@ def command(given: ExperimentOptions) -> int:
     Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
     report.html. The run begins with the machine at rest at the first r.
     """
-    from workbench.cards.own_effects import library
-    from workbench.documents.design_file import read_design
-    from workbench.documents.model_file import read_model
-    from workbench.report.experiment import experiment_view
+    from workbench.interface.loops import experiment
+    from workbench.interface.models import load_model
     from workbench.report.next_steps import after_experiment
     from workbench.report.view import show
-    from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment
-    from workbench.steps.experiment.planned import Wanted, read_rivals
+    from workbench.steps.experiment.planned import Wanted
     from workbench.steps.present import with_card
 
-    known, model_file = library(given.effects), given.model_file
-    model = with_card(read_model(model_file, known), given.card)
-    design = read_design(given.design_file) if given.design_file else None
+    model = with_card(load_model(given.model_file, given.effects), given.card)
     parts = (given.parameters or "").split(",")
-    names = tuple(name.strip() for name in parts if name.strip())
-    rivals = read_rivals(given.trace_file, model, known) if given.trace_file else ()
     wanted = Wanted(
-        names, given.stroke, given.speed, given.force, given.limit, given.seconds, given.seed,
-        rivals,
+        tuple(name.strip() for name in parts if name.strip()), given.stroke, given.speed,
+        given.force, given.limit, given.seconds, given.seed,
     )  # fmt: skip
-    as_json, budget = given.as_json, given.budget
     with results("experiment", given.out) as folder:
-        with running("experiment", EXPERIMENT_STAGES, as_json=as_json, budget=budget) as course:
-            found = experiment(model, wanted, design, course.report, course.keep_going)
-        view = experiment_view(found)
-        view.write(folder)
-    then = after_experiment(found, model_file, given.design_file)
-    show(view, folder.final, as_json, then)
+        found = experiment(
+            model, design=given.design_file, wanted=wanted, rivals=given.trace_file,
+            budget=given.budget,
+        )  # fmt: skip
+        found.view.write(folder)
+    then = after_experiment(found.found, given.model_file, given.design_file)
+    show(found.view, folder.final, then)
     return 0 if then is None else 1

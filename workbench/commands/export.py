@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, OutputFolder, emit, results
-from workbench.signature import argument, by_fields, option
+from workbench.output import OutputFolder, emit, results
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.export.compensation import Encoder
@@ -85,16 +84,13 @@ class ExportOptions:
         "By which the control positions: before the play, or the logs' transducer behind it.",
         type=click.Choice(["motor", "load"]),
     )  # fmt: skip
-    as_json: bool = JSON_OPTION
-    out: Path | None = OUT_OPTION
+    out: Path | None = options.OUT_OPTION
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     epilog="Example: workbench export runs/.../design.json --to c --to st --out code; workbench"
     " export runs/.../model.json --to friction-table --control sinumerik",
 )
-@by_fields(ExportOptions)
 def command(given: ExportOptions) -> int:
     """Write a design's controller as code, or a model's friction as the tables of its control.
 
@@ -135,7 +131,6 @@ def command(given: ExportOptions) -> int:
             folder.write(each, content)
     emit(
         _document(what, tuple(files), folder.final),
-        given.as_json,
         lambda: _view(what, targets, tuple(files), folder.final),
     )
     return 0
@@ -176,7 +171,6 @@ def _tables(given: ExportOptions) -> int:
             folder.write(one.name, one.text)
     emit(
         tables_document(what, found, folder.final),
-        given.as_json,
         lambda: tables_view(what, found, folder.final),
     )
     return 0

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand, Step, step
+from workbench.ending import Step, step
 from workbench.jobs.options import clock, worker_name
-from workbench.output import JSON_OPTION, dumps, emit, progress
-from workbench.signature import argument, by_fields, option
+from workbench.output import dumps, emit, progress
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.fleet.run import Recorder, Report
@@ -54,15 +54,12 @@ class FleetOptions:
         "Folder of the results; the same again goes on there.",
         default=Path("fleet"), metavar="DIR",
     )  # fmt: skip
-    as_json: bool = JSON_OPTION
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="some logs were refused, failed, give an alarm or are left to a later run",
     epilog="Example: workbench fleet logs --card card.toml --out fleet --workers 2",
 )
-@by_fields(FleetOptions)
 def command(given: FleetOptions) -> int:
     """Identify the logs of many machines, or test them against the active models.
 
@@ -87,13 +84,13 @@ def command(given: FleetOptions) -> int:
         store = stack.enter_context(ResultStore(out))
         recorder = stack.enter_context(_recorder(where))
         cluster = stack.enter_context(_cluster(given))
-        advance = stack.enter_context(progress("fleet", float(len(found)), as_json=given.as_json))
+        advance = stack.enter_context(progress("fleet", float(len(found))))
         settings = FleetSettings(logs, text, given.seed)
         done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
     result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
     then = after_fleet(done, logs, given.card, where, in_registry=not given.no_registry)
-    emit(result, given.as_json, lambda: fleet_view(done, out), then)
+    emit(result, lambda: fleet_view(done, out), then)
     return 0 if then is None else 1
 
 

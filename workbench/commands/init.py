@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from workbench.ending import StatusCommand
+from workbench import options
 from workbench.output import emit, progress, write_whole
-from workbench.screen import debug_option, verbose_option
-from workbench.signature import argument, by_signature, option
+from workbench.screen import JSON, is_given
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.steps.first_card.proposal import Proposal
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 CARD = "card.toml"
 
 
-@click.command(cls=StatusCommand, epilog="Example: workbench init run1.csv --out bench-a/card.toml")
-@by_signature
+@options.command(
+    json="Print the result as JSON; ask nothing.",
+    epilog="Example: workbench init run1.csv --out bench-a/card.toml",
+)
 def command(
     log: Path = argument(),
     out: Path | None = option(
@@ -29,9 +31,6 @@ def command(
     axis: str | None = option("Which of several axes or joints in the log.", metavar="NAME"),
     force: bool = option("Replace a card that is there."),
     yes: bool = option("Ask nothing; take the guesses."),
-    as_json: bool = option(
-        "Print the result as JSON; ask nothing.", "--json", beside=(verbose_option, debug_option)
-    ),
 ) -> None:  # fmt: skip
     """Propose a card for a log that has none: which column is what, in which unit, and the rig.
 
@@ -47,18 +46,18 @@ def command(
     from workbench.steps.first_card.written import checked_proposal, written
 
     card = _place(out)
-    asking = not (yes or as_json) and sys.stdin.isatty() and sys.stdout.isatty()
+    asking = not (yes or is_given(JSON)) and sys.stdin.isatty() and sys.stdout.isatty()
     _refuse_existing(card, force, asking)
-    with progress("looking", as_json=as_json):
+    with progress("looking"):
         found = proposed(log, name, axis)
     if asking and axis is None and len(found.axes) > 1:
         found = proposed(log, name, _asked_axis(found))
     if asking:
         found = _asked(found)
-    with progress("reading", as_json=as_json):
+    with progress("reading"):
         found = checked_proposal(found)
     write_whole(card, written(found, asked=asking), "--out")
-    emit({**found.as_json(), "out": card}, as_json, lambda: proposal_view(found, card))
+    emit({**found.as_json(), "out": card}, lambda: proposal_view(found, card))
 
 
 def _place(out: Path | None) -> Path:

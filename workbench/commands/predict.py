@@ -1,21 +1,19 @@
 """`workbench predict`: a model on a log -> prediction.csv."""
 
 from pathlib import Path
-from typing import Literal
-
-import click
+from typing import TYPE_CHECKING, Literal
 
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import by_signature, option
+from workbench.output import results
+from workbench.signature import option
+
+if TYPE_CHECKING:
+    from workbench.report.view import View
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a",
 )
-@by_signature
 def command(
     model_file: Path = options.MODEL_ARGUMENT,
     log: str = options.LOG_ARGUMENT,
@@ -27,8 +25,7 @@ def command(
         "What drives the run.  [default: the command where the model has an actuator]"
     ),
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> None:
     """Predict force and position of a log by a model and its effects; nothing is fitted on it.
 
@@ -37,31 +34,34 @@ def command(
     is predicted also where the model does not identify what a free run needs (mass, friction of
     sliding, by command the actuator); then `run_refused` says so.
     """
-    from workbench.cards.own_effects import library
-    from workbench.documents.model_file import read_model
-    from workbench.documents.velocity import is_velocity_model, read_velocity_model
-    from workbench.logs.sources import read_sources
+    from workbench.documents.velocity import is_velocity_model
+    from workbench.interface.logs import predict
+    from workbench.interface.models import load_model
     from workbench.report.prediction import prediction_view
     from workbench.report.view import show
-    from workbench.steps.predict import predict_sources
 
-    velocity = is_velocity_model(model_file)
-    if velocity:
-        from workbench.report.velocity import velocity_prediction_view
-        from workbench.steps.velocity import predict_velocity
-
-        options.refuse_for_velocity("drive", "effects")
-        valve = read_velocity_model(model_file)
-    else:
-        model = read_model(model_file, library(effects))
-    sources = read_sources([log], card, velocity=velocity)
     with results("predict", out) as folder:
-        with progress("predicting", as_json=as_json):
-            if velocity:
-                runs = predict_velocity(valve, sources, window)
-                view = velocity_prediction_view(runs, window, valve.rotary)
-            else:
-                found = predict_sources(model, sources, drive=drive, window=window)
-                view = prediction_view(found, model.rotary, log, card)
+        if is_velocity_model(model_file):
+            options.refuse_for_velocity("drive", "effects")
+            view = _of_velocity(model_file, log, card, window)
+        else:
+            model = load_model(model_file, effects)
+            found = predict(model, log, card, drive=drive, window=window)
+            view = prediction_view(found.found, found.rotary, log, card)
         view.write(folder)
-    show(view, folder.final, as_json)
+    show(view, folder.final)
+
+
+def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":
+    """The same of a rig whose velocity follows the command."""
+    from workbench.course import working
+    from workbench.documents.velocity import read_velocity_model
+    from workbench.logs.sources import read_sources
+    from workbench.report.velocity import velocity_prediction_view
+    from workbench.steps.velocity import predict_velocity
+
+    valve = read_velocity_model(model_file)
+    sources = read_sources([log], card, velocity=True)
+    with working("predicting"):
+        runs = predict_velocity(valve, sources, window)
+    return velocity_prediction_view(runs, window, valve.rotary)

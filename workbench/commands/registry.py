@@ -11,8 +11,8 @@ import click
 
 from workbench import options
 from workbench.ending import StatusGroup
-from workbench.output import JSON_OPTION, emit, results
-from workbench.signature import argument, by_signature, option
+from workbench.output import emit, results
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
@@ -39,25 +39,22 @@ def command() -> None:
     """
 
 
-@command.command("list", epilog="Example: workbench registry list --registry fleet.db")
-@by_signature
-def list_machines(where: str | None = options.REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
+@options.command(command, "list", epilog="Example: workbench registry list --registry fleet.db")
+def list_machines(where: str | None = options.REGISTRY_OPTION) -> None:
     """List the machines, the active version of each, and how many logs wait."""
     from workbench.registry.views import list_view
 
     with _open(where) as found:
         machines = found.machines()
-    emit({"machines": machines}, as_json, lambda: list_view(machines))
+    emit({"machines": machines}, lambda: list_view(machines))
 
 
-@command.command(epilog="Example: workbench registry show bench-a 2 --out version2")
-@by_signature
+@options.command(command, epilog="Example: workbench registry show bench-a 2 --out version2")
 def show(
     machine: str = MACHINE_ARGUMENT,
     number: int | None = argument(type=click.IntRange(min=1)),
     out: Path | None = option("Write the files of the version too.", metavar="DIR"),
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show a machine: the active version, every decision with its reason, every log's result.
 
@@ -75,17 +72,15 @@ def show(
             if out is not None:
                 _write(found, version, out)
     shown = {"machine": state, "decisions": decisions, "logs": outcomes}
-    emit(shown, as_json, lambda: machine_view(state, decisions, outcomes))
+    emit(shown, lambda: machine_view(state, decisions, outcomes))
 
 
-@command.command(epilog="Example: workbench registry diff bench-a 1 2")
-@by_signature
+@options.command(command, epilog="Example: workbench registry diff bench-a 1 2")
 def diff(
     machine: str = MACHINE_ARGUMENT,
     first: int | None = argument(type=click.IntRange(min=1)),
     second: int | None = argument(type=click.IntRange(min=1)),
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show the parameters of two versions side by side, with units and 95 % intervals.
 
@@ -105,13 +100,14 @@ def diff(
         lines = difference(found.documents(before), found.documents(after))
     names = (f"version {before.number}", f"version {after.number}")
     result = {"machine": machine, "versions": [before, after], "parameters": lines}
-    emit(result, as_json, lambda: difference_view(lines, names))
+    emit(result, lambda: difference_view(lines, names))
 
 
-@command.command(
-    epilog="Example: workbench registry add bench-a model.json design.json --promote --reason first"
+@options.command(
+    command,
+    epilog="Example: workbench registry add bench-a model.json design.json --promote --reason"
+    " first",
 )
-@by_signature
 def add(
     machine: str = MACHINE_ARGUMENT,
     model_file: Path = options.MODEL_ARGUMENT,
@@ -122,7 +118,6 @@ def add(
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
 
@@ -151,51 +146,49 @@ def add(
             found.promote(machine, version.number, reason=reason, by=who, now=now)
     state = "active" if promote else "not active yet: 'workbench registry promote'"
     said = [f"{machine}: version {version.number}, {state}", *(f"note: {r}" for r in remarks)]
-    emit({**asdict(version), "remarks": remarks}, as_json, lambda: "\n".join(said))
+    emit({**asdict(version), "remarks": remarks}, lambda: "\n".join(said))
 
 
-@command.command(epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'")
-@by_signature
+@options.command(
+    command, epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'"
+)
 def promote(
     machine: str = MACHINE_ARGUMENT,
     number: int = argument(type=click.IntRange(min=1)),
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Activate a version of a machine."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         decision = found.promote(machine, number, reason=reason, by=who, now=now)
-    emit(decision, as_json, lambda: _said(decision))
+    emit(decision, lambda: _said(decision))
 
 
-@command.command(epilog="Example: workbench registry rollback bench-a --reason 'it hunts'")
-@by_signature
+@options.command(command, epilog="Example: workbench registry rollback bench-a --reason 'it hunts'")
 def rollback(
     machine: str = MACHINE_ARGUMENT,
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Activate the version before the present one; again goes one further back."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         decision = found.rollback(machine, reason=reason, by=who, now=now)
-    emit(decision, as_json, lambda: _said(decision))
+    emit(decision, lambda: _said(decision))
 
 
-@command.command(epilog="Example: workbench registry retry bench-a --reason 'card corrected'")
-@by_signature
+@options.command(
+    command, epilog="Example: workbench registry retry bench-a --reason 'card corrected'"
+)
 def retry(
     machine: str = MACHINE_ARGUMENT,
     logs: tuple[str, ...] = argument("[LOG...]"),
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Have logs tested again by the next pass; their earlier results stay on record.
 
@@ -207,7 +200,7 @@ def retry(
     with _open(where) as found:
         files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
     said = f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none excluded"
-    emit({"machine": machine, "logs": files}, as_json, lambda: said)
+    emit({"machine": machine, "logs": files}, lambda: said)
 
 
 def _open(where: str | None, *, create: bool = False) -> "Registry":

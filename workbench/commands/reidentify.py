@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from workbench.ending import StatusCommand, Step, step
+from workbench import options
+from workbench.ending import Step, step
 from workbench.jobs.options import JobOptions, worker
-from workbench.output import JSON_OPTION, emit, next_step
-from workbench.signature import by_fields, by_signature
+from workbench.output import emit, next_step
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery
@@ -18,14 +18,11 @@ if TYPE_CHECKING:
 MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="an alarm: drift, another structure, an excluded log",
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
-@by_signature
-@by_fields(JobOptions)
-def command(given: JobOptions, as_json: bool = JSON_OPTION) -> int:
+def command(given: JobOptions) -> int:
     """Test each new log of each machine once; where friction has drifted, re-tune.
 
     ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
@@ -42,7 +39,7 @@ def command(given: JobOptions, as_json: bool = JSON_OPTION) -> int:
         done = found.once()
     judged, alarms = done.judged, done.alarms
     then = after_pass(judged, given.where)
-    emit({**vars(judged), "alarms": alarms}, as_json, lambda: pass_view(judged), then)
+    emit({**vars(judged), "alarms": alarms}, lambda: pass_view(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]
     if alarms is not None and (alarms.waiting or alarms.given_up):
         errors.append(undelivered(alarms))

@@ -1,29 +1,16 @@
 """`workbench response`: logs -> frequency responses, resonances, margins of the open loop."""
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import click
 
 from workbench import options
-from workbench.course import running
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import by_signature, option
-from workbench.steps.stages import IDENTIFY_STAGES
-
-if TYPE_CHECKING:
-    from workbench.documents.model import Model
-    from workbench.logs.sources import Sources
+from workbench.output import results
+from workbench.signature import option
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="the logs show the machine at no frequency",
     epilog="Example: workbench response run1.csv run2.csv --card bench-a --model model.json",
 )
-@by_signature
 def command(
     logs: tuple[str, ...] = options.LOGS_ARGUMENT,
     card: str = options.CARD_OPTION,
@@ -39,8 +26,7 @@ def command(
     budget: float = options.BUDGET_OPTION,
     seed: int = options.SEED_OPTION,
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> None:  # fmt: skip
     """Show a machine over frequency: plant, controller and open loop, resonances, margins.
 
@@ -49,37 +35,15 @@ def command(
     do not reach, nothing is drawn. Writes response.json, response.csv (the curves with their 95 %
     bands and coherence) and report.html (Bode).
     """
-    begun = time.monotonic()
-    from workbench.cards.own_effects import library
-    from workbench.documents.model_file import read_model
+    from workbench.interface.logs import responded
+    from workbench.interface.models import load_model
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.response import response_view
     from workbench.report.view import show
-    from workbench.steps.response import respond
 
-    known = None if model_file is None else read_model(model_file, library(effects))
+    known = None if model_file is None else load_model(model_file, effects)
     left_in = "asked for" if friction_left_in else None
     with results("response", out, check_of_refused(logs, card)) as folder:
-        sources = read_sources(logs, card)
-        if known is None and left_in is None:
-            left = budget - (time.monotonic() - begun)
-            known, left_in = _identified(sources, seed, left, as_json)
-        with progress("averaging spectra", as_json=as_json):
-            found = respond(
-                sources.runs, sources.rig, sources.card.name, known, lowest, left_in=left_in,
-                read=sources.remarks,
-            )  # fmt: skip
-        view = response_view(found)
-        view.write(folder)
-    show(view, folder.final, as_json)
-
-
-def _identified(
-    sources: "Sources", seed: int, budget: float, as_json: bool
-) -> "tuple[Model | None, str | None]":
-    """The model that the logs themselves give, or None and why they give none."""
-    from workbench.steps.response import identified_or_not
-
-    with running("identifying", IDENTIFY_STAGES, as_json=as_json, budget=budget) as course:
-        return identified_or_not(sources, seed, course.report, course.keep_going)
+        found = responded(read_sources(logs, card), known, left_in, lowest, seed, budget)
+        found.view.write(folder)
+    show(found.view, folder.final)

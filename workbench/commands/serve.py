@@ -8,8 +8,7 @@ from typing import Literal
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.signature import by_fields, option
+from workbench.signature import option
 
 MEGA = 1e6
 
@@ -60,15 +59,13 @@ class ServeOptions:
         "Processes that identify and trace; more by 'workbench work'.",
         type=click.IntRange(0, 64), default=1, metavar="N",
     )  # fmt: skip
-    as_json: bool = options.EVENTS_OPTION
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
+    json=options.EVENTS,
     done="stopped",
     epilog="Example: workbench serve --registry fleet.db --machines machines",
 )
-@by_fields(ServeOptions)
 def command(given: ServeOptions) -> int:
     """Serve the page: the fleet, each machine, and a place to drop a log.
 

@@ -8,8 +8,8 @@ import click
 
 from workbench import options
 from workbench.ending import StatusGroup
-from workbench.output import JSON_OPTION, emit
-from workbench.signature import argument, by_signature, option
+from workbench.output import emit
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
@@ -24,14 +24,12 @@ def command() -> None:
     """
 
 
-@command.command("add", epilog="Example: workbench token add anna --role change")
-@by_signature
+@options.command(command, "add", epilog="Example: workbench token add anna --role change")
 def add_token(
     name: str = argument(),
     role: Literal["read", "change"] = option("", default="read"),
     by: str | None = option("Who makes it.  [default: you]", metavar="NAME"),
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Make a token and show it, this once."""
     from workbench.registry.access import Access
@@ -41,12 +39,11 @@ def add_token(
             name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
         )
     shown = f"{secret}\nThe token of {name} ({role}); it is shown only now and stored nowhere."
-    emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
+    emit({"name": name, "role": role, "token": secret}, lambda: shown)
 
 
-@command.command("list", epilog="Example: workbench token list --json")
-@by_signature
-def list_tokens(where: str | None = options.REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
+@options.command(command, "list", epilog="Example: workbench token list --json")
+def list_tokens(where: str | None = options.REGISTRY_OPTION) -> None:
     """List the tokens by name, role and who made them; not the tokens themselves."""
     from workbench.registry.access import Access
     from workbench.registry.views import moment
@@ -60,24 +57,22 @@ def list_tokens(where: str | None = options.REGISTRY_OPTION, as_json: bool = JSO
         for one in tokens
     ]  # fmt: skip
     head = ("token", "role", "made by", "at", "state")
-    emit({"tokens": tokens}, as_json,
-         lambda: screen(tabled(head, rows, ())) if rows else "no token yet")  # fmt: skip
+    shown = screen(tabled(head, rows, ())) if rows else "no token yet"
+    emit({"tokens": tokens}, lambda: shown)
 
 
-@command.command("revoke", epilog="Example: workbench token revoke anna")
-@by_signature
+@options.command(command, "revoke", epilog="Example: workbench token revoke anna")
 def revoke_token(
     name: str = argument(),
     by: str | None = option("Who revokes it.  [default: you]", metavar="NAME"),
     where: str | None = options.REGISTRY_OPTION,
-    as_json: bool = JSON_OPTION,
 ) -> None:
     """Take a token no more; its name stays taken."""
     from workbench.registry.access import Access
 
     with _open(where) as found:
         Access(found.database).revoke(name, by=by or getpass.getuser(), now=datetime.now(UTC))
-    emit({"name": name, "revoked": True}, as_json, lambda: f"{name}: revoked")
+    emit({"name": name, "revoked": True}, lambda: f"{name}: revoked")
 
 
 def _open(where: str | None) -> "Registry":

@@ -1,25 +1,23 @@
 """`workbench trace`: logs and held-out logs -> trace.json, model.json and report.html."""
 
-import time
 from pathlib import Path
-
-import click
+from typing import TYPE_CHECKING
 
 from workbench import options
-from workbench.course import Course, watched
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import argument, by_signature, option
+from workbench.course import running
+from workbench.output import results
+from workbench.signature import argument, option
 from workbench.steps.stages import TRACE_STAGES
 
+if TYPE_CHECKING:
+    from workbench.report.view import View
 
-@click.command(
-    cls=StatusCommand,
+
+@options.command(
     done="done, whatever the verdict",
     refusal="too little slides",
     epilog="Example: workbench trace day1.csv day2.csv --test day3.csv --card bench-a/card.toml",
 )
-@by_signature
 def command(
     logs: tuple[str, ...] = argument("[LOG...]", shell_complete=options.complete_file),
     tests: tuple[str, ...] = option(
@@ -30,8 +28,7 @@ def command(
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     budget: float = options.BUDGET_OPTION,
     seed: int = options.SEED_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> None:  # fmt: skip
     """Find the physical effect that the model of a machine lacks, and what it is worth.
 
@@ -40,36 +37,33 @@ def command(
     without LOG, the card's [split] names the logs of both kinds. Ended by --budget or Ctrl-C, it
     says what was not tried.
     """
-    begun = time.monotonic()
-    from workbench.cards.own_effects import library
-    from workbench.logs.sources import card_of_velocity, read_sources
+    from workbench.interface.models import trace
+    from workbench.logs.sources import card_of_velocity
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.trace import traced_view
     from workbench.report.view import show
-    from workbench.steps.trace import named_logs, trace_sources
+    from workbench.steps.trace import named_logs
 
-    velocity = card_of_velocity(card)
-    if velocity:
-        from workbench.report.velocity import velocity_view
-        from workbench.steps.velocity import trace_velocity
-
-        options.refuse_for_velocity("effects", "seed")
-    known = library(effects)
     with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
-        with progress("trace", 1.0, as_json=as_json) as bar:
+        if card_of_velocity(card):
+            options.refuse_for_velocity("effects", "seed")
+            view = _of_velocity(*named_logs(logs, tests, card), card, budget)
+        else:
             names, held_out = named_logs(logs, tests, card)
-            train = read_sources(names, card, velocity=velocity)
-            test = read_sources(held_out, card, velocity=velocity) if held_out else None
-            left = budget - (time.monotonic() - begun)
-            course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.describe)
-            going = course.keep_going
-            with watched(course):
-                view = (
-                    velocity_view(trace_velocity(train, test, keep_going=going))
-                    if velocity
-                    else traced_view(
-                        trace_sources(train, test, known, seed, course.report, keep_going=going)
-                    )
-                )
+            found = trace(names, held_out or None, card, effects=effects, budget=budget, seed=seed)
+            view = found.view
         view.write(folder)
-    show(view, folder.final, as_json)
+    show(view, folder.final)
+
+
+def _of_velocity(
+    names: tuple[str, ...], held_out: tuple[str, ...], card: str, budget: float
+) -> "View":
+    """The same of a rig whose velocity follows the command."""
+    from workbench.logs.sources import read_sources
+    from workbench.report.velocity import velocity_view
+    from workbench.steps.velocity import trace_velocity
+
+    train = read_sources(names, card, velocity=True)
+    test = read_sources(held_out, card, velocity=True) if held_out else None
+    with running("trace", TRACE_STAGES, budget) as course:
+        return velocity_view(trace_velocity(train, test, keep_going=course.keep_going))

@@ -3,23 +3,18 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
-from workbench.signature import argument, by_signature, option
+from workbench.output import results
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.steps.loop_figures import Limits
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
     refusal="the recommended controller does not meet the limits on every plant",
     epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
 )
-@by_signature
 def command(
     model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path = argument("DESIGN"),
@@ -35,8 +30,7 @@ def command(
     seed: int = options.SEED_OPTION,
     card: str | None = options.PRESENT_CARD_OPTION,
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
-    as_json: bool = JSON_OPTION,
-    out: Path | None = OUT_OPTION,
+    out: Path | None = options.OUT_OPTION,
 ) -> int:
     """Check a design on a plant in simulation: margins, steps, a smooth reference, limit cycles.
 
@@ -44,45 +38,39 @@ def command(
 
     Writes validation.json and report.html.
     """
-    import numpy as np
-
-    from workbench.cards.own_effects import library
     from workbench.documents.design_file import read_design
-    from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
+    from workbench.interface.loops import validate
+    from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate
-    from workbench.report.reports import validation_view
     from workbench.report.view import show
     from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
-    from workbench.steps.validate import validate
 
+    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")
-        limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
-        return _velocity((model_file, design_file, plant_file), limits, seed, as_json, out)
-    known = library(effects)
-    model, found = with_card(read_model(model_file, known), card), read_design(design_file)
-    plant = read_model(plant_file, known) if plant_file else None
-    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
+        return _velocity((model_file, design_file, plant_file), limits, seed, out)
+    model = with_card(load_model(model_file, effects), card)
+    design, plant = (
+        read_design(design_file),
+        load_model(plant_file, effects) if plant_file else None,
+    )
     with results("validate", out) as folder:
-        with progress("simulating the loop", as_json=as_json):
-            rng = np.random.default_rng(seed)
-            result, traces = validate(model, found, rng, plant=plant, limits=limits)
-        view = validation_view(result, traces, model.rotary)
-        view.write(folder)
-    then = after_validate(result, found, model, model_file, plant_file, card)
-    show(view, folder.final, as_json, then)
-    return 0 if result.passed else 1
+        found = validate(model, design, plant=plant, limits=limits, seed=seed)
+        found.view.write(folder)
+    then = after_validate(found.found, design, model, model_file, plant_file, card)
+    show(found.view, folder.final, then)
+    return 0 if found.passed else 1
 
 
 def _velocity(
-    files: tuple[Path, Path, Path | None], limits: "Limits", seed: int, as_json: bool,
-    out: Path | None,
-) -> int:  # fmt: skip
+    files: tuple[Path, Path, Path | None], limits: "Limits", seed: int, out: Path | None
+) -> int:
     """The same of a rig whose velocity follows the command; files: model, design, plant."""
     import numpy as np
 
+    from workbench.course import working
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
     from workbench.report.velocity import after_velocity_validation, velocity_view
     from workbench.report.view import show
@@ -91,10 +79,10 @@ def _velocity(
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
     plant = read_velocity_model(files[2]) if files[2] else None
     with results("validate", out) as folder:
-        with progress("simulating the loop", as_json=as_json):
+        with working("simulating the loop"):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
         view = velocity_view(found)
         view.write(folder)
-    show(view, folder.final, as_json, after_velocity_validation(found, files[0]))
+    show(view, folder.final, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

@@ -10,21 +10,18 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-from workbench.ending import StatusCommand
 from workbench.jobs.options import JobOptions, clock, worker
-from workbench.signature import by_fields, by_signature, option
+from workbench.signature import option
 
 if TYPE_CHECKING:
     from workbench.jobs.options import Worker
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
+    json=options.EVENTS,
     done="stopped",
     epilog="Example: workbench watch machines --cron '0 * * * *' --port 9400",
 )
-@by_signature
-@by_fields(JobOptions)
 def command(
     given: JobOptions,
     cron: str = option(
@@ -34,7 +31,6 @@ def command(
         "Serve Prometheus metrics by HTTP.", type=click.IntRange(1, 65535), metavar="N"
     ),
     address: str = option("Where to serve them.", default="127.0.0.1"),
-    as_json: bool = options.EVENTS_OPTION,
 ) -> None:
     """Do what 'workbench reidentify' does on a schedule, and soon after a log file appears.
 

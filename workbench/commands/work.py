@@ -3,24 +3,19 @@
 import sys
 from pathlib import Path
 
-import click
-
 from workbench import options
-from workbench.ending import StatusCommand
-from workbench.signature import by_signature, option
+from workbench.signature import option
 
 
-@click.command(
-    cls=StatusCommand,
+@options.command(
+    json=options.EVENTS,
     done="stopped, or, with --once, no task waits",
     epilog="Example: workbench work --registry postgresql://... --machines /srv/machines",
 )
-@by_signature
 def command(
     where: str | None = options.REGISTRY_OPTION,
     machines: Path = options.MACHINES_OPTION,
     once: bool = option("End when no task waits."),
-    as_json: bool = options.EVENTS_OPTION,
 ) -> None:
     """Identify and trace the logs that were dropped on the page, one after the other.
 

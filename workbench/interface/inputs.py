@@ -1,4 +1,19 @@
-"""What a caller gives: logs as tables or paths, a machine as a card or in keywords with units."""
+"""What a caller gives: logs as tables or paths, a machine as a card or in keywords with units.
+
+A log is a DataFrame (or what makes one), a path, or the name of a file of the card's set; several
+of one machine go as a list. The machine is said by `card` (a path, the name of a shipped card, or a
+card that is read), or by `rig` and `signals`:
+
+    rig = "motor"                                     # all columns in SI
+    rig = {"kind": "electro-pneumatic", "area_p": "12.6 cm^2", "area_n": "10 cm^2",
+           "supply_pressure": "5 bar"}
+    signals = {"y": "position [mm]", "u": ("valve", "V"), "F": {"column": 3, "unit": "kN"}}
+
+Keys of `rig` are a card's, also without the unit in them, then as numbers in SI or texts with a
+unit. Without `signals` the columns are those named as signals are (`t`, `y`, `F`, ...), a unit in
+brackets behind the name included; an index of times counts as a column. Errors of what was given
+are `UserError`, a line that says what to do.
+"""
 
 import hashlib
 import os
@@ -23,6 +38,7 @@ if TYPE_CHECKING:
 
 PathLike: TypeAlias = str | os.PathLike[str]
 LogLike: TypeAlias = Union["pd.DataFrame", Mapping[str, Any], PathLike]
+Logs: TypeAlias = LogLike | Sequence[LogLike]
 CardLike: TypeAlias = Card | PathLike
 RigLike: TypeAlias = str | Mapping[str, Any]
 Signals: TypeAlias = Mapping[str, Any]
@@ -40,9 +56,8 @@ _RIG_KEYS: Mapping[str, tuple[str, tuple[str, ...]]] = {  # key of a card, SI un
 
 
 def sources(
-    logs: LogLike | Sequence[LogLike], card: CardLike | None, rig: RigLike | None,
-    signals: Signals | None,
-) -> Sources:  # fmt: skip
+    logs: Logs, card: CardLike | None, rig: RigLike | None, signals: Signals | None
+) -> Sources:
     """The runs of the logs, read by a card or by what the keywords say of machine and columns.
 
     Raises BadCard, BadLog as the commands do.

@@ -1,28 +1,47 @@
-"""Results of `design`, `validate` and `experiment`: controllers, and what a simulated loop does."""
+"""`design`, `validate` and `experiment`, as the commands of these names: controllers, and what a
+simulated loop does."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from identification.errors import BadModel
+from workbench.course import running, working
 from workbench.documents.design import Design
+from workbench.documents.design_file import read_design
 from workbench.documents.model import Model
+from workbench.interface.inputs import PathLike
+from workbench.interface.models import ModelLike, TraceResult, model_of
 from workbench.interface.result import Result
 from workbench.report.experiment import experiment_view
 from workbench.report.reports import design_view, validation_view
 from workbench.report.robust import robust_view
 from workbench.report.view import View
-from workbench.steps.experiment.planned import Experiment
-from workbench.steps.loop_figures import Traces
-from workbench.steps.robust.robust import ROBUST, Robust
+from workbench.steps.design import design as design_of_model
+from workbench.steps.design import effort_limit
+from workbench.steps.experiment.plan import EXPERIMENT_STAGES
+from workbench.steps.experiment.plan import experiment as plan_experiment
+from workbench.steps.experiment.planned import Experiment, Wanted, read_rivals, rivals_of
+from workbench.steps.loop_figures import Limits, Traces
+from workbench.steps.robust.robust import ROBUST, ROBUST_STAGES, Robust, RobustAsked
+from workbench.steps.robust.robust import robust_design as robust_of_model
+from workbench.steps.schedule import scheduled
 from workbench.steps.validate import Validation
+from workbench.steps.validate import validate as validate_design
 
 if TYPE_CHECKING:
+    from typing import Literal
+
     import pandas as pd
 
     from design.schedule import Over
+    from design.tune import Asked, Goals
+    from workbench.documents.design import Structure
 
 
 class ControlLoop(NamedTuple):
@@ -62,15 +81,17 @@ class DesignResult(Result):
         feedback, forward = controller_to_control(there[wanted].rst)
         return ControlLoop(to_control(plant.A, plant.B, plant.h), feedback, forward)
 
-    def scheduled(self, over: "Over") -> "DesignResult":
+    def scheduled(
+        self, over: "Over", asked: "Asked | None" = None, goals: "Goals | None" = None
+    ) -> "DesignResult":
         """The same with a gain schedule of its PID and P-PI over "place", "load" or "direction", as
-        `workbench design --schedule`.
+        `workbench design --schedule`; asked, goals: poles and margins at each point.
 
         Raises BadModel where the model's friction does not change over it.
         """
-        from workbench.steps.schedule import scheduled
-
-        return DesignResult(scheduled(self.model, self.design, over), self.model)
+        with working("designing"):
+            found = scheduled(self.model, self.design, over, asked, goals)
+        return DesignResult(found, self.model)
 
     def _made(self) -> View:
         return design_view(self.design, self.model.rotary)
@@ -140,3 +161,106 @@ class ExperimentResult(Result):
 
     def _made(self) -> View:
         return experiment_view(self.found)
+
+
+DesignLike: TypeAlias = DesignResult | Design | PathLike
+
+
+def design(
+    model: ModelLike, *, poles: tuple[float, float] | None = None,
+    auxiliary: Sequence[complex] | None = None, integrator: bool = True,
+    source: "Literal['physical', 'arx'] | None" = None, period: float | None = None,
+    goals: "Goals | None" = None, structures: "Sequence[Structure] | None" = None,
+) -> DesignResult:  # fmt: skip
+    """PID and RST for a model by pole placement, and P-PI cascades, as `workbench design`.
+
+    poles: w_n [rad/s] and damping of the dominant pair, auxiliary: the others, values of z; both
+    searched where not given. source: the plant to design on; period: of the position loop [s];
+    goals: margins to keep, by default those of the command; structures: of "rst", "pid", "p-pi".
+    Raises BadSpecification where the poles cannot be placed, NotIdentifiable where the model
+    carries no design.
+    """
+    from design.tune import Asked
+    from design.tune import Goals as DesignGoals
+
+    known = model_of(model)
+    asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
+    wanted = goals or DesignGoals(effort=effort_limit(known))
+    with working("designing"):
+        found = design_of_model(
+            known, asked, goals=wanted, source=source, period=period, structures=structures
+        )
+    return DesignResult(found, known)
+
+
+def robust_design(
+    model: ModelLike, wanted: RobustAsked | None = None, *,
+    poles: tuple[float, float] | None = None, auxiliary: Sequence[complex] | None = None,
+    integrator: bool = True, source: "Literal['physical', 'arx'] | None" = None,
+    period: float | None = None,
+) -> RobustResult:  # fmt: skip
+    """The design that does best over the machines that a model's errors allow, as `workbench design
+    --robust`.
+
+    wanted: machines drawn, limits, on what share of the machines each has to hold; the others as
+    `design` has them. Raises BadSpecification where no loop can be placed,
+    NotIdentifiable where the mass is not known.
+    """
+    from design.tune import Asked
+
+    known = model_of(model)
+    asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
+    with running("robust design", ROBUST_STAGES, math.inf) as course:
+        found = robust_of_model(
+            known, wanted or RobustAsked(), asked, where=(source, period), report=course.report
+        )
+    return RobustResult(found, known)
+
+
+def validate(
+    model: ModelLike, design: DesignLike, *, plant: ModelLike | None = None,
+    limits: Limits | None = None, seed: int = 0,
+) -> ValidateResult:  # fmt: skip
+    """A design on its model in the simulated loop, as `workbench validate`.
+
+    plant: another machine on which it has to work too; limits: what the tested controller keeps.
+    """
+    known, made = model_of(model), _design(design)
+    other = None if plant is None else model_of(plant)
+    with working("simulating the loop"):
+        rng = np.random.default_rng(seed)
+        found, traces = validate_design(known, made, rng, plant=other, limits=limits)
+    return ValidateResult(found, traces, known.rotary)
+
+
+def experiment(
+    model: ModelLike, *, design: DesignLike | None = None, wanted: Wanted | None = None,
+    rivals: "TraceResult | PathLike | None" = None, budget: float = 30.0,
+) -> ExperimentResult:  # fmt: skip
+    """The run to make next on a machine, as `workbench experiment`.
+
+    design: whose controller moves the machine, by default the model's present one; wanted:
+    parameters, limits, seed, keys of effects that are to be discriminated; rivals: a trace that
+    leaves such effects open. budget [s]: end the search after so long. Raises NotIdentifiable where
+    no run within the limits identifies anything.
+    """
+    known = model_of(model)
+    asked = wanted or Wanted()
+    if rivals is not None:
+        asked = replace(asked, rivals=_rivals(rivals, known))
+    made = None if design is None else _design(design)
+    with running("experiment", EXPERIMENT_STAGES, budget) as course:
+        found = plan_experiment(known, asked, made, course.report, course.keep_going)
+    return ExperimentResult(found)
+
+
+def _design(given: DesignLike) -> Design:
+    made = read_design(Path(given)) if isinstance(given, str | os.PathLike) else given
+    return made.design if isinstance(made, DesignResult) else made
+
+
+def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:
+    """Keys of the effects that a trace leaves open."""
+    if isinstance(given, TraceResult):
+        return rivals_of(given.document, model, model.library)
+    return read_rivals(Path(given), model, model.library)

@@ -1,21 +1,32 @@
-"""Results that hold the model of a machine: of `identify` and `trace`."""
+"""`identify` and `trace`, as the commands of these names, and what they find of a machine."""
 
 import importlib
+import math
+import os
+import time
 import warnings
 from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from identification.errors import BadModel, UserError
+from identification.errors import BadCard, BadModel, UserError
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
+from workbench.cards.own_effects import library
+from workbench.course import running
 from workbench.documents.model import Model
+from workbench.documents.model_file import read_model
+from workbench.interface.inputs import CardLike, Logs, PathLike, RigLike, Signals, sources
 from workbench.interface.result import Result
 from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
 from workbench.report.view import View
-from workbench.steps.identify_sources import Identified
-from workbench.steps.trace import Traced
+from workbench.steps.identify import Options
+from workbench.steps.identify_sources import Identified, identify_sources
+from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
+from workbench.steps.trace import Traced, named_logs, trace_sources
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -160,3 +171,80 @@ def _arviz() -> Any:
             "to_arviz needs the library 'arviz', which is not installed; run"
             " pip install 'servo-workbench[arviz]'"
         ) from None
+
+
+ModelLike: TypeAlias = IdentifyResult | TraceResult | Model | PathLike
+
+
+def identify(
+    logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, options: Options | None = None, posterior: bool = False,
+    budget: float | None = None, seed: int = 0,
+) -> IdentifyResult:  # fmt: skip
+    """Friction, plant and actuator of a machine from its logs, as `workbench identify`.
+
+    options: what drives the fitted run, orders and period of the ARX plant; posterior: sample it
+    too, which takes half a minute and more. budget [s]: end after so long with the best so far, and
+    on Ctrl-C. Raises NotIdentifiable where nothing is identifiable.
+    """
+    begun = time.monotonic()
+    found = sources(logs, card, rig, signals)
+    with running("identifying", IDENTIFY_STAGES, left_of(budget, begun)) as course:
+        known = identify_sources(
+            found, options, seed, posterior=posterior, on_progress=course.report,
+            keep_going=course.keep_going,
+        )  # fmt: skip
+    return IdentifyResult(found.card, known)
+
+
+def trace(
+    train: Logs | None = None, test: Logs | None = None, card: CardLike | None = None, *,
+    rig: RigLike | None = None, signals: Signals | None = None,
+    effects: Iterable[PathLike] = (), budget: float | None = None, seed: int = 0,
+) -> TraceResult:  # fmt: skip
+    """The effect that the model of a machine lacks, as `workbench trace`.
+
+    test: held-out logs, which neither fit nor choice sees; without them stretches of the training
+    logs are left out in turn, and without `train` the card's [split] names both. effects: folders
+    of your own, whose Python is run. budget [s]: end after so long with the best so far, as Ctrl-C
+    does. Raises NotIdentifiable where too little slides.
+    """
+    begun = time.monotonic()
+    known = library([Path(one) for one in effects])
+    if train is None:
+        if card is None or isinstance(card, Card):
+            raise BadCard("no log given; give train, or the path or name of a card with a [split]")
+        names, held_out = named_logs((), (), os.fspath(card))
+        train, test = list(names), list(held_out) or None
+    learnt = sources(train, card, rig, signals)
+    seen = None if test is None else sources(test, learnt.card, None, None)
+    left = left_of(math.inf if budget is None else budget, begun)
+    with running("trace", TRACE_STAGES, left) as course:
+        found = trace_sources(
+            learnt, seen, known, seed, course.report, keep_going=course.keep_going
+        )
+    return TraceResult(learnt.card, found)
+
+
+def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:
+    """The model in the file, its effects also of your own folders, whose Python is run."""
+    return read_model(Path(path), library([Path(one) for one in effects]))
+
+
+def model_of(given: ModelLike) -> Model:
+    """The model that was given, of a result or in a file."""
+    if isinstance(given, Model):
+        return given
+    if isinstance(given, IdentifyResult | TraceResult):
+        return given.model
+    if isinstance(given, str | os.PathLike):
+        return load_model(given)
+    raise BadModel(
+        f"{type(given).__name__} found, a model needed: the path of a model.json, or what identify"
+        " or trace gave"
+    )
+
+
+def left_of(budget: float | None, begun: float) -> float | None:
+    """What is left of a budget [s] that began then."""
+    return None if budget is None else budget - (time.monotonic() - begun)

@@ -30,13 +30,14 @@ class Result(ABC):
         """How the result is shown."""
 
     @cached_property
-    def _view(self) -> View:
+    def view(self) -> View:
+        """The result as terminal, page, notebook and picture show it."""
         return self._made()
 
     @property
     def document(self) -> Mapping[str, Any]:
         """The document that the command writes, as plain values."""
-        return self._view.document
+        return self.view.document
 
     def to_json(self) -> str:
         """The document as strict JSON, letter for letter what the command writes."""
@@ -44,21 +45,21 @@ class Result(ABC):
 
     def report(self) -> str:
         """The report as one HTML page, as the command writes it."""
-        return self._view.page()
+        return self.view.page()
 
     def plot(self) -> "Figure":
         """The main chart, a figure of matplotlib."""
-        return self._view.figure()
+        return self.view.figure()
 
     def save(self, out: PathLike | None = None) -> Path:
         """The folder that now holds the command's files: `out`, or runs/<time>-<command>."""
         folder = None if out is None else Path(out)
         with OutputFolder(self._command, folder, now=datetime.now()) as target:
-            self._view.write(target)
+            self.view.write(target)
         return target.final
 
     def __repr__(self) -> str:
-        return self._view.screen().text(rest="report()").rstrip()
+        return self.view.screen().text(rest="report()").rstrip()
 
     def _repr_html_(self) -> str:
-        return self._view.html()
+        return self.view.html()

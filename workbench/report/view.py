@@ -169,9 +169,9 @@ class View:
         return [line.replace(OUT, where) for line in self.then]
 
 
-def show(view: View, folder: Path, as_json: bool, then: Step | None = None, **more: object) -> None:
+def show(view: View, folder: Path, then: Step | None = None, **more: object) -> None:
     """Print a result that lies in the folder: as JSON, with `more` in it, or on one screen.
 
     then: the command to type next.
     """
-    emit({**view.document, **more, "out": folder}, as_json, lambda: view.screen(folder), then)
+    emit({**view.document, **more, "out": folder}, lambda: view.screen(folder), then)
