@@ -37,11 +37,12 @@ from workbench.report.experiment import experiment_view
 from workbench.report.first_card import proposal_view
 from workbench.report.installation import installation_view
 from workbench.report.prediction import prediction_view
-from workbench.report.reports import design_view, identified_view, validation_view
+from workbench.report.reports import design_view, identified_view
 from workbench.report.response import response_view
 from workbench.report.robust import robust_view
 from workbench.report.trace import traced_view
 from workbench.report.trace_words import words
+from workbench.report.validation import validation_view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.drift import Drifted

@@ -19,8 +19,9 @@ from workbench.interface.inputs import PathLike
 from workbench.interface.models import ModelLike, TraceResult, model_of
 from workbench.interface.result import Result
 from workbench.report.experiment import experiment_view
-from workbench.report.reports import design_view, validation_view
+from workbench.report.reports import design_view
 from workbench.report.robust import robust_view
+from workbench.report.validation import validation_view
 from workbench.report.view import View
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit

@@ -17,7 +17,7 @@ from identification.errors import BadModel
 from workbench.documents.model import Model
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
-from workbench.report.drift_tables import reason_sentence
+from workbench.report.drift import reason_sentence
 from workbench.steps.drift import Drifted, Stream, detectable_sizes, drift_of, model_key
 
 TestedDrift = Literal["none", "drift", "structure", "not_judged"]

@@ -23,7 +23,7 @@ from workbench.logs.sources import Sources, read_sources
 from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE
 from workbench.registry.bench import TaskKind
-from workbench.report.fit import fit
+from workbench.report.fit import fit_chart, residual
 from workbench.report.missing_force import missing_over_time
 from workbench.report.model_tables import (
     MODEL_HEAD,
@@ -34,7 +34,6 @@ from workbench.report.model_tables import (
     summary,
 )
 from workbench.report.reports import identified_view
-from workbench.report.residual import residual
 from workbench.report.trace import traced_view
 from workbench.report.trace_pictures import against_signal, pictures
 from workbench.report.trace_tables import errors_table, logs_of_trace
@@ -111,7 +110,8 @@ def _identified(sources: Sources, course: Course) -> Made:
         "report": identified_view(found).page(),
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
-    drawn = (fit(model, found.sources, runs), *residual(model, found.sources, runs, missing))
+    fit = Section("Fit over time", fit_chart(model, found.sources, runs))
+    drawn = (fit, *residual(model, found.sources, runs, missing))
     return model, {"model": model_document(model)}, result, drawn
 
 

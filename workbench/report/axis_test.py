@@ -1,17 +1,14 @@
 """The axis test on one page: a light, why, the numbers with their limits, and two pictures."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from identification.arrays import Array
 from workbench.cards.readable import in_digits, number, shown_unit, units_of
 from workbench.output import Row
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.templating import render
 from workbench.report.view import Section, View
 from workbench.screen import listed, tabled
-from workbench.steps.axis_test import AxisTest, Earlier, Quantity, axis_document
+from workbench.steps.axis_test import AxisTest, Quantity, axis_document
 
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
 LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
@@ -28,13 +25,8 @@ def axis_sentence(test: AxisTest) -> str:
     judged = sum(1 for one in test.quantities if one.light)
     if test.light == "green":
         return f"{light}: {test.machine} is within its limits in {judged} of {judged} quantities."
-    return f"{light}: {_first(test)}."
-
-
-def _first(test: AxisTest) -> str:
-    """The first reason, and how many more there are."""
     first, *rest = test.reasons
-    return f"{first} (and {len(rest)} more)" if rest else first
+    return f"{light}: {first}{f' (and {len(rest)} more)' if rest else ''}."
 
 
 def _row(one: Quantity) -> Row:
@@ -81,42 +73,44 @@ def _sections(test: AxisTest) -> list[Section]:
     facts = [
         f"log {test.source.file}, {number(log.duration, 4)} s at {number(1.0 / log.h, 4)} Hz",
         f"{test.breakaways[0]} breakaways in positive, {test.breakaways[1]} in negative direction",
-        _limits_said(test.earlier),
+        "limits of the card alone; no registry was given",
     ]
+    if test.earlier is not None:
+        many = max((len(values) for values in test.earlier.values.values()), default=0)
+        facts[-1] = (
+            f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of"
+            " few logs; never nearer than 2 %, of breakaway 5 %)"
+        )
+    reasons, most = list(test.reasons), MOST_REASONS
+    if len(reasons) > most:
+        reasons[most - 1 :] = [f"{len(reasons) - most + 1} more, which the table shows"]
+    if len(reasons) == 1:  # which stands beside the lamp
+        reasons = []
     body = render(
         "axis_test", light=test.light, sentence=axis_sentence(test).partition(": ")[2],
-        reasons=_few(test.reasons),
-        head=AXIS_HEAD, rows=[(_row(one), one) for one in test.quantities],
+        reasons=reasons, head=AXIS_HEAD, rows=[(_row(one), one) for one in test.quantities],
     )  # fmt: skip
     drawn = "".join(str(chart_html(one)) for one in axis_charts(test))
-    end = render("axis_test_end", facts=[one for one in facts if one], remarks=test.remarks)
+    end = render("axis_test_end", facts=facts, remarks=test.remarks)
     return [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
-
-
-def _few(reasons: Sequence[str]) -> list[str]:
-    """Reasons for a printed page: none where there is but one, which stands beside the lamp."""
-    if len(reasons) == 1:
-        return []
-    if len(reasons) <= MOST_REASONS:
-        return list(reasons)
-    left = len(reasons) - MOST_REASONS + 1
-    return [*reasons[: MOST_REASONS - 1], f"{left} more, which the table shows"]
 
 
 def axis_charts(test: AxisTest) -> list[Chart]:
     """Friction along the travel and, where there is a past, over the last logs."""
-    along = Chart("travel", "Coulomb friction of each direction along the travel",
-                  [along_panel(test)], shared_x=False)  # fmt: skip
-    past = [panel for name, said in EACH_DIRECTION if (panel := history_panel(test, name, said))]
+    what = "Coulomb friction of each direction along the travel"
+    along = Chart("travel", what, [_along_panel(test)], shared_x=False)
+    past = [panel for name, said in EACH_DIRECTION if (panel := _history_panel(test, name, said))]
     if not past:
         return [along]
-    return [along, Chart("logs", "Coulomb friction over the last logs, with its limits", past,
-                         columns=2)]  # fmt: skip
+    what = "Coulomb friction over the last logs, with its limits"
+    return [along, Chart("logs", what, past, columns=2)]
 
 
-def along_panel(test: AxisTest) -> Panel:
+def _along_panel(test: AxisTest) -> Panel:
     """Coulomb friction of both directions along the travel, as sizes."""
     units, travel = units_of(test.rotary), test.travel
+    found = np.concatenate([travel.positive, travel.negative])
+    found = found[np.isfinite(found)]
     x = units.position.factor * travel.place
     up, down = travel.positive, travel.negative
     return Panel(
@@ -126,11 +120,11 @@ def along_panel(test: AxisTest) -> Panel:
         "along the travel",
         areas=[Area("", x, up - 2 * travel.positive_sd, up + 2 * travel.positive_sd),
                Area("", x, down - 2 * travel.negative_sd, down + 2 * travel.negative_sd)],
-        y_range=_from_zero(up, down), height=AXIS_HEIGHT,
+        y_range=(0.0, 1.2 * float(np.max(found)) if len(found) else 1.2), height=AXIS_HEIGHT,
     )  # fmt: skip
 
 
-def history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
+def _history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
     """A Coulomb level over the last logs and this one, with its limits; None without a past."""
     one = test.of(name)
     past = [value for _, value in test.earlier.values.get(name, ())] if test.earlier else []
@@ -141,36 +135,12 @@ def history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
     lines = [Line("earlier logs", np.arange(-len(past), len(own), 1.0), values, "measured")]
     if own:
         lines.append(Line("this log", np.array([-0.4, 0.4]), np.repeat(own, 2), "model", "bold"))
-    limits = one.allowed
-    bands = [] if limits is None else [Band("limits", limits.low, limits.high)]
-    edges = [] if limits is None else [limits.low, limits.high]
+    bands = [] if one.allowed is None else [Band("limits", one.allowed.low, one.allowed.high)]
+    every = np.array([*values, *(edge for band in bands for edge in (band.low, band.high))])
+    low, high = float(np.nanmin(every)), float(np.nanmax(every))
+    room = 0.1 * (high - low) or 0.1 * abs(high)
     return Panel(
         "logs before this one", f"friction [{units_of(test.rotary).force.name}]", lines,
         f"{said}, over the last logs", bands=bands, x_range=(-len(past) - 0.5, 0.6),
-        y_range=_close(values, np.array(edges)), height=AXIS_HEIGHT,
+        y_range=(low - room, high + room), height=AXIS_HEIGHT,
     )  # fmt: skip
-
-
-def _from_zero(*values: Array) -> tuple[float, float]:
-    """From 0 to a little above the largest."""
-    most = max((float(np.nanmax(one)) for one in values if np.any(np.isfinite(one))), default=1.0)
-    return 0.0, 1.2 * most
-
-
-def _close(*values: Array) -> tuple[float, float]:
-    """From a little below the lowest to a little above the highest."""
-    every = np.concatenate(values)
-    low, high = float(np.nanmin(every)), float(np.nanmax(every))
-    room = 0.1 * (high - low) or 0.1 * abs(high)
-    return low - room, high + room
-
-
-def _limits_said(earlier: Earlier | None) -> str:
-    if earlier is None:
-        return "limits of the card alone; no registry was given"
-    many = max((len(values) for values in earlier.values.values()), default=0)
-    return (
-        f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of few"
-        " logs; never nearer than 2 %, of"
-        " breakaway 5 %)"
-    )

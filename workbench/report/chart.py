@@ -7,7 +7,7 @@ once: uPlot, the script that draws, and their style, to be inlined or served as 
 import base64
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
@@ -78,6 +78,13 @@ class Part(NamedTuple):
     high: float
 
 
+def parts_of(names: Sequence[str], begins: Sequence[float], ends: Sequence[float]) -> list[Part]:
+    """The logs of these names, in a row; none of a single one, or where they are not all named."""
+    if not len(names) == len(begins) > 1:
+        return []
+    return [Part(*one) for one in zip(names, begins, ends, strict=True)]
+
+
 @dataclass(frozen=True, eq=False)
 class Panel:
     """One pair of axes: `x` and `y` are their labels with unit.
@@ -105,7 +112,8 @@ class Panel:
 class Chart:
     """Panels below each other, or two a row; `name` is its own on a page.
 
-    description: what it shows, for those who do not see it. shared_x: all panels zoom together.
+    description: what it shows, for those who do not see it. caption: below it. shared_x: all panels
+    zoom together.
     """
 
     name: str
@@ -113,14 +121,15 @@ class Chart:
     panels: Sequence[Panel]
     columns: Literal[1, 2] = 1
     shared_x: bool = True
-    parts: Sequence[Part] = field(default=())
+    parts: Sequence[Part] = ()
+    caption: str = ""
 
 
-def chart_html(chart: Chart, caption: str = "") -> Any:
+def chart_html(chart: Chart) -> Any:
     """The figure of a chart: its data as JSON, which the script of `chart_assets` draws."""
     # "<" could end the element that holds the data.
     data = json.dumps(chart_data(chart), allow_nan=False).replace("<", "\\u003c")
-    return safe(render("chart", chart=chart, data=safe(data), caption=caption))
+    return safe(render("chart", chart=chart, data=safe(data)))
 
 
 def chart_data(chart: Chart) -> dict[str, Any]:
@@ -157,6 +166,13 @@ class _Column(NamedTuple):
     line: Line
     edge: Literal["", "lower", "upper"] = ""
 
+    @property
+    def entry(self) -> dict[str, Any]:
+        """Name, colour and look, as JSON has them."""
+        line, upper = self.line, {"upper": self.edge == "upper"} if self.edge else {}
+        look = "edge" if self.edge else line.style
+        return {"name": line.name, "colour": line.colour, "look": look, **upper}
+
 
 def _columns(panel: Panel) -> list[_Column]:
     out = []
@@ -181,19 +197,12 @@ def _panel(panel: Panel, points: int) -> dict[str, Any]:
         "bands": [band._asdict() for band in panel.bands],
         "marks": [mark._asdict() for mark in panel.marks],
         "tables": tables,
-        "lines": [_line_entry(column) for group in groups for column in group],
+        "lines": [column.entry for group in groups for column in group],
     }
 
 
 def _dots(*columns: _Column) -> bool:
     return any(column.line.style == "dots" for column in columns)
-
-
-def _line_entry(column: _Column) -> dict[str, Any]:
-    line = column.line
-    style = "edge" if column.edge else line.style
-    out = {"name": line.name, "colour": line.colour, "look": style}
-    return {**out, "upper": column.edge == "upper"} if column.edge else out
 
 
 def _table(group: list[_Column], points: int) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import not_identified
 from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
-from workbench.report.validation_tables import (
+from workbench.report.validation import (
+    error_cells,
     validation_lines,
     validation_sentence,
     validation_table,
@@ -22,7 +23,6 @@ from workbench.report.view import notes
 from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
-from workbench.steps.recommend import percent, settling_words
 from workbench.steps.trace import effect_estimates
 
 SIMULATED = (
@@ -105,14 +105,7 @@ def _figures(one: LoopFigures) -> Row:
     if not one.stable:
         return ("runs away", "-", "-", "-", "-", "-")
     margin = "-" if one.margins is None else f"{one.margins.modulus:.2f}"
-    return (
-        percent(one.standstill_relative),
-        percent(max(one.overshoot, 0.0)),
-        settling_words(one),
-        percent(one.smooth_relative),
-        f"{one.force_peak:.3g}",
-        margin,
-    )
+    return (*error_cells(one), margin)
 
 
 def _friction(found: Demonstration) -> list[Row]:

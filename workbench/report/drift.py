@@ -1,22 +1,20 @@
-"""A drift test: verdict, parameters before and after, the statistic over the logs."""
+"""A drift test in words, tables and pictures: verdict, parameters before and after, the
+statistic over the logs."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from identification.arrays import Array
-from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, chart_html
-from workbench.report.drift_tables import (
-    detectable_lines,
-    drift_parts,
-    drift_sentence,
-    logs_of_drift,
-    run_table,
-    shift_table,
-    then_of_drift,
-    what_the_columns_say,
-)
-from workbench.report.view import Section, View, lines_section, report_notes, table_section
+from identification.drift.drift_result import DriftTest, Shift, Statistic
+from identification.estimation.estimates import reported_estimate
+from workbench.cards.readable import number, shown_unit
+from workbench.output import Row
+from workbench.remarks import printed_once
+from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
+from workbench.report.model_tables import reasons_once
+from workbench.report.view import Section, View, notes, report_notes
+from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]
@@ -55,19 +53,19 @@ def drift_view(found: Drifted, model_name: str) -> View:
 
 
 def _sections(found: Drifted) -> list[Section]:
-    sections, logs = [], table_section("The logs", run_table(found))
+    sections, logs = [], Section("The logs", run_table(found))
     judged = _judged(found)
     if judged:
         last = judged[-1]
-        picture = chart_html(drift_chart(found, last), DRIFT_CAPTION)
+        picture = drift_chart(found, last)
         sections.append(Section("Before and after, and over the logs", picture))
     sections.append(logs)
     if judged:
         title = f"Parameters before and after, {last.source.file}"
-        sections.append(table_section(title, shift_table(last)))
+        sections.append(Section(title, shift_table(last)))
     lines = [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
     notes = report_notes(lines, logs_of_drift(found))
-    return [*sections, lines_section("Notes", notes)]
+    return [*sections, Section("Notes", notes)]
 
 
 def _judged(found: Drifted) -> list[Tested]:
@@ -78,7 +76,7 @@ def drift_chart(found: Drifted, last: Tested) -> Chart:
     """The parameters of a tested run before and after, and the statistics over the logs."""
     what = "Parameters before and after, and the statistic over logs"
     panels = [_changes(found, last), _over_logs(found)]
-    return Chart("drift", what, panels, columns=2, shared_x=False)
+    return Chart("drift", what, panels, columns=2, shared_x=False, caption=DRIFT_CAPTION)
 
 
 def _changes(found: Drifted, last: Tested) -> Panel:
@@ -137,3 +135,200 @@ def _over_logs(found: Drifted) -> Panel:
 
 def _known(values: Sequence[float | None]) -> Array:
     return np.array([np.nan if one is None else max(one, LEAST_STATISTIC) for one in values])
+
+
+def drift_sentence(found: Drifted) -> str:
+    """The verdict over all runs in one or two plain sentences."""
+    tests = [one.test for one in found.tests]
+    if found.verdict == "structure":
+        names = _files(found, "structure")
+        return (
+            f"Another structure: no parameters of the model follow {names}. This is no drift;"
+            " trace finds the effect that joined."
+        )
+    if found.verdict == "drift":
+        last = [test for test in tests if test.verdict == "drift"][-1]
+        return f"Drift in {_files(found, 'drift')}: {_what_changed(last)}; the structure holds."
+    if found.verdict == "not_judged":
+        newest = [test for test in tests if test.tested] or tests
+        return f"INCONCLUSIVE, which is no all-clear: {newest[-1].reason}"
+    known = sum(test.verdict == "none" for test in tests)
+    margin = f"{100 * found.settings.margin:.3g} %"
+    said = f"No drift in {known} of {len(tests)} log(s): no change significantly beyond {margin}."
+    coarse = sum(test.verdict == "not_judged" for test in tests)
+    return said + (f" {coarse} INCONCLUSIVE: see the notes." if coarse else "")
+
+
+def _what_changed(test: DriftTest) -> str:
+    """The parameters that changed, and those of which nobody can say it."""
+    parts = [", ".join(_changed(shift) for shift in test.moved)] if test.moved else []
+    if test.unsure:
+        names = ", ".join(test.unsure)
+        first = "something changed" if not parts else "something more"
+        parts.append(f"{first}, this log cannot say which of: {names}")
+    return "; ".join(parts)
+
+
+def detectable_sentence(test: DriftTest, limit: float) -> str:
+    """The minimum detectable changes of a test, and on which parameters it is inconclusive.
+
+    limit: relative change that it must be able to see. "" where nothing was tested.
+    """
+    sizes = test.could_have_seen
+    if not sizes:
+        return ""
+    seen = [f"{n} {_percent(x)}" for n, x in sizes.items() if x <= limit]
+    coarse = [f"{n} ({_percent(x)})" for n, x in sizes.items() if x > limit]
+    coarse += [f"{n} (not identifiable)" for n in test.not_judged]
+    said = f"minimum detectable change: {', '.join(seen) or 'none'}"
+    return said + (f"; inconclusive: {', '.join(coarse)}" if coarse else "")
+
+
+def reason_sentence(test: DriftTest, limit: float) -> str:
+    """Why a test has its verdict and, without an alarm, its minimum detectable changes."""
+    seen = "" if test.found_by else detectable_sentence(test, limit)
+    return "; ".join(filter(None, (test.reason or _all_that_moved(test), seen)))
+
+
+def _all_that_moved(test: DriftTest) -> str:
+    if not test.found_by:
+        return "no parameter has moved"
+    by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
+    moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
+    if test.unsure:
+        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
+    return f"moved{by}: {', '.join(moved)}"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %" if value < 1.0 else "more than 100 %"
+
+
+def _files(found: Drifted, verdict: str) -> str:
+    names = [one.source.file for one in found.tests if one.test.verdict == verdict]
+    return ", ".join(dict.fromkeys(names))
+
+
+def _changed(shift: Shift) -> str:
+    change, low, high = (signed_percent(x) for x in (shift.change, shift.low, shift.high))
+    return f"{shift.name} {change} ({low} to {high})"
+
+
+def signed_percent(value: float) -> str:
+    """A relative change in percent, with its sign."""
+    return f"{100 * value:+.2f} %" if abs(value) < 0.1 else f"{100 * value:+.1f} %"
+
+
+def run_table(found: Drifted) -> Part:
+    """Every run's verdict and statistics."""
+    head = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
+    return tabled(head, [_run_row(one) for one in found.tests], right=(), latest=True)
+
+
+def _run_row(one: Tested) -> Row:
+    test = one.test
+    chi = "-" if test.chi_square is None else f"{test.chi_square:.3g} of {test.allowed:.3g}"
+    return (
+        one.source.file,
+        test.verdict.replace("_", " "),
+        _over(test.single),
+        _over(test.mean),
+        chi,
+        ", ".join([*(shift.name for shift in test.moved), *(f"{n}?" for n in test.unsure)]) or "-",
+    )
+
+
+def _over(found: Statistic | None) -> str:
+    return "-" if found is None else f"{found.value:.3g} of {found.threshold:.3g}"
+
+
+def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
+    """Every parameter of a run before and after; those inconclusive with the reason."""
+    head = ("parameter", "before", "after", "unit", "change", "95 % interval")
+    rows = [_shift_row(shift) for shift in one.test.shifts.values()]
+    rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
+    once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
+    return tabled(head, once, right=(1, 2), whole=rows)
+
+
+def _shift_row(shift: Shift) -> Row:
+    interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
+    pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
+    values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
+    unit, factor = shown_unit(shift.unit)
+    before, after = ("-" if value is None else number(factor * value, 5) for value in values)
+    return (shift.name, before, after, unit, signed_percent(shift.change), interval)
+
+
+def then_of_drift(found: Drifted) -> list[str]:
+    """What to do next after a drift test."""
+    match found.verdict:
+        case "drift":
+            logs = _files(found, "drift").replace(", ", " ")
+            return [f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and"
+                    " a controller of the machine as it is now"]  # fmt: skip
+        case "structure":
+            logs = _files(found, "structure").replace(", ", " ")
+            return [f"`workbench trace {logs} --card CARD` finds the effect that joined"]
+        case "not_judged":
+            return ["log longer, with more speeds, reversals and rests; the notes give the minimum"
+                    " detectable change"]  # fmt: skip
+        case _:
+            return ["nothing to change; test the next log with the same `--state FILE`, which finds"
+                    " slow changes too"]  # fmt: skip
+
+
+def what_the_columns_say(found: Drifted) -> list[str]:
+    """Legend of the tables, and what counts as a change."""
+    setting = found.settings
+    return [
+        "this log, mean of logs: drift statistic, of its threshold; chi-square: residual of the"
+        " model, of its limit",
+        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where"
+        f" significant: thresholds for a false alarm in {setting.run_length:g} logs or more",
+        "the intervals contain the errors of the model and of the log, and how much the machine"
+        " varies"
+        f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
+    ]
+
+
+def detectable_lines(found: Drifted) -> list[str]:
+    """The minimum detectable change of each test, and why a log was inconclusive."""
+    out = []
+    for one in found.tests:
+        said = detectable_sentence(one.test, found.settings.to_be_seen)
+        if said:
+            out.append(f"{one.source.file}: {said}")
+        if one.test.reason:
+            out.append(one.test.reason)
+        if one.test.found_by == "mean":
+            out.append(f"{one.source.file}: found by the mean over the logs, not by this log alone")
+    return out
+
+
+def logs_of_drift(found: Drifted) -> tuple[str, ...]:
+    """Names of the logs, as remarks begin with them."""
+    names = ((one.source.file, one.source.log.name) for one in found.tests)
+    return tuple(dict.fromkeys(name for both in names for name in both))
+
+
+def drift_parts(found: Drifted) -> list[Part | str]:
+    """Every run, the parameters of the last one, and what to know of the tests."""
+    logs = logs_of_drift(found)
+    legend, seen = what_the_columns_say(found), detectable_lines(found)
+    # What is inconclusive, and why, stands in the table too.
+    once = printed_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
+    short = [line for line in once if line not in drift_sentence(found)]
+    return [
+        run_table(found),
+        shift_table(found.tests[-1], logs),
+        instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]),
+        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True),
+        notes(found.remarks, logs),
+    ]
+
+
+def _swapped(row: Row) -> Row:
+    """A row of `shift_table` with the unit after the change, as `reasons_once` has it; or back."""
+    first, second = row[3:5]
+    return (*row[:3], second, first, *row[5:])

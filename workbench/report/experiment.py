@@ -5,7 +5,7 @@ import numpy as np
 from workbench.cards.parameter_units import shown
 from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
-from workbench.report.view import Section, View, notes, table, table_section
+from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.experiment.planned import Experiment, Promised, experiment_document
 
@@ -36,20 +36,17 @@ def reference_text(found: Experiment) -> str:
     return "\n".join([f"t [s],r [{unit}]", *rows, ""])
 
 
-def promise_table(found: Experiment) -> Part:
-    """A row a parameter."""
+def _promised(found: Experiment) -> Part:
     return tabled(PROMISE_HEAD, map(_row, found.promise), right=(1, 3, 4, 5))
 
 
 def _row(one: Promised) -> Row:
     now = "not identifiable" if one.before is None else f"{one.before:.2g}"
     after = "not identifiable" if one.after is None else f"{one.after:.2g}"
-    share = "-" if one.after is None or one.value == 0.0 else _percent(one.after / abs(one.value))
+    share = "-"
+    if one.after is not None and one.value != 0.0:
+        share = f"{100.0 * one.after / abs(one.value):.2g} %"
     return one.name, f"{one.value:.4g}", one.unit, now, after, share
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
 
 
 def experiment_lead(found: Experiment) -> str:
@@ -59,28 +56,23 @@ def experiment_lead(found: Experiment) -> str:
     what = (
         f"{len(identified)} of {len(found.promise)} parameters identifiable from a run of {seconds}"
     )
-    worst = max(
-        identified, key=lambda one: (one.after or 0.0) / max(abs(one.value), 1e-300), default=None
-    )
+    shares = [((one.after or 0.0) / max(abs(one.value), 1e-300), one) for one in identified]
+    share, worst = max(shares, key=lambda both: both[0], default=(0.0, None))
     if worst is not None and worst.value != 0.0:
-        share = (worst.after or 0.0) / abs(worst.value)
-        what += f"; the least certain, {worst.name}, within {_percent(share)}"
+        what += f"; the least certain, {worst.name}, within {100.0 * share:.2g} %"
     if found.separation:
         least = min(found.separation, key=lambda one: one.deviations)
         what += (
             f". Hardest to discriminate: {least.one} and {least.other}, by"
             f" {least.deviations:.3g} standard deviations of the noise"
         )
-    return f"{what}. {_safe(found)}"
-
-
-def _safe(found: Experiment) -> str:
-    many = found.safety.machines
-    if found.safety.exceeding:
-        return f"NOT SAFE: {found.safety.exceeding} of {many} simulated machines exceed a limit."
-    return (
+    exceeding, many = found.safety.exceeding, found.safety.machines
+    safe = (
         f"No limit is exceeded on {many} simulated machines drawn from what the model leaves open."
     )
+    if exceeding:
+        safe = f"NOT SAFE: {exceeding} of {many} simulated machines exceed a limit."
+    return f"{what}. {safe}"
 
 
 def limit_lines(found: Experiment) -> list[str]:
@@ -115,7 +107,7 @@ def experiment_view(found: Experiment) -> View:
         f"The run to make next on {found.card}",
         experiment_lead(found),
         [
-            promise_table(found),
+            _promised(found),
             listed(limit_lines(found)),
             more(listed(search_lines(found))),
             notes(found.remarks),
@@ -138,16 +130,16 @@ def _sections(found: Experiment) -> list[Section]:
         for i, one in enumerate(found.segments)
     ]  # fmt: skip
     lines = [*limit_lines(found), *search_lines(found), *found.remarks]
-    promised = table(promise_table(found), lines)
+    promised = table(_promised(found), lines)
     sections = [
-        Section("The run", chart_html(run_chart(found), RUN_CAPTION)),
+        Section("The run", run_chart(found)),
         Section("What it promises", promised + chart_html(promise_chart(found))),
     ]
     if found.separation:
         apart = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
         between = ("if the machine has", "rival", "deviations of the noise")
-        sections.append(table_section("What it discriminates", tabled(between, apart)))
-    return [*sections, table_section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
+        sections.append(Section("What it discriminates", tabled(between, apart)))
+    return [*sections, Section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
 
 
 def _rate(found: Experiment, index: int) -> str:
@@ -183,7 +175,8 @@ def run_chart(found: Experiment) -> Chart:
                 y_range=(min(ends) - room, max(ends) + room),
             )
         )  # fmt: skip
-    return Chart("experiment", "reference, motion, speed and force", panels)
+    what = "reference, motion, speed and force"
+    return Chart("experiment", what, panels, caption=RUN_CAPTION)
 
 
 def promise_chart(found: Experiment) -> Chart:

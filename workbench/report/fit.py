@@ -1,4 +1,5 @@
-"""Section: measured and simulated position and force over time, all logs."""
+"""Sections: measured and simulated position and force over time, all logs, and what the model
+leaves beside the sensors' noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,15 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
+from identification.estimation.latent_force import LatentForces
 from identification.model.inverse_model import Smoothing
 from identification.simulation.free_run import FreeRun
-from workbench.cards.readable import units_of
+from workbench.cards.readable import times, units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.report.chart import Chart, Line, Mark, Panel, Part, chart_html
-from workbench.report.model_tables import run_coupling
+from workbench.report.chart import Band, Chart, Line, Mark, Panel, Part
+from workbench.report.missing_force import force_line, range_of
+from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
 from workbench.steps.predicted_force import force_by_model
+
+NOISE_BAND = "±2σ of the sensor's noise"
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +27,6 @@ class InARow:
     """Time of all logs in a row [s], with an empty sample between two of them."""
 
     t: Array
-    lengths: tuple[int, ...]
     parts: tuple[Part, ...]
 
     def joined(self, values: Sequence[Array]) -> Array:
@@ -30,10 +34,6 @@ class InARow:
         gap = np.array([np.nan])
         pieces = [piece for one in values for piece in (np.asarray(one, dtype=np.float64), gap)]
         return np.concatenate(pieces[:-1])
-
-    def none(self) -> list[Array]:
-        """No values, for every log."""
-        return [np.full(n, np.nan) for n in self.lengths]
 
     @property
     def marks(self) -> tuple[Mark, ...]:
@@ -57,8 +57,7 @@ def in_a_row(sources: Sequence[Source]) -> InARow:
         begin = float(t[-1]) + 2 * source.log.h
         if number + 1 < len(sources):
             times.append(np.array([float(t[-1]) + source.log.h]))
-    lengths = tuple(len(source.log) for source in sources)
-    return InARow(np.concatenate(times), lengths, tuple(parts))
+    return InARow(np.concatenate(times), tuple(parts))
 
 
 def liveliest(y: Array, share: float = 0.12) -> slice:
@@ -76,16 +75,11 @@ def liveliest(y: Array, share: float = 0.12) -> slice:
     return slice(start, min(start + size, len(y)))
 
 
-def fit(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Section:
-    """Position and force of every log, measured and by the model."""
-    return Section("Fit over time", chart_html(fit_chart(model, sources, runs), _caption(model)))
-
-
 def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Chart:
-    """The chart of `fit`."""
+    """Position and force of every log, measured and by the model."""
     units, row = units_of(model.rotary), in_a_row(sources)
     pairs = list(zip(sources, runs, strict=True))
-    position = [run.y if run else empty for (_, run), empty in zip(pairs, row.none(), strict=True)]
+    position = [run.y if run else np.full(len(one.log), np.nan) for one, run in pairs]
     columns = (
         ("position", units.position, "y", position),
         ("applied force", units.force, "F", [_force(model, *pair) for pair in pairs]),
@@ -101,7 +95,7 @@ def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | 
     lively = Part("liveliest part", float(row.t[part.start]), float(row.t[part.stop - 1]))
     logs = row.parts if len(sources) > 1 else ()
     what = "measured and simulated position and applied force over time"
-    return Chart("fit", what, panels, parts=(*logs, lively))
+    return Chart("fit", what, panels, parts=(*logs, lively), caption=_fit_caption(model))
 
 
 def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
@@ -112,7 +106,7 @@ def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
     return run.F
 
 
-def _caption(model: Model) -> str:
+def _fit_caption(model: Model) -> str:
     inverse = " The model's force is that of the inverse model: what this motion needs."
     if model.by_equation:
         return f"No free run follows these logs, so no position is simulated.{inverse}"
@@ -124,4 +118,69 @@ def _caption(model: Model) -> str:
     return (
         f"The model is driven by the measured force, {run_coupling(model)}: a free run on a"
         f" measured force drifts at every stop.{inverse}"
+    )
+
+
+def residual(
+    model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None],
+    missing: LatentForces | None,
+) -> list[Section]:  # fmt: skip
+    """Position's and force's residual over time, with the noise that a perfect model leaves; none
+    where neither is known."""
+    row, panels = in_a_row(sources), []
+    unit, factor = units_of(model.rotary).position
+    known = [run for run in runs if run]
+    if len(known) == len(sources):
+        off = [one.log["y"] - run.y for one, run in zip(sources, known, strict=True)]
+        noise = 2 * factor * model.fit.noise_y
+        panels.append(
+            Panel(
+                row.label, f"position [{unit}]",
+                [Line("measured less simulated", row.t, factor * row.joined(off))],
+                bands=[Band(NOISE_BAND, -noise, noise)], marks=row.marks,
+            )
+        )  # fmt: skip
+    force = _force_panel(model, sources, known, row, missing)
+    panels += [force] if force else []
+    what = "residual of position and force over time, with the band of the sensors' noise"
+    parts, caption = row.parts if len(sources) > 1 else (), _residual_caption(model)
+    chart = Chart("residual", what, panels, parts=parts, caption=caption)
+    return [Section("What the model leaves", chart)] if panels else []
+
+
+def _force_panel(
+    model: Model, sources: Sequence[Source], runs: Sequence[FreeRun], row: InARow,
+    missing: LatentForces | None,
+) -> Panel | None:  # fmt: skip
+    """The force less that of the actuator's run, or the force that the model lacks, with its band;
+    None where neither is known."""
+    label = f"force [{units_of(model.rotary).force.name}]"
+    if len(runs) == len(sources) and model.rig.kind != "motor" and model.fit.drive == "command":
+        noise = 2 * model.fit.noise_F
+        off = [one.log["F"] - run.F for one, run in zip(sources, runs, strict=True)]
+        lines = [Line("measured less simulated", row.t, row.joined(off))]
+        bands = [Band(NOISE_BAND, -noise, noise)]
+        return Panel(row.label, label, lines, bands=bands, marks=row.marks)
+    if missing is None:
+        return None
+    line, band = force_line(missing, "applied less modelled", "model")
+    level = max(model.karnopp.F_cp, model.karnopp.F_cn)
+    return Panel(
+        row.label, label, [line], areas=[band], marks=row.marks, y_range=range_of(missing, level),
+        x_range=(float(row.t[0]), float(row.t[-1])),
+    )  # fmt: skip
+
+
+def _residual_caption(model: Model) -> str:
+    if model.by_equation:
+        return (
+            "No free run follows these logs: this is the force that the model lacks, smoothed, with"
+            " its 95 % band, which is wide where the body rests."
+        )
+    if model.fit.adequate:
+        how = times(float(np.sqrt(model.fit.chi_square)))
+        return f"What is left of the run is {how} the sensors' noise."
+    return (
+        f"What is left is {left_of(model)}: the machine has an effect that the model has not, or"
+        " another structure. The command `workbench trace` finds which."
     )

@@ -1,4 +1,5 @@
-"""Section: friction against velocity, the data under the identified curve."""
+"""Sections: friction against velocity, the data under the identified curve; of a trace, before and
+after."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.effects._base import Acting
 from identification.log import Log
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.inverse_model import zoh_force
@@ -16,11 +18,14 @@ from identification.simulation.effect_along_motion import contribution
 from workbench.cards.readable import Units, units_of
 from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
-from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
+from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
 from workbench.report.chart_figure import evenly_spread
+from workbench.report.trace_words import words
 from workbench.report.view import Section
+from workbench.steps.trace import Traced
 
 POINTS = 80  # of a branch of the curve
+CURVE = 160  # of one in a trace
 FRICTION_DOTS = 3000  # of a panel
 SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
 SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
@@ -53,15 +58,8 @@ def friction_data(model: Model, log: Log) -> FrictionData:
 
 def _of_place(model: Model, log: Log) -> Array:
     """Force [N] of the effects that depend on the place alone, (n,)."""
-    force, blank = np.zeros(len(log)), np.zeros(len(log))
-    signals = {
-        "t": blank,
-        "y": np.asarray(log["y"]),
-        "v": blank,
-        "F": blank,
-        "u": blank,
-        "d": blank,
-    }
+    force = np.zeros(len(log))
+    signals = {**dict.fromkeys("tvFud", force), "y": np.asarray(log["y"])}
     for one in model.acting:
         if one.effect.acts == "force" and set(one.effect.depends_on) <= {"y"}:
             force = force + contribution(one.effect, one.values, signals, log.h, model.karnopp)
@@ -79,25 +77,17 @@ def _inertia(model: Model, a: Array, h: float) -> Array:
 
 def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> Section:
     """Friction of the logs' samples against velocity, with the Karnopp curve and its band."""
-    chart = friction_chart(model, fit, [friction_data(model, one.log) for one in sources])
-    return Section("Friction", chart_html(chart, _caption(model)))
-
-
-def friction_chart(model: Model, fit: KarnoppFit, data: Sequence[FrictionData]) -> Chart:
-    """The whole range of speeds, and the low ones."""
-    p = model.karnopp
-    v, F_f = (np.concatenate([getattr(one, name) for one in data]) for name in ("v", "F_f"))
+    p, dots, panels = model.karnopp, _dots("log: F_e − m a", model, sources), []
+    v = dots.x
     reach = (min(float(v.min()), 1.2 * p.dv_n), max(float(v.max()), 1.2 * p.dv_p))
-    low, panels = low_speeds(p, reach), []
-    dots = Line("log: F_e − m a", v, F_f, "measured", "dots")
+    low = low_speeds(p, reach)
     for title, (begin, end) in (("all speeds", reach), ("low speeds", low)):
         v_n, v_p = np.linspace(begin, p.dv_n, POINTS), np.linspace(p.dv_p, end, POINTS)
-        curve_v, curve_F = with_bar(v_n, _slip(v_n, p), v_p, _slip(v_p, p), p, end - begin)
-        bottom, top = (extent(p, begin, end, sign) for sign in (-1, 1))
+        curve = _curve("Karnopp model", p, [], v_n, v_p, "model")
+        bottom, top = min(p.F_sn, -p.F_cn + p.F_vn * begin), max(p.F_sp, p.F_cp + p.F_vp * end)
         panels.append(
             friction_panel(
-                title, units_of(model.rotary), dots,
-                [Line("Karnopp model", curve_v, curve_F, "model", "bold")],
+                title, units_of(model.rotary), dots, [curve],
                 (begin, end), (SHOWN_RANGE * bottom, SHOWN_RANGE * top), p,
                 [
                     Area("95 % interval", v_n, *_interval(fit, p, v_n)),
@@ -105,8 +95,13 @@ def friction_chart(model: Model, fit: KarnoppFit, data: Sequence[FrictionData]) 
                 ],
             )
         )  # fmt: skip
-    what = "friction force against velocity, samples of the logs and the model"
-    return Chart("friction", what, panels, columns=2, shared_x=False)
+    what, caption = (
+        "friction force against velocity, samples of the logs and the model",
+        _caption(model),
+    )
+    return Section(
+        "Friction", Chart("friction", what, panels, columns=2, shared_x=False, caption=caption)
+    )
 
 
 def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
@@ -119,20 +114,30 @@ def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
     return -low, low
 
 
-def with_bar(
-    v_n: Array, F_n: Array, v_p: Array, F_p: Array, p: Karnopp, wide: float
-) -> tuple[Array, Array]:
-    """The two branches of a friction curve, and between them the bar of breakaway at rest."""
-    at_rest, gap = 1e-6 * wide, [np.nan]
+def _dots(name: str, model: Model, sources: Sequence[Source]) -> Line:
+    """What the logs of these sources say of friction."""
+    data = [friction_data(model, one.log) for one in sources]
+    v, F_f = (np.concatenate([getattr(one, key) for one in data]) for key in ("v", "F_f"))
+    return Line(name, v, F_f, "measured", "dots")
+
+
+def _curve(
+    name: str, p: Karnopp, acting: Sequence[Acting], v_n: Array, v_p: Array, colour: Colour
+) -> Line:
+    """Friction at these speeds [m/s], and between both ways the bar of breakaway at rest."""
+    at_rest, gap = 1e-6 * (v_p[-1] - v_n[0]), [np.nan]
     v = np.concatenate([v_n, [-3 * at_rest, -at_rest, at_rest, 3 * at_rest], v_p])
-    return v, np.concatenate([F_n, gap, [p.F_sn, p.F_sp], gap, F_p])
+    F_n, F_p = (sliding_friction(branch, p, acting) for branch in (v_n, v_p))
+    return Line(name, v, np.concatenate([F_n, gap, [p.F_sn, p.F_sp], gap, F_p]), colour, "bold")
 
 
-def extent(p: Karnopp, low: float, high: float, sign: int) -> float:
-    """Largest friction of the model in a direction, at speeds up to `low` or `high`."""
-    if sign > 0:
-        return max(p.F_sp, p.F_cp + p.F_vp * high)
-    return min(p.F_sn, -p.F_cn + p.F_vn * low)
+def sliding_friction(v: Array, p: Karnopp, acting: Sequence[Acting]) -> Array:
+    """Friction while sliding at `v` [m/s], (n,): Karnopp's and what effects of speed add [N]."""
+    d, blank = np.sign(v), np.zeros(len(v))
+    signals = {"t": blank, "y": blank, "F": blank, "u": blank, "v": v, "d": d}
+    plain = np.where(v > 0, p.F_cp + p.F_vp * v, -p.F_cn + p.F_vn * v)
+    more = [d * contribution(a.effect, a.values, signals, 1e-3, p) for a in acting]
+    return np.asarray(plain + np.sum(more, axis=0)) if more else plain
 
 
 def friction_panel(
@@ -160,10 +165,6 @@ def friction_panel(
     )  # fmt: skip
 
 
-def _slip(v: Array, p: Karnopp) -> Array:
-    return np.where(v > 0, p.F_cp + p.F_vp * v, -p.F_cn + p.F_vn * v)
-
-
 def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     """95 % interval of the sliding friction at `v`, by the covariance of its parameters."""
     up, at = 1.0 * (v > 0), [fit.free.index(n) for n in SLIDING_PARAMETERS if n in fit.free]
@@ -183,3 +184,59 @@ def _caption(model: Model) -> str:
     if model.friction["m"].value is None:
         text += " The mass is not identified, so the assumed one is used for the inertia."
     return text
+
+
+def friction_before_after(traced: Traced) -> Section:
+    """Friction against velocity at all speeds and at low ones, before and after.
+
+    Where the machine has drifted without lacking an effect, on training and test logs.
+    """
+    speeds = _of_speed(traced)
+    other = [words(a.key) for a in traced.model.acting if a not in speeds]
+    caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
+    if other:
+        caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
+    return Section("Friction", replace(trace_friction_chart(traced), caption=caption))
+
+
+def _of_speed(traced: Traced) -> list[Acting]:
+    """The effects that are a function of velocity."""
+    every = traced.model.acting
+    return [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
+
+
+def trace_friction_chart(traced: Traced) -> Chart:
+    """The chart of `friction_before_after`."""
+    found, model, after = traced.trace, traced.model, traced.model.karnopp
+    drifted = bool(found.drift) and not found.effects
+    curves: list[tuple[Karnopp, list[Acting], Colour, str]] = [
+        (after, _of_speed(traced), "model", "after" if found.effects else "model")
+    ]
+    if found.effects:
+        before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
+        curves.insert(0, (before, [], "reference", "before"))
+    if drifted:
+        changed = {one.name: max(one.after, 0.0) for one in found.drift if one.name in NAMES}
+        curves = [
+            (after, [], "reference", "on the training logs"),
+            (replace(after, **changed), [], "model", "on the test logs"),
+        ]
+    sources = traced.test if drifted and traced.test else traced.train
+    name = "logs: F_e − m a" if len(sources) > 1 else f"{sources[0].file}: F_e − m a"
+    dots, panels = _dots(name, model, sources), []
+    reach = max(float(np.quantile(np.abs(dots.x), 0.999)), 2 * max(after.dv_p, -after.dv_n))
+    low = low_speeds(after, (-reach, reach))[1]
+    for title, high in (("all speeds", reach), ("low speeds", low)):
+        lines = [
+            _curve(said, p, acting, np.linspace(-high, p.dv_n, CURVE),
+                   np.linspace(p.dv_p, high, CURVE), colour)
+            for p, acting, colour, said in curves
+        ]  # fmt: skip
+        top = SHOWN_RANGE * max(float(np.nanmax(np.abs(one.y))) for one in lines)
+        panels.append(
+            friction_panel(
+                title, units_of(model.rotary), dots, lines, (-high, high), (-top, top), after
+            )
+        )
+    what = "friction force against velocity, before and after"
+    return Chart("trace-friction", what, panels, columns=2, shared_x=False)

@@ -10,7 +10,7 @@ from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import NORMAL_95
 from identification.tracing.result import MissingForce, Trace
 from workbench.cards.readable import units_of
-from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, Part, chart_html
+from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE
 from workbench.report.trace_words import before_and_after
 from workbench.report.view import Section
@@ -29,6 +29,14 @@ def missing_over_time(
     """
     if found.missing_force is None:
         return []
+    chart = missing_chart(found, found.missing_force, rotary, logs, which)
+    return [Section("Force that the model lacks", chart)]
+
+
+def missing_chart(
+    found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str], which: Which = "training"
+) -> Chart:
+    """The chart of `missing_over_time`."""
     caption = (
         "Applied force less modelled, smoothed, as the measured position shows it, with its 95 %"
         " band. Where the body rests or turns, friction takes whatever is applied: the band is"
@@ -36,14 +44,6 @@ def missing_over_time(
     )
     if found.missing is not None:
         caption += f" Root mean square while it slides: {before_and_after(found)}."
-    chart = missing_chart(found, found.missing_force, rotary, logs, which)
-    return [Section("Force that the model lacks", chart_html(chart, caption))]
-
-
-def missing_chart(
-    found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str], which: Which = "training"
-) -> Chart:
-    """The chart of `missing_over_time`."""
     drawn: list[tuple[LatentForces, str, Colour]] = [(force.after, "model", "model")]
     if force.lessened:
         drawn = [(force.before, "before", "before"), (force.after, "after", "model")]
@@ -54,16 +54,15 @@ def missing_chart(
         begin + float(one.t[-1] - one.t[0])
         for begin, one in zip(starts, force.after.logs, strict=True)
     ]
-    names = logs if len(logs) == len(starts) > 1 else ()
     panel = Panel(
         f"time, {which} logs in a row [s]" if len(starts) > 1 else f"time of the {which} log [s]",
         f"force that is missing [{units_of(rotary).force.name}]", lines, areas=areas,
         marks=[Mark(at, "x") for at in starts[1:]],
         y_range=range_of(force.before, level),
     )  # fmt: skip
-    named = [Part(*one) for one in zip(names, starts, ends, strict=False)]
+    parts = parts_of(logs, starts, ends)
     what = "force that the model lacks against time, with its 95 % band"
-    return Chart("trace-missing-force", what, [panel], parts=named)
+    return Chart("trace-missing-force", what, [panel], parts=parts, caption=caption)
 
 
 def force_line(of: LatentForces, name: str, colour: Colour) -> tuple[Line, Area]:

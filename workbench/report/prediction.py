@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from workbench.cards.readable import force, length, units_of
-from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel, chart_html
-from workbench.report.view import Section, View, lines_section, notes
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
+from workbench.report.view import Section, View, notes
 from workbench.steps.predict import Predicted, prediction_csv
 
 Columns = tuple[tuple[str, Colour, str], ...]
@@ -49,9 +49,8 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str 
 
     def sections() -> list[Section]:
         lines = [*more, *(f"note: {one}" for one in remarks)]
-        chart = chart_html(prediction_chart(found, rotary), "Nothing is fitted on this log.")
-        drawn = [Section("Over time", chart)]
-        return [*drawn, lines_section("In words", lines)] if lines else drawn
+        drawn = Section("Over time", prediction_chart(found, rotary))
+        return [drawn, Section("In words", lines)] if lines else [drawn]
 
     return View(
         "Prediction",
@@ -90,4 +89,5 @@ def prediction_chart(found: Predicted, rotary: bool) -> Chart:
             measured, model = lines[:2]
             off = Line(f"{measured.name} less {model.name}", t, measured.y - model.y)
             panels.append(Panel("time [s]", f"error [{unit}]", [off]))
-    return Chart("prediction", "measured and predicted position and force over time", panels)
+    what = "measured and predicted position and force over time"
+    return Chart("prediction", what, panels, caption="Nothing is fitted on this log.")

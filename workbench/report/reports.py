@@ -1,6 +1,6 @@
-"""What `identify`, `design` and `validate` show: which tables and pictures, under which words."""
+"""What `identify` and `design` show: which tables and pictures, under which words."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -17,7 +17,7 @@ from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import design_document
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.report.chart import Chart, Colour, Line, Mark, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, Mark, Panel
 from workbench.report.design_tables import (
     design_lines,
     design_parts,
@@ -28,10 +28,8 @@ from workbench.report.design_tables import (
     polynomial_lines,
     then_of_design,
 )
-from workbench.report.fit import fit, fit_chart
+from workbench.report.fit import fit_chart, residual
 from workbench.report.friction import friction_curve
-from workbench.report.loop import LOOP_COLOURS, judged, loop
-from workbench.report.loop import step_chart as loop_chart
 from workbench.report.model_tables import (
     fit_lines,
     logs_of,
@@ -41,21 +39,14 @@ from workbench.report.model_tables import (
     plant_lines,
     summary,
 )
-from workbench.report.residual import residual
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
-from workbench.report.validation_tables import (
-    then_of_validation,
-    validation_parts,
-    validation_sentence,
-)
-from workbench.report.view import Section, View, lines_section, report_notes, table
+from workbench.report.validation import LOOP_COLOURS
+from workbench.report.view import Section, View, report_notes, table
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
-from workbench.steps.loop_figures import Traces
 from workbench.steps.predict import fitted_run
 from workbench.steps.predicted_force import missing_force
-from workbench.steps.validate import Validation, validation_document
 
 
 def identified_view(found: Identified) -> View:
@@ -72,9 +63,9 @@ def identified_view(found: Identified) -> View:
             *residual(model, sources, runs(), missing),
             parameters_section(model),
             friction_curve(model, found.fit, sources),
-            fit(model, sources, runs()),
+            Section("Fit over time", fit_chart(model, sources, runs())),
             *over_frequency(model, sources),
-            lines_section("In words", report_notes(said, logs_of(model))),
+            Section("In words", report_notes(said, logs_of(model))),
         )
 
     missing = missing_force(model, [one.log for one in sources])
@@ -96,12 +87,11 @@ def design_view(found: Design, rotary: bool = False) -> View:
 
     def sections() -> Sequence[Section]:
         return (
-            step_response(found),
+            Section("Step response", step_chart(found)),
             controllers(found, rotary),
             *bode_section(found),
-            sensitivity_section(found, rotary),
-            coefficients(found),
-            drive_section(found),
+            Section("Sensitivity", sensitivity_chart(found, rotary)),
+            *program_sections(found),
         )
 
     return View(
@@ -117,41 +107,16 @@ def design_view(found: Design, rotary: bool = False) -> View:
     )
 
 
-def validation_view(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False
-) -> View:
-    """Whether the design holds in simulation, and what the loop does."""
-
-    def sections() -> Sequence[Section]:
-        places = dict.fromkeys(place for _, place in traces)
-        drawn = [one for place in places for one in loop(found, traces, place, rotary)]
-        return (*drawn[:1], judged(found, rotary), *drawn[1:])
-
-    return View(
-        f"Validation for {found.card}",
-        validation_sentence(found),
-        validation_parts(found, rotary),
-        lambda: validation_document(found),
-        {"validation.json": lambda: validation_document(found)},
-        sections,
-        lambda: loop_chart(found, traces, "model", rotary),
-        then_of_validation(found),
-        then_by_command=not found.passed,
-    )
-
-
 def parameters_section(model: Model) -> Section:
     """The parameters with units and intervals, or why there is none."""
     estimates = {**model.friction, **(model.actuator or {})}
     assumed = ", ".join(
-        f"{name} = {_shown(used(e))} {e.unit}" for name, e in estimates.items() if e.value is None
+        # What a plant keeps of 0 is 0.
+        f"{name} = {'0' if abs(used(e)) <= AT_ZERO else f'{used(e):.3g}'} {e.unit}"
+        for name, e in estimates.items()
+        if e.value is None
     )
     return Section("Parameters", render("parameters", rows=parameter_rows(model), assumed=assumed))
-
-
-def _shown(value: float) -> str:
-    """A value that simulations use; what a plant keeps of 0 is 0."""
-    return "0" if abs(value) <= AT_ZERO else f"{value:.3g}"
 
 
 MOST_DB = float(20 * np.log10(2.0))  # of |S_yp| at a modulus margin of 0.5
@@ -163,18 +128,14 @@ def controllers(found: Design, rotary: bool = False) -> Section:
     return Section("Controllers", margins + table(drive_table(found)))
 
 
-def coefficients(found: Design) -> Section:
-    """The polynomials, for whoever programs the controller."""
+def program_sections(found: Design) -> tuple[Section, Section]:
+    """The polynomials, for whoever programs the controller, and the same as difference equations,
+    in the unit that the drive takes."""
     text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
-    return lines_section("Coefficients", text)
+    return Section("Coefficients", text), Section("As the drive runs it", drive_lines(found))
 
 
-def drive_section(found: Design) -> Section:
-    """The same as difference equations, in the unit that the drive takes."""
-    return lines_section("As the drive runs it", drive_lines(found))
-
-
-def sensitivity_section(found: Design, rotary: bool = False) -> Section:
+def sensitivity_chart(found: Design, rotary: bool = False) -> Chart:
     """|S_yp| with its limit, and |S_up|."""
     A, B = np.array(found.plant.A), np.array(found.plant.B)
     w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h
@@ -194,21 +155,16 @@ def sensitivity_section(found: Design, rotary: bool = False) -> Section:
         ),
     )  # fmt: skip
     caption = "Below 0 dB the loop suppresses disturbances; the peak of |S_yp| is 1/modulus margin."
-    chart = Chart("sensitivity", "sensitivity functions against frequency", panels, columns=2)
-    return Section("Sensitivity", chart_html(chart, caption))
+    what = "sensitivity functions against frequency"
+    return Chart("sensitivity", what, panels, columns=2, caption=caption)
 
 
-def step_response(found: Design) -> Section:
+def step_chart(found: Design) -> Chart:
     """Linear step response of both loops, without Coulomb friction."""
     caption = (
         "Response of the linear loop. The machine has Coulomb friction too: `workbench validate`"
         " shows the loop with it."
     )
-    return Section("Step response", chart_html(step_chart(found), caption))
-
-
-def step_chart(found: Design) -> Chart:
-    """The chart of `step_response`."""
     lines = []
     for name, one in found.controllers.items():
         t, y = linear_step(found, one)
@@ -216,7 +172,7 @@ def step_chart(found: Design) -> Chart:
         staircase = np.repeat(t, 2)[1:], np.repeat(y, 2)[:-1]
         lines.append(Line(name.upper(), *staircase, LOOP_COLOURS[name]))
     panel = Panel("time [s]", "position / step [-]", lines, marks=[Mark(1.0)])
-    return Chart("step", "linear step response of the closed loop", [panel])
+    return Chart("step", "linear step response of the closed loop", [panel], caption=caption)
 
 
 def linear_step(found: Design, one: Controller) -> tuple[Array, Array]:
@@ -228,8 +184,8 @@ def linear_step(found: Design, one: Controller) -> tuple[Array, Array]:
     return t, np.asarray(lfilter(forward, P, np.ones(n)), dtype=np.float64)
 
 
-def _db(values: object) -> Array:
-    return np.asarray(20 * np.log10(np.maximum(np.abs(np.asarray(values)), 1e-12)))
+def _db(values: object, least: float = 1e-12) -> Array:
+    return np.asarray(20 * np.log10(np.maximum(np.abs(np.asarray(values)), least)))
 
 
 LOWEST_DRAWN = 1e-3  # of half the sampling rate
@@ -237,22 +193,17 @@ POINTS_OF_BODE = 1200
 HERTZ = "frequency [Hz]"
 
 
-def bode_section(found: Design) -> Iterator[Section]:
-    """Magnitude, phase and |S_yp| of the cascade's loop with its filter and with the same gains
-    without it; nothing where there is no filter."""
+def bode_section(found: Design) -> list[Section]:
+    """The chart of `bode_chart`; nothing where there is no filter."""
     one = found.p_pi
     if one is None or one.cascade is None or one.series is None:
-        return
-    caption = (
-        f"Open loop on two masses with the {filter_words(one.series)}, and with the same gains"
-        " without it: the peak of the resonance comes down, and |S_yp| with it. What is above 6 dB"
-        " there has a modulus margin below 0.5."
-    )
-    yield Section("Bode plot, before and after the filter", chart_html(bode_chart(found), caption))
+        return []
+    return [Section("Bode plot, before and after the filter", bode_chart(found))]
 
 
 def bode_chart(found: Design) -> Chart:
-    """The chart of `bode_section`; raises ValueError where the design has no filter."""
+    """Magnitude, phase and |S_yp| of the cascade's loop with its filter and with the same gains
+    without it; raises ValueError where the design has no filter."""
     one = found.p_pi
     if one is None or one.cascade is None or one.series is None:
         raise ValueError("a design without a filter has no Bode plot before and after it")
@@ -265,19 +216,21 @@ def bode_chart(found: Design) -> Chart:
     size, phase, sensitivity = list[Line](), list[Line](), list[Line]()
     for name, rst, colour in pairs:
         L = open_loop_response(A, B, rst, f)
-        size.append(Line(name, f, _decibels(np.abs(L)), colour))
+        size.append(Line(name, f, _db(L, 1e-9), colour))
         turned = np.degrees(np.unwrap(np.angle(L)))
         phase.append(Line(name, f, turned - 360.0 * np.ceil(turned[0] / 360.0), colour))
-        S = np.abs(sensitivities(A, B, rst, 2.0 * np.pi * f).S_yp)
-        sensitivity.append(Line(name, f, _decibels(S), colour))
+        S = sensitivities(A, B, rst, 2.0 * np.pi * f).S_yp
+        sensitivity.append(Line(name, f, _db(S, 1e-9), colour))
     panels = (
         Panel(HERTZ, "|L| [dB]", size, "open loop, magnitude", log_x=True, marks=[Mark(0.0)]),
         Panel(HERTZ, "phase [deg]", phase, "open loop, phase", log_x=True, marks=[Mark(-180.0)]),
         Panel(HERTZ, "|S_yp| [dB]", sensitivity, "disturbance to position", log_x=True,
               marks=[Mark(6.0)]),
     )  # fmt: skip
-    return Chart("bode", "open loop and sensitivity before and after the filter", panels, columns=1)
-
-
-def _decibels(size: Array) -> Array:
-    return np.asarray(20.0 * np.log10(np.maximum(size, 1e-9)))
+    caption = (
+        f"Open loop on two masses with the {filter_words(one.series)}, and with the same gains"
+        " without it: the peak of the resonance comes down, and |S_yp| with it. What is above 6 dB"
+        " there has a modulus margin below 0.5."
+    )
+    what = "open loop and sensitivity before and after the filter"
+    return Chart("bode", what, panels, caption=caption)

@@ -1,7 +1,6 @@
 """Frequency responses for a terminal and as Bode plots."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Chart, Line, Mark, Panel, chart_html
-from workbench.report.view import Section, View, lines_section, notes, report_notes, table
+from workbench.report.view import Section, View, notes, report_notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.response import (
     Responded,
@@ -77,9 +76,8 @@ def _cells(one: Size, unit: str) -> tuple[str, str]:
 def loop_line(found: Responded) -> str:
     """The open loop's crossover and margins, in words."""
     if found.open_loop is None or found.margins is None:
-        return "open loop: not shown, since the controller is not identifiable from the logs" + (
-            "" if found.found.instrument else " (no moving reference is logged)"
-        )
+        why = "" if found.found.instrument else " (no moving reference is logged)"
+        return f"open loop: not shown, since the controller is not identifiable from the logs{why}"
     m = found.margins
     by = "the logs" if found.found.controller is not None else "the card's controller"
     if m.crossover is None:
@@ -123,26 +121,17 @@ def friction_line(found: Responded) -> str:
     )
 
 
-def spectra_line(found: Responded) -> str:
-    """How the spectra were made."""
-    lengths, body = found.found.stretches, found.found.body
-    by = "the reference as instrument" if found.found.instrument else "no instrument"
-    averages = [float(body.averages[0]), float(body.averages[-1])]
-    return (
-        f"spectra: Welch, {by}; stretches of {number(lengths[0])} s at low frequencies to"
-        f" {number(lengths[-1])} s at high ones, {averages[0]:.0f} to {averages[1]:.0f} averages"
-    )
-
-
 def response_lines(found: Responded) -> list[str]:
-    """All that is said of the curves, a line each."""
-    body = found.found.body
-    sure = ranges(body.f, body.sure)
+    """All that is said of the curves, and of the spectra of which they are made, a line each."""
+    body, lengths = found.found.body, found.found.stretches
+    by = "the reference as instrument" if found.found.instrument else "no instrument"
     return [
         loop_line(found),
         friction_line(found),
-        f"coherence above {COHERENCE_SURE:g}: {_spans(sure)}",
-        spectra_line(found),
+        f"coherence above {COHERENCE_SURE:g}: {_spans(ranges(body.f, body.sure))}",
+        f"spectra: Welch, {by}; stretches of {number(lengths[0])} s at low frequencies to"
+        f" {number(lengths[-1])} s at high ones, {body.averages[0]:.0f} to"
+        f" {body.averages[-1]:.0f} averages",
     ]
 
 
@@ -165,15 +154,15 @@ def response_view(found: Responded) -> View:
 
 def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
     sections = [
-        Section("Plant", plant_html(found)),
+        Section("Plant", plant_chart(found)),
         Section("Resonances and margins", table(peak_table(found), response_lines(found))),
     ]
     if found.open_loop is not None:
-        sections.append(Section("Open loop", loop_html(found)))
+        sections.append(Section("Open loop", loop_chart(found)))
     if found.found.controller is not None:
-        sections.append(Section("Controller", controller_html(found)))
+        sections.append(Section("Controller", controller_chart(found)))
     lines = report_notes(found.remarks, logs)
-    return [*sections, lines_section("Notes", lines)] if lines else sections
+    return [*sections, Section("Notes", lines)] if lines else sections
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
@@ -187,14 +176,8 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
     except UserError:
         return []
     lines = [response_sentence(found), friction_line(found)]
-    return [Section("Over frequency", plant_html(found) + table(peak_table(found), lines))]
-
-
-def plant_html(found: Responded) -> Any:
-    """The plant's Bode plot with its caption."""
-    without = "" if found.left_in else " Grey: the same with friction left in the force."
-    model = "" if found.curves is None else " Dashed: the model's mass, friction and springs."
-    return chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}")
+    drawn = chart_html(plant_chart(found))
+    return [Section("Over frequency", drawn + table(peak_table(found), lines))]
 
 
 def plant_chart(found: Responded) -> Chart:
@@ -206,38 +189,32 @@ def plant_chart(found: Responded) -> Chart:
     marks = [Mark(one.frequency.value, "x") for one in found.peaks]
     title = f"from force to position [{units.position}/{units.force}]"
     panels = _bode(f, every.position, title, others, beside, marks)
-    return Chart("plant", "Bode plot of the plant from force to position", panels)
-
-
-def loop_html(found: Responded) -> str:
-    """The open loop's Bode plot with its caption."""
-    by = (
-        "the controller that the logs show" if found.found.controller is not None
-        else "the card's controller"
-    )  # fmt: skip
-    return str(chart_html(loop_chart(found), f"Plant and {by} in series. {loop_line(found)}."))
+    without = "" if found.left_in else " Grey: the same with friction left in the force."
+    model = "" if found.curves is None else " Dashed: the model's mass, friction and springs."
+    what, caption = (
+        "Bode plot of the plant from force to position",
+        f"{COHERENCE_SAID}{model}{without}",
+    )
+    return Chart("plant", what, panels, caption=caption)
 
 
 def loop_chart(found: Responded) -> Chart:
     """The open loop: magnitude, phase and coherence."""
     assert found.open_loop is not None
-    curves = found.curves
-    L = None
+    curves, L = found.curves, None
     if curves is not None and curves.controller is not None:
         L = curves.plant * curves.controller
     at = found.margins.crossover if found.margins else None
+    by = "the card's controller"
+    if found.found.controller is not None:
+        by = "the controller that the logs show"
     marks = [] if at is None else [Mark(at, "x")]
     panels = _bode(
         found.found.f, found.open_loop, "open loop [-]", [("the model, card's controller", L)],
         None, marks, levels=(0.0, -180.0),
     )  # fmt: skip
-    return Chart("open-loop", "Bode plot of the open loop", panels)
-
-
-def controller_html(found: Responded) -> str:
-    """The controller's Bode plot with its caption."""
-    caption = "From the position to the force that counters it, by the reference and the position."
-    return str(chart_html(controller_chart(found), caption))
+    caption = f"Plant and {by} in series. {loop_line(found)}."
+    return Chart("open-loop", "Bode plot of the open loop", panels, caption=caption)
 
 
 def controller_chart(found: Responded) -> Chart:
@@ -249,7 +226,8 @@ def controller_chart(found: Responded) -> Chart:
         found.found.f, found.found.controller, f"controller [{units.stiffness}]",
         [("of the card", card)], None, [],
     )  # fmt: skip
-    return Chart("controller", "Bode plot of the controller", panels)
+    caption = "From the position to the force that counters it, by the reference and the position."
+    return Chart("controller", "Bode plot of the controller", panels, caption=caption)
 
 
 def _bode(

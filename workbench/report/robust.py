@@ -10,8 +10,8 @@ from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.design_tables import design_lines
-from workbench.report.reports import coefficients, controllers, drive_section
-from workbench.report.view import Section, View, lines_section, notes, table, table_section
+from workbench.report.reports import controllers, program_sections
+from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
 from workbench.steps.robust.outcomes import MEASURES, Measure
@@ -28,6 +28,7 @@ ROBUST_CAPTION = (
     "Share of the machines drawn (upwards) on which a measure is at most the value (to the right):"
     " the robust loop, the nominal design's, the present one. Broken: the limit."
 )
+UNITS_OF_KIND = {"share": (100.0, "%"), "time": (1.0, "s"), "samples": (1.0, "samples")}
 UPWARDS = 1e-7  # of the largest value, from machine to machine
 AXIS_WIDEST = 12.0  # times the middle of all curves, to which an axis goes
 
@@ -101,26 +102,16 @@ def _said(one: Measure, value: float, rotary: bool) -> str:
     """A value of a measure in words."""
     if not np.isfinite(value):
         return "any" if one.floor else "runs away"
-    match one.kind:
-        case "share":
-            return f"{number(100 * value)} %"
-        case "length":
-            return "none" if value == 0.0 else length(value, rotary)
-        case "time":
-            return f"{number(value)} s"
-        case "samples":
-            return f"{number(value)} samples"
-    return number(value)
+    if one.kind == "length":
+        return "none" if value == 0.0 else length(value, rotary)
+    factor, unit = UNITS_OF_KIND.get(one.kind, (1.0, ""))
+    return f"{number(factor * value)} {unit}".rstrip()
 
 
 def robust_lines(found: Robust, rotary: bool) -> list[str]:
-    """How it was chosen, and what to know of it."""
-    return [*choice_lines(found, rotary), *(f"note: {one}" for one in robust_remarks(found))]
-
-
-def robust_remarks(found: Robust) -> tuple[str, ...]:
-    """What it misses, and its remarks."""
-    return (*found.missed, *found.remarks)
+    """How it was chosen, what it misses, and remarks."""
+    remarks = (*found.missed, *found.remarks)
+    return [*choice_lines(found, rotary), *(f"note: {one}" for one in remarks)]
 
 
 def choice_lines(found: Robust, rotary: bool) -> list[str]:
@@ -144,7 +135,7 @@ def robust_view(found: Robust, rotary: bool) -> View:
             promise_table(found, rotary),
             beside_table(found, rotary),
             listed(choice_lines(found, rotary)),
-            notes(robust_remarks(found)),
+            notes((*found.missed, *found.remarks)),
         ],
         lambda: robust_document(found),
         {
@@ -162,17 +153,16 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
     design, chart = found.design, robust_chart(found, rotary)
     lines = robust_lines(found, rotary)
     promised = table(promise_table(found, rotary), lines)
-    picture = chart_html(chart, ROBUST_CAPTION) if chart.panels else ""
+    picture = chart_html(chart) if chart.panels else ""
     return [
         Section("Over the machines that there may be", picture + promised),
-        table_section(
+        Section(
             "Beside the nominal design and the present controller",
             beside_table(found, rotary),
         ),
         controllers(design, rotary),
-        coefficients(design),
-        drive_section(design),
-        lines_section("Notes", design_lines(design, rotary)),
+        *program_sections(design),
+        Section("Notes", design_lines(design, rotary)),
     ]  # fmt: skip
 
 
@@ -186,26 +176,21 @@ def _then(found: Robust) -> list[str]:
 
 def robust_chart(found: Robust, rotary: bool) -> Chart:
     """The share of machines over each measure's value, for every loop."""
-    wanted = [one for one, _ in _of(found.promises[ROBUST]) if _varies(found, one.name)]
-    panels = [_shares(found, one, rotary) for one in wanted]
+    panels = list[Panel]()
+    for one, _ in _of(found.promises[ROBUST]):
+        every = [promise.found.values.get(one.name) for promise in found.promises.values()]
+        values = np.concatenate([np.zeros(0), *(each for each in every if each is not None)])
+        values = values[np.isfinite(values)]
+        if values.size and float(np.ptp(values)) > 0.0:  # where all are one there is no curve
+            panels.append(_shares(found, one, rotary))
     what = "shares of machines by measure"
-    return Chart("robust", what, panels, columns=2, shared_x=False)
-
-
-def _varies(found: Robust, name: str) -> bool:
-    """Whether any loop has another value than the others' first."""
-    values = [_finite(one.found.values[name]) for one in found.promises.values()
-              if name in one.found.values]  # fmt: skip
-    joined = np.concatenate(values) if values else np.zeros(0)
-    return joined.size > 0 and float(np.ptp(joined)) > 0.0
-
-
-def _finite(values: Array) -> Array:
-    return values[np.isfinite(values)]
+    return Chart("robust", what, panels, columns=2, shared_x=False, caption=ROBUST_CAPTION)
 
 
 def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
-    factor, unit = _axis(one, rotary)
+    factor, unit = UNITS_OF_KIND.get(one.kind, (1.0, ""))
+    if one.kind == "length":
+        unit, factor = shown_unit(shown(rotary).position)
     limit = found.promises[ROBUST].measures[one.name].limit
     lines = []
     for name, promise in found.promises.items():
@@ -220,7 +205,7 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
         apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
         lines.append(Line(name, at + apart, share, *CURVE_STYLES[name]))
     return Panel(
-        f"{one.words.split(',')[0]}{unit}", "share of machines [%]", lines,
+        one.words.split(",")[0] + (f" [{unit}]" if unit else ""), "share of machines [%]", lines,
         marks=[] if limit is None else [Mark(factor * limit, "x")],
         x_range=_within([line.x for line in lines], None if limit is None else factor * limit),
         y_range=(-3.0, 103.0),
@@ -237,17 +222,3 @@ def _within(arrays: Sequence[Array], limit: float | None) -> tuple[float, float]
     high = min(high, AXIS_WIDEST * middle) if middle > 0.0 else high
     room = 0.05 * max(high - low, 1e-9 * max(abs(high), 1.0))
     return low - room, high + room
-
-
-def _axis(one: Measure, rotary: bool) -> tuple[float, str]:
-    match one.kind:
-        case "share":
-            return 100.0, " [%]"
-        case "length":
-            unit, factor = shown_unit(shown(rotary).position)
-            return factor, f" [{unit}]"
-        case "time":
-            return 1.0, " [s]"
-        case "samples":
-            return 1.0, " [samples]"
-    return 1.0, ""

@@ -2,9 +2,9 @@
 
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
+from workbench.report.friction import friction_before_after, trace_friction_chart
 from workbench.report.missing_force import Which, missing_chart, missing_over_time
 from workbench.report.response import over_frequency
-from workbench.report.trace_friction import friction_before_after, friction_chart
 from workbench.report.trace_pictures import (
     Picture,
     against_signal,
@@ -25,7 +25,7 @@ from workbench.report.trace_tables import (
     trace_parts,
 )
 from workbench.report.trace_words import then_of, trace_sentence, words
-from workbench.report.view import Section, View, lines_section, report_notes, table_section
+from workbench.report.view import Section, View, report_notes
 from workbench.steps.trace import Traced, trace_document
 
 EVERY_EQUATION = ("mechanical", "actuator")
@@ -62,7 +62,7 @@ def _main_chart(traced: Traced) -> Chart:
         return missing_chart(
             traced.trace, traced.trace.missing_force, traced.model.rotary, *_unseen(traced)
         )
-    return friction_chart(traced)
+    return trace_friction_chart(traced)
 
 
 def _sections(traced: Traced) -> list[Section]:
@@ -74,11 +74,11 @@ def _sections(traced: Traced) -> list[Section]:
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
     errors = errors_table(found, model.rotary, bool(traced.test))
-    sections.append(table_section("Before and after", errors))
+    sections.append(Section("Before and after", errors))
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
         effects = effects_table(found, model.rig)
-        sections.append(table_section(title, effects, effect_lines(found)))
+        sections.append(Section(title, effects, effect_lines(found)))
     if found.curves:
         sections.append(free_curves(found.curves, model.rotary, model.rig.command_unit))
     sections.append(friction_before_after(traced))
@@ -88,10 +88,10 @@ def _sections(traced: Traced) -> list[Section]:
         plain: changes_table(found),
         "Drift between training and test logs": differences_table(found),
     }
-    sections += [table_section(title, one) for title, one in tables.items() if one.whole]
+    sections += [Section(title, one) for title, one in tables.items() if one.whole]
     sections += over_frequency(model, traced.train)
     notes = report_notes((*traced.remarks, *found.remarks), logs_of_trace(traced))
-    return [*sections, lines_section("Notes", notes)] if notes else sections
+    return [*sections, Section("Notes", notes)] if notes else sections
 
 
 def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
@@ -118,4 +118,4 @@ def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:
         for e in traced.trace.effects
         if in_equation(e.effect) not in (seen if traced.trace.residuals else EVERY_EQUATION)
     ]
-    return [lines_section("Where it shows", lines)] if lines else []
+    return [Section("Where it shows", lines)] if lines else []

@@ -1,7 +1,7 @@
 """Pictures of a trace: the residual before and after over time and against what explains it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from identification.model.karnopp import Karnopp
 from identification.simulation.effect_along_motion import contribution
 from identification.tracing.result import FreeCurve, Residual, Trace
 from workbench.cards.readable import units_of
-from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
+from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
@@ -65,6 +65,11 @@ class Picture:
     period: float | None = None
 
     @property
+    def place(self) -> tuple[str, str]:
+        """The equation and the signal of which it is."""
+        return self.residual.equation, self.signal
+
+    @property
     def levels(self) -> int:
         """Of the signal, over which running medians are taken: enough for what repeats."""
         if self.period is None:
@@ -90,18 +95,13 @@ def pictures(found: Trace) -> list[Picture]:
         if residual is None:
             continue
         others = [o for o in found.effects if in_equation(o.effect) == equation]
-        out.append(
-            _of_effect(
-                next(a for a in found.plant.effects if a.key == e.effect.key),
-                residual,
-                found.plant.friction,
-                len(others) == 1,
-            )
-        )
+        acting = next(a for a in found.plant.effects if a.key == e.effect.key)
+        out.append(_of_effect(acting, residual, found.plant.friction, len(others) == 1))
     rest = _unexplained(found)
-    if rest is not None and all(_place(p) != _place(rest) for p in out):
+    if rest is not None and all(one.place != rest.place for one in out):
         out.append(rest)
-    return _once(out)
+    # One picture of each residual and signal.
+    return list({one.place: one for one in reversed(out)}.values())[::-1]
 
 
 def shown_residuals(found: Trace) -> list[Residual]:
@@ -142,22 +142,17 @@ def effect_at_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | No
     return np.asarray(value * (signals["d"][1:] if sign == 0.0 else sign))
 
 
-def _once(drawn: list[Picture]) -> list[Picture]:
-    """One picture of each residual and signal."""
-    return list({_place(p): p for p in reversed(drawn)}.values())[::-1]
-
-
-def _place(picture: Picture) -> tuple[str, str]:
-    return picture.residual.equation, picture.signal
-
-
 def _unexplained(found: Trace) -> Picture | None:
     """What no effect explains, or (where there is no effect) the residual that is largest."""
     wanted, residuals = found.unknown.depends_on, shown_residuals(found)
     if not residuals or (found.effects and not wanted):
         return None
     having = [r for r in residuals if set(wanted) & set(r.signals)]
-    residual = max(having or residuals, key=_in_noise)
+    # By what is left in units of its noise (of a smoothed force: of its own deviation).
+    residual = max(
+        having or residuals,
+        key=lambda one: float(np.median(np.abs(one.after) / np.maximum(one.noise, 1e-300))),
+    )
     if found.unknown.swing > 0.0 and "t" in residual.signals:
         folded = folded_at(residual, found.unknown.swing)
         return Picture(folded, "phase", None, folded.before, "before", None)
@@ -173,15 +168,8 @@ def folded_at(residual: Residual, rate: float) -> Residual:
     own = residual.log == residual.log[0]
     signals = {k: v[own] for k, v in residual.signals.items()}
     signals["phase"] = signals["t"] * rate % 1.0
-    return Residual(
-        residual.equation, residual.t[own], residual.log[own], residual.before[own],
-        residual.after[own], residual.noise[own], signals,
-    )  # fmt: skip
-
-
-def _in_noise(residual: Residual) -> float:
-    """What is left, in units of its noise (of a smoothed force: of its own deviation)."""
-    return float(np.median(np.abs(residual.after) / np.maximum(residual.noise, 1e-300)))
+    rows = {k: getattr(residual, k)[own] for k in ("t", "log", "before", "after", "noise")}
+    return replace(residual, **rows, signals=signals)
 
 
 def signal_of(effect: Effect, residual: Residual) -> str:
@@ -194,41 +182,32 @@ def signal_of(effect: Effect, residual: Residual) -> str:
 
 
 def over_time(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Section:
-    """Residual against time before and after, with the band of the sensors' noise."""
-    chart = time_chart(residual, rotary, logs)
-    shares = [
-        f"{share_inside(values, residual.noise):.0f} % ({name})"
-        for values, _, name in _both(residual)
-    ]
-    equation = EQUATION_TITLES[residual.equation]
-    caption = (
-        f"{equation.capitalize()}, {ROWS_TAKEN.get(residual.equation, WINDOWS)}; a complete model"
-        f" has 95 % of its points in the band, here {', '.join(shares)}."
-    )
-    return Section(f"What the model leaves over time: {equation}", chart_html(chart, caption))
-
-
-def time_chart(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Chart:
-    """The chart of `over_time`; logs: names of the logs in a row."""
+    """Residual against time before and after, with the band of the sensors' noise; logs: names of
+    those in a row."""
+    equation, both = EQUATION_TITLES[residual.equation], _both(residual)
+    shares = [f"{share_inside(y, residual.noise):.0f} % ({name})" for y, _, name in both]
     unit, factor = residual_unit(residual.equation, rotary)
     noise = 2 * factor * float(np.median(residual.noise))
     chosen = evenly_spread(len(residual.t))
     lines = [
         Line(name, residual.t[chosen], factor * values[chosen], colour, "dots")
-        for values, colour, name in _both(residual)
+        for values, colour, name in both
     ]
     starts = log_starts(residual)
     ends = np.append(starts[1:], residual.t.max())
-    names = logs if len(logs) == len(starts) > 1 else ()
-    parts = [Part(*one) for one in zip(names, starts.tolist(), ends.tolist(), strict=False)]
     panel = Panel(
         "time, training logs in a row [s]", f"residual [{unit}]", lines,
         bands=[Band("±2σ of the sensors' noise", -noise, noise)],
         marks=[Mark(float(at), "x") for at in starts[1:]],
         y_range=_limits(residual, factor),
     )  # fmt: skip
-    what = f"residual of the {EQUATION_TITLES[residual.equation]} against time, before and after"
-    return Chart(f"trace-time-{residual.equation}", what, [panel], parts=parts)
+    what = f"residual of the {equation} against time, before and after"
+    chart = Chart(
+        f"trace-time-{residual.equation}", what, [panel], parts=parts_of(logs, starts.tolist(), ends.tolist()),
+        caption=f"{equation.capitalize()}, {ROWS_TAKEN.get(residual.equation, WINDOWS)}; a complete"
+        f" model has 95 % of its points in the band, here {', '.join(shares)}.",
+    )  # fmt: skip
+    return Section(f"What the model leaves over time: {equation}", chart)
 
 
 def _both(residual: Residual) -> list[tuple[Array, Colour, str]]:
@@ -253,7 +232,7 @@ def against_signal(picture: Picture, rotary: bool, command: str = "V") -> Sectio
     signal = axis_of(picture.signal, rotary)[0].split(" [")[0]
     alone = len(_both(picture.residual)) == 1
     title = f"Against {signal}" if alone else f"What it depends on: {signal}"
-    return Section(title, chart_html(signal_chart(picture, rotary, command), _caption(picture)))
+    return Section(title, signal_chart(picture, rotary, command))
 
 
 def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
@@ -274,7 +253,8 @@ def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
             lines += _fitted(picture, x, factor)
         panels.append(Panel(label, f"residual [{unit}]", lines, title, y_range=limits, height=260))
     what = f"residual of the {EQUATION_TITLES[residual.equation]} against {label}, before and after"
-    return Chart(f"trace-{residual.equation}-{picture.signal}", what, panels, columns=2)
+    name, caption = f"trace-{residual.equation}-{picture.signal}", _caption(picture)
+    return Chart(name, what, panels, columns=2, caption=caption)
 
 
 def _cloud(residual: Residual, x: Array, values: Array, colour: Colour, levels: int) -> list[Line]:
@@ -299,20 +279,17 @@ def _fitted(picture: Picture, x: Array, factor: float) -> list[Line]:
 
 def _caption(picture: Picture) -> str:
     equation = EQUATION_TITLES[picture.residual.equation]
+    # Of the equation of motion the force that is missing is shown, beside rows of the others.
+    smoothed = ", smoothed, while the body slides" if equation == "equation of motion" else ""
     text = (
-        f"Residual of the {equation}{_smoothed(picture.residual)};"
-        " lines are running medians, by direction of motion. Flat at 0 is a complete model."
+        f"Residual of the {equation}{smoothed}; lines are running medians, by direction of motion."
+        " Flat at 0 is a complete model."
     )
     if picture.how != "before":
         text += " Left: the other effects are in the model, this one is not."
     if picture.curve is not None:
         text += " Dashed: what the fitted effect takes away."
     return text
-
-
-def _smoothed(residual: Residual) -> str:
-    """How the force that is missing is shown beside rows of an equation."""
-    return ", smoothed, while the body slides" if residual.equation == "mechanical" else ""
 
 
 def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, Colour]]:
@@ -367,16 +344,8 @@ def _limits(residual: Residual, factor: float, values: Array | None = None) -> t
 
 
 def free_curves(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -> Section:
-    """Each named effect that is a function of a logged signal, by its law and free of it."""
-    caption = (
-        "Band: mean of what the model without the effect leaves there, with its 95 % interval;"
-        " a law that stays inside it says what the logs say."
-    )
-    return Section("Law and logs", chart_html(curves_chart(curves, rotary, command), caption))
-
-
-def curves_chart(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -> Chart:
-    """The chart of `free_curves`; command: unit of u."""
+    """Each named effect that is a function of a logged signal, by its law and free of it; command:
+    unit of u."""
     panels = []
     for one in curves:
         label, x_factor = axis_of(one.signal, rotary, command)
@@ -390,4 +359,9 @@ def curves_chart(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") 
             )
         )  # fmt: skip
     what = "what each effect gives against its signal, by its law and by the logs alone"
-    return Chart("trace-curves", what, panels, columns=2, shared_x=False)
+    caption = (
+        "Band: mean of what the model without the effect leaves there, with its 95 % interval;"
+        " a law that stays inside it says what the logs say."
+    )
+    chart = Chart("trace-curves", what, panels, columns=2, shared_x=False, caption=caption)
+    return Section("Law and logs", chart)

@@ -11,7 +11,7 @@ from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity
 from workbench.ending import Step, step
 from workbench.output import Row
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
-from workbench.report.view import View, lines_section, notes, table_section
+from workbench.report.view import Section, View, notes
 from workbench.screen import Part, screen, tabled
 from workbench.steps.velocity import (
     VelocityPrediction,
@@ -80,12 +80,6 @@ def _valve(model: VelocityModel, *, with_meaning: bool) -> Part:
     return tabled(MODEL_HEAD, [row[:4] for row in rows])
 
 
-def _said(parts: Sequence[Part | str]) -> list[str]:
-    """What a screen of these parts says, line by line."""
-    lines = screen(*parts).text(verbose=True).splitlines()
-    return [one for one in lines if one.strip()]
-
-
 def velocity_view(
     found: VelocityModel | VelocityTraced | VelocityDesign | VelocityValidation,
 ) -> View:
@@ -99,26 +93,30 @@ def velocity_view(
             files = {"model.json": partial(velocity_document, found)}
             parts = [_valve(found, with_meaning=False), errors,
                      notes(found.remarks, logs_of(found))]  # fmt: skip
-            sections = [table_section("The valve", _valve(found, with_meaning=True)),
-                        lines_section("In words", [errors, *found.remarks])]  # fmt: skip
+            sections = [Section("The valve", _valve(found, with_meaning=True)),
+                        Section("In words", [errors, *found.remarks])]  # fmt: skip
         case VelocityTraced():
             what, sentence = "Trace of", _verdict(found)
             files = {"trace.json": partial(velocity_trace_document, found),
                      "model.json": partial(velocity_document, found.model)}  # fmt: skip
             valve = _valve(found.model, with_meaning=False)
             remarks = notes(found.model.remarks, logs_of(found.model))
-            parts = [_rivals(found), valve, notes(_untried(found)), remarks]
-            sections = [table_section("The valve", _valve(found.model, with_meaning=True)),
-                        lines_section("In words", _said([sentence, *parts]))]  # fmt: skip
+            left_out = ", ".join(found.left.not_tried)
+            untried = notes([f"not tried: {left_out}"] if left_out else [])
+            parts = [_rivals(found), valve, untried, remarks]
+            said = screen(sentence, *parts).text(verbose=True).splitlines()
+            lines = [line for line in said if line.strip()]
+            sections = [Section("The valve", _valve(found.model, with_meaning=True)),
+                        Section("In words", lines)]  # fmt: skip
         case VelocityDesign():
             what, (sentence, *rest) = "Design for", design_lines(found)
             files = {"design.json": partial(velocity_document, found)}
             parts = [*rest, notes(found.remarks)]
-            sections = [lines_section("The controller", [*rest, *found.remarks])]
+            sections = [Section("The controller", [*rest, *found.remarks])]
         case VelocityValidation():
             what, sentence, loops = "Validation for", _passed(found), _validation_table(found)
             files = {"validation.json": partial(velocity_validation_document, found)}
-            parts, sections = [loops], [table_section("The loop", loops)]
+            parts, sections = [loops], [Section("The loop", loops)]
     content = next(iter(files.values()))
     return View(f"{what} {model.card}", sentence, parts, content, files, lambda: sections)
 
@@ -160,10 +158,6 @@ def _rivals(found: VelocityTraced) -> Part:
         for one in found.left.rivals
     ]  # fmt: skip
     return tabled(RIVAL_ROWS, rows, (1, 2, 3))
-
-
-def _untried(found: VelocityTraced) -> list[str]:
-    return [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else []
 
 
 def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:

@@ -13,7 +13,7 @@ from workbench.ending import Step
 from workbench.files import REPORT_FILE
 from workbench.output import OutputFolder, dumps, emit, next_step, written
 from workbench.remarks import Merged, merged, printed_once
-from workbench.report.chart import Chart, chart_assets
+from workbench.report.chart import Chart, chart_assets, chart_html
 from workbench.report.templating import render, safe, used_symbols
 from workbench.screen import Part, Screen, instead, screen
 
@@ -21,12 +21,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Section:
-    """A part of a report: its heading and its HTML."""
+    """A part of a report: its heading, and a chart, a table with lines below it, lines (merged
+    remarks open up), or HTML."""
 
     title: str
-    html: str
+    content: Chart | Part | Sequence[str | Merged] | str
+    below: Sequence[str | Merged] = ()
+
+    @cached_property
+    def html(self) -> str:
+        """What stands below the heading."""
+        match self.content:
+            case str():
+                return self.content
+            case Chart():
+                return str(chart_html(self.content))
+            case Part():
+                return str(table(self.content, self.below))
+        return render("lines", lines=self.content)
 
 
 def table(part: Part, lines: Sequence[Any] = ()) -> Any:
@@ -34,16 +48,6 @@ def table(part: Part, lines: Sequence[Any] = ()) -> Any:
     if not part.whole:
         return safe(render("lines", lines=lines) if lines else "")
     return safe(render("table", head=part.full_head, rows=part.whole, lines=lines))
-
-
-def table_section(title: str, part: Part, lines: Sequence[Any] = ()) -> Section:
-    """A section that is a table."""
-    return Section(title, table(part, lines))
-
-
-def lines_section(title: str, lines: Sequence[Any]) -> Section:
-    """A section of lines; merged remarks open up."""
-    return Section(title, render("lines", lines=lines))
 
 
 def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str] = ()) -> str:

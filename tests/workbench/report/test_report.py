@@ -12,10 +12,11 @@ from tests.chain import TABLES, designed, identified, model_of
 from workbench.cards.parameter_units import friction_units
 from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
-from workbench.report.reports import design_view, identified_view, validation_view
-from workbench.report.validation_tables import (
+from workbench.report.reports import design_view, identified_view
+from workbench.report.validation import (
     validation_lines,
     validation_table,
+    validation_view,
 )
 from workbench.report.view import Section, page
 from workbench.steps.identify_sources import Identified

@@ -7,7 +7,7 @@ import numpy as np
 
 from workbench.output import OutputFolder
 from workbench.report.chart import Chart, Line, Panel
-from workbench.report.view import OUT, Section, View, notes, table_section
+from workbench.report.view import OUT, Section, View, notes
 from workbench.screen import instead, more, tabled
 
 TABLE = tabled(("what", "size"), [("a", "1")], whole=[("a", "1"), ("b", "2")])
@@ -21,7 +21,7 @@ def view() -> View:
         [TABLE, instead(["in short"], ["at length"]), more("beside"), notes(["one", "two"])],
         lambda: {"schema": "x/1", "size": 1.0},
         {"x.json": lambda: {"schema": "x/1", "size": 1.0}, "x.csv": lambda: "t\n0\n"},
-        lambda: [table_section("Sizes", TABLE, ["a line"]), Section("More", "<p>more</p>")],
+        lambda: [Section("Sizes", TABLE, ["a line"]), Section("More", "<p>more</p>")],
         lambda: Chart("x", "a line", [Panel("t [s]", "y [m]", [Line("y", X, X)])]),
         [f"`workbench design {OUT}x.json` goes on"],
     )

@@ -14,7 +14,7 @@ from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Recommendation
 from workbench.documents.drive import present_file
 from workbench.documents.model import Model
-from workbench.report.validation_tables import validation_table
+from workbench.report.validation import validation_table
 from workbench.steps import recommend
 from workbench.steps.design import with_choice
 from workbench.steps.linear_loop import force_period, periods

@@ -15,7 +15,7 @@ from workbench.documents.model import Model
 from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import schedule_lines, schedule_rows
-from workbench.report.reports import validation_view
+from workbench.report.validation import validation_view
 from workbench.steps.clear_win import Contest, contest, strokes, that_may_be
 from workbench.steps.closed_loop import driven_loop, scheduled_loop
 from workbench.steps.local_friction import asked_for, local

@@ -26,8 +26,8 @@ from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
+from workbench.report.friction import sliding_friction
 from workbench.report.trace import traced_view
-from workbench.report.trace_friction import sliding_friction
 from workbench.report.trace_pictures import (
     axis_of,
     effect_at_rows,

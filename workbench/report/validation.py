@@ -1,0 +1,293 @@
+"""A validation: verdict and figures, steps and smooth reference in the simulated loop."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from design.loop import LoopRun
+from identification.arrays import Array
+from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import length, number, units_of
+from workbench.output import Row
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
+from workbench.report.view import Section, View, notes
+from workbench.screen import Part, listed, more, tabled
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
+from workbench.steps.recommend import (
+    in_thousandths,
+    other_figures,
+    own_figures,
+    percent,
+    settling_words,
+)  # fmt: skip
+from workbench.steps.validate import Validation, validation_document
+
+LOOP_COLOURS: dict[str, Colour] = {
+    "rst": "reference", "pid": "model", "p-pi": "measured", PRESENT: "before",
+}  # fmt: skip
+ERRORS_SHOWN: tuple[tuple[Literal["step", "smooth"], str], ...] = (
+    ("smooth", "along the smooth reference"),
+    ("step", "at rest, last step"),
+)
+SETTLING_TIMES_SHOWN = 4.0  # settling times shown after a step
+SINCE = "time since the step [s]"
+STEPS_CAPTION = (
+    "The loop with the identified Karnopp friction and the logs' noise, all controllers from"
+    " the moment of the step; dashed: with the compensator, dotted: with the gain schedule,"
+    " broken grey lines: the command's limits."
+)
+
+
+def validation_view(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False
+) -> View:
+    """Whether the design holds in simulation, and what the loop does."""
+
+    def sections() -> Sequence[Section]:
+        places = dict.fromkeys(place for _, place in traces)
+        drawn = [one for place in places for one in _loop(found, traces, place, rotary)]
+        lines = validation_lines(found, rotary)
+        verdict = Section("Verdict", validation_table(found, rotary), lines)
+        return (*drawn[:1], verdict, *drawn[1:])
+
+    return View(
+        f"Validation for {found.card}",
+        validation_sentence(found),
+        validation_parts(found, rotary),
+        lambda: validation_document(found),
+        {"validation.json": lambda: validation_document(found)},
+        sections,
+        lambda: _step_chart(found, traces, "model", rotary),
+        [
+            "`workbench export DESIGN --to c` writes it as code for the drive"
+            if found.passed
+            else "`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"
+        ],
+        then_by_command=not found.passed,
+    )
+
+
+def validation_table(found: Validation, rotary: bool = False) -> Part:
+    """A row a controller and plant."""
+    alone = len(found.figures[found.judged]) == 1
+    rows = [
+        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        for name, places in found.figures.items()
+        for place, one in places.items()
+    ]
+    return tabled(_head(found, rotary), rows, right=())
+
+
+def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
+    units, one = shown(rotary), _any(found)
+    where = ("on",) if len(found.figures[found.judged]) > 1 else ()
+    command = () if one.command_peak is None else (f"command {one.command_unit}",)
+    figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
+    return ("loop", *where, *figures, f"force {units.force}", *command, "limit cycle")
+
+
+def _any(found: Validation) -> LoopFigures:
+    return next(iter(found.figures[found.judged].values()))
+
+
+def _shown(name: str) -> str:
+    """A loop's name as a narrow column takes it."""
+    alone = name.removesuffix(COMPENSATED)
+    if alone == PRESENT:
+        return PRESENT
+    if name.endswith(SCHEDULED):
+        return f"{name.removesuffix(SCHEDULED).upper()}+table"
+    return alone.upper() if alone == name else f"{alone.upper()}+comp"
+
+
+def _row(one: LoopFigures, units: Shown) -> Row:
+    m, passes = one.margins, "yes" if one.passed else "no"
+    modulus, delay = f"{m.modulus:.3f}" if m else "unstable", "-"
+    command: tuple[str, ...] = ()
+    if one.command_peak is not None:  # and for how long it is at its limit
+        limited = f" ({100 * one.limited:.1g} %)" if one.limited else ""
+        command = (f"{one.command_peak:.3g}{limited}",)
+    if m:
+        delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g}"
+    if not one.stable:
+        return (passes, modulus, delay, *["-"] * (6 + len(command)))
+    cycle = "none"
+    if one.limit_cycle:
+        size, unit = in_thousandths(one.limit_cycle.amplitude, units)
+        cycle = f"{size:.2g} {unit}, {one.limit_cycle.period:.2g} s"
+    return (passes, modulus, delay, *error_cells(one), *command, cycle)
+
+
+def error_cells(one: LoopFigures) -> Row:
+    """What a loop that holds does of a step and a smooth reference, and the force for it."""
+    return (
+        percent(one.standstill_relative),
+        percent(max(one.overshoot, 0.0)),
+        settling_words(one),
+        percent(one.smooth_relative),
+        f"{one.force_peak:.3g}",
+    )
+
+
+def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
+    """What fails and what to know, in words."""
+    alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
+    others = other_figures(found.why)
+    lines = [others] if others else []
+    lines += [line for name in alone for line in _missed(found, name)]
+    lines.append(columns_line(found, rotary))
+    return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def columns_line(found: Validation, rotary: bool = False) -> str:
+    """What the columns of the table mean, and the limits of command and force."""
+    one, units = _any(found), shown(rotary)
+    limit = (
+        "" if one.command_limit is None else f"; limit {one.command_limit:.4g} {one.command_unit}"
+    )
+    table = any(name.endswith(SCHEDULED) for name in found.figures)
+    beside = "+comp: with the compensator" + ("; +table: with the gain schedule" if table else "")
+    limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
+    return (
+        f"steps of {length(one.step, rotary)}; at rest, over (overshoot): error relative to the"
+        " step; smooth: to the amplitude of the smooth reference; margin: modulus margin; delay:"
+        f" delay margin in sampling periods; {beside}{limit}"
+    )
+
+
+def missed(found: Validation) -> str | None:
+    """Why the tested controller does not pass, in one line; None where it does."""
+    return None if found.passed else "; ".join(_missed(found, found.judged))
+
+
+def _missed(found: Validation, name: str) -> list[str]:
+    return [
+        f"{name if name == PRESENT else name.upper()} on the {place}: {limit}"
+        for place, one in found.figures[name].items()
+        for limit in one.missed
+    ]
+
+
+def validation_sentence(found: Validation) -> str:
+    """Whether the tested controller passed and with which figures; what it misses."""
+    said = f"{found.judged.upper()} {'passes' if found.passed else 'fails'} in simulation"
+    if not found.passed:
+        return f"{said}: {missed(found)}."
+    return f"{said}: {own_figures(found.why)}." if found.why else f"{said}."
+
+
+def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
+    """The figures of each loop; what controllers miss that are not tested, with --verbose."""
+    others = other_figures(found.why)
+    alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
+    return [
+        validation_table(found, rotary),
+        *([more(others)] if others else []),
+        *(more(listed(_missed(found, name))) for name in alone),
+        columns_line(found, rotary),
+        notes(found.remarks),
+    ]
+
+
+def _loop(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+) -> list[Section]:
+    """The loop on one plant, all controllers over each other: after steps, then where they rest."""
+    on = "the identified plant" if place == "model" else "the other plant"
+    return [
+        Section(f"Steps on {on}", _step_chart(found, traces, place, rotary)),
+        Section(f"Error on {on}", _error_chart(traces, place, rotary)),
+    ]
+
+
+def _step_chart(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+) -> Chart:
+    """Position and command after the first step up and the first one down, loops overlaid."""
+    (unit, factor), first = units_of(rotary).position, found.figures[found.judged][place]
+    runs = _runs(traces, place, "step")
+    some = next(iter(runs.values()))
+    begins = [int(at) for at in np.flatnonzero(np.diff(some.r))[:2] + 1]
+    span = _span(found, place, begins[1] - begins[0], some)
+    command = first.command_unit if first.command_peak is not None else units_of(rotary).force.name
+    limit = first.command_limit
+    panels = []
+    for begin in begins:
+        height = factor * float(some.r[begin] - some.r[begin - 1])
+        title = f"step of {number(height)} {unit}"
+        lines = [_cut(some, some.r, begin, span, factor, "reference", "other", "dotted")]
+        lines += [_of(name, run, run.y, begin, span, factor) for name, run in runs.items()]
+        panels.append(
+            Panel(SINCE, f"position [{unit}]", lines, title, y_range=_near(lines, height))
+        )
+    for begin in begins:
+        lines = [_of(name, run, run.u, begin, span, 1.0) for name, run in runs.items()]
+        marks = [] if limit is None else [Mark(-limit), Mark(limit)]
+        panels.append(Panel(SINCE, f"command [{command}]", lines, marks=marks))
+    what = "position and command after a step in the simulated loop, all controllers"
+    return Chart(f"loop-{place}", what, panels, columns=2, caption=STEPS_CAPTION)
+
+
+def _near(lines: Sequence[Line], height: float) -> tuple[float, float] | None:
+    """Range around a step where a loop leaves it by far, as one that runs away."""
+    reference, *loops = lines
+    low, high = float(reference.y.min()), float(reference.y.max())
+    low, high = min(low, high - abs(height)), max(high, low + abs(height))
+    low, high = low - abs(height), high + abs(height)
+    inside = all(bool(np.all((one.y > low) & (one.y < high))) for one in loops)
+    return None if inside else (low, high)
+
+
+def _error_chart(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Chart:
+    """Error along the smooth reference and in the last dwell, loops overlaid."""
+    unit, factor = units_of(rotary).position
+    panels = []
+    for kind, title in ERRORS_SHOWN:
+        runs = _runs(traces, place, kind)
+        some = next(iter(runs.values()))
+        begin = 0 if kind == "smooth" else _rest(some)
+        span = len(some.t) - begin
+        lines = [_of(name, run, run.r - run.y, begin, span, factor) for name, run in runs.items()]
+        start = "time [s]" if kind == "smooth" else "time, after half of the dwell [s]"
+        panels.append(Panel(start, f"error [{unit}]", lines, title))
+    what = "error along the smooth reference and at rest in the simulated loop, all controllers"
+    caption = "What is left of the error where it should be none: the smaller, the better."
+    return Chart(f"error-{place}", what, panels, columns=2, shared_x=False, caption=caption)
+
+
+def _runs(
+    traces: Mapping[tuple[str, str], Traces], place: str, kind: Literal["step", "smooth"]
+) -> dict[str, LoopRun]:
+    return {name: getattr(run, kind) for (name, where), run in traces.items() if where == place}
+
+
+def _span(found: Validation, place: str, most: int, run: LoopRun) -> int:
+    """Samples after a step in which the loops differ: until the slowest has long settled."""
+    times = [one[place].settling for one in found.figures.values() if place in one]
+    h = float(run.t[1] - run.t[0])
+    return int(np.clip(SETTLING_TIMES_SHOWN * float(np.median(times)) / h, min(50, most), most))
+
+
+def _rest(run: LoopRun) -> int:
+    """First sample of the last half of the last dwell."""
+    last = int(np.flatnonzero(np.diff(run.r))[-1]) + 1
+    return (last + len(run.r)) // 2
+
+
+def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
+    """A line of a loop, called and coloured by its controller."""
+    alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
+    shown = name if alone == PRESENT else name.replace(alone, alone.upper())
+    beside: LineStyle = "dotted" if name.endswith(SCHEDULED) else "dashed"
+    style: LineStyle = "line" if alone == name else beside
+    return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], style)
+
+
+def _cut(
+    run: LoopRun, values: Array, begin: int, span: int, factor: float, name: str, colour: Colour,
+    style: LineStyle,
+) -> Line:  # fmt: skip
+    part = slice(begin, begin + span)
+    t = run.t[part]
+    return Line(name, t - t[0], factor * np.asarray(values, dtype=np.float64)[part], colour, style)
