@@ -1,31 +1,22 @@
 """A design as tables and lines, for a terminal and a report."""
 
 from design.drive_law import DriveLaw
-from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number
 from workbench.documents.codec import Output
 from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import units_of
 from workbench.documents.drive import equation_lines, force_lines
 from workbench.output import Row
-from workbench.report.view import OUT, notes
+from workbench.report.view import notes
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import takes_compensator
 from workbench.steps.recommend import other_figures, own_figures
 
 DESIGN_HEAD = (
-    "loop",
-    "w_n rad/s",
-    "zeta",
-    "modulus",
-    "worst",
-    "gain",
-    "phase",
-    "delay",
-    "periods",
-    "|S_up|",
-)
+    "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",
+)  # fmt: skip
 IN_DRIVES_HEAD = (
     "in a drive's words", "crossover", "bandwidth", "gain margin", "phase margin", "delay margin",
 )  # fmt: skip
@@ -79,25 +70,43 @@ def _margins(one: Controller) -> Row:
 
 def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    p = found.plant
-    others = other_lines(found)
-    lines = [*others, MARGINS_SAID, f"plant: {p.source}, {p.why}", *loop_lines(found, rotary)]
-    lines += [*schedule_lines(found, rotary), *schedule_rows(found, rotary)]
-    lines += [*refused_lines(found), *missed_lines(found), *set_point_lines(found)]
-    return [*lines, *(f"note: {line}" for line in found.remarks)]
+    return [
+        *other_lines(found),
+        MARGINS_SAID,
+        f"plant: {found.plant.source}, {found.plant.why}",
+        *loop_lines(found, rotary),
+        *schedule_lines(found, rotary),
+        *schedule_rows(found, rotary),
+        *refused_lines(found),
+        *missed_lines(found),
+        *set_point_lines(found),
+        *(f"note: {line}" for line in found.remarks),
+    ]
 
 
 def other_lines(found: Design) -> list[str]:
     """The figures of the other controllers, and of the present one, beside the recommended."""
     why = found.recommendation.why if found.recommendation else ""
-    return [other_figures(why)] if found.recommended != "none" and other_figures(why) else []
+    others = other_figures(why)
+    return [others] if found.recommended != "none" and others else []
 
 
 def loop_lines(found: Design, rotary: bool = False) -> list[str]:
     """Periods, gains and the compensator of the loops."""
     p, c = found.plant, found.compensator
     units = shown(rotary, found.command.unit if found.command else "V")
-    lines = [f"position loop every {1e3 * p.h:.4g} ms{_output(found, units)}"]
+    output, command = "", found.command
+    if command is not None:
+        most = (
+            "no limit" if command.limit is None else f"at most {command.limit:.4g} {command.unit}"
+        )
+        output = f", its output the command in {command.unit}, {most}"
+        if found.force is not None:
+            output = (
+                f", its output the force reference in {units.force} for the force loop, whose"
+                f" command is in {command.unit}, {most}"
+            )
+    lines = [f"position loop every {1e3 * p.h:.4g} ms{output}"]
     if found.force:
         f = found.force
         lines.append(
@@ -220,42 +229,15 @@ def design_sentence(found: Design) -> str:
     why = ""
     if found.recommendation:
         why = f". With friction in simulation: {own_figures(found.recommendation.why)}"
-    said = (
-        f"{found.recommended.upper()} recommended, position loop every {1e3 * found.plant.h:.4g} ms"
-    )
-    return f"{said}{why}."
-
-
-def then_of_design(found: Design) -> list[str]:
-    """What to do next with a design."""
-    file = f"{OUT}design.json"
-    if found.recommended == "none":
-        return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and"
-                " identify again"]  # fmt: skip
-    return [f"`workbench validate MODEL {file}` checks it in simulation, then `workbench export"
-            f" {file} --to c` writes it as code"]  # fmt: skip
-
-
-def _output(found: Design, units: Shown) -> str:
-    """What the controllers give, and its limit, in words."""
-    command = found.command
-    if command is None:
-        return ""
-    limit = "no limit" if command.limit is None else f"at most {command.limit:.4g} {command.unit}"
-    if found.force is None:
-        return f", its output the command in {command.unit}, {limit}"
-    return (
-        f", its output the force reference in {units.force} for the force loop, whose command is in"
-        f" {command.unit}, {limit}"
-    )
+    every = f"position loop every {1e3 * found.plant.h:.4g} ms"
+    return f"{found.recommended.upper()} recommended, {every}{why}."
 
 
 def drive_lines(found: Design, only: str | None = None) -> list[str]:
     """The difference equation of each controller, or of one, as its drive runs it."""
     if found.command is None:
         return []
-    units, limit = units_of(found), found.command.limit
-    out = []
+    units, limit, out = units_of(found), found.command.limit, list[str]()
     laws: dict[str, tuple[DriveLaw, Output]] = {
         name: (one.law(found.command), found.output) for name, one in found.controllers.items()
     }

@@ -95,13 +95,9 @@ def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> 
                 ],
             )
         )  # fmt: skip
-    what, caption = (
-        "friction force against velocity, samples of the logs and the model",
-        _caption(model),
-    )
-    return Section(
-        "Friction", Chart("friction", what, panels, columns=2, shared_x=False, caption=caption)
-    )
+    what = "friction force against velocity, samples of the logs and the model"
+    chart = Chart("friction", what, panels, 2, shared_x=False, caption=_caption(model))
+    return Section("Friction", chart)
 
 
 def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:

@@ -77,15 +77,16 @@ def is_left_out(param: Param, estimate: Estimate) -> bool:
     return param.spare and estimate.value == 0.0 and estimate.sd is None
 
 
-def estimate_cells(estimate: Estimate) -> tuple[str, str, str]:
-    """Value, unit, and 95 % interval or why there is none, of a parameter."""
+def estimate_cells(estimate: Estimate, why: str = "not identified: ") -> tuple[str, str, str]:
+    """Value, unit, and 95 % interval or why there is none, of a parameter; why: before a reason."""
     estimate = as_shown(estimate)
     if estimate.value is None:
-        return "-", estimate.unit, f"not identified: {estimate.reason}"
+        reason = estimate.reason if why else estimate.reason or "not identified"
+        return "-", estimate.unit, f"{why}{reason}"
     if estimate.low is None or estimate.high is None:
         return number(estimate.value, 4), estimate.unit, estimate.reason or "no interval"
-    low, high = in_digits((estimate.low, estimate.high), estimate.value, estimate.sd)
-    (value,) = in_digits((estimate.value,), estimate.value, estimate.sd)
+    numbers = (estimate.value, estimate.low, estimate.high)
+    value, low, high = in_digits(numbers, estimate.value, estimate.sd)
     return value, estimate.unit, f"{low} to {high}"
 
 
@@ -118,23 +119,19 @@ def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> li
 
     value: column of the value, before those of the unit and of the interval or reason.
     """
-    out: dict[tuple[str, ...], list[Row]] = {}
+    groups: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        has_value = row[value] != "-"
-        out.setdefault((row[0],) if has_value else ("", _short(row[value + 2], logs)), []).append(
-            row
-        )
-    return [
-        alike[0] if name else _together(alike, reason, value)
-        for (name, *reason), alike in out.items()
-    ]
-
-
-def _together(alike: Sequence[Row], reason: Sequence[str], value: int) -> Row:
-    """Rows of parameters that are not identified for the same reason as one."""
-    names, units = ", ".join(row[0] for row in alike), {row[value + 1] for row in alike}
-    unit, rest = units.pop() if len(units) == 1 else "", len(alike[0]) - value - 3
-    return (names, *alike[0][1:value], "-", unit, *reason, *[""] * rest)
+        key = (row[0],) if row[value] != "-" else ("", _short(row[value + 2], logs))
+        groups.setdefault(key, []).append(row)
+    out = []
+    for (name, *reason), alike in groups.items():
+        row, units = alike[0], {one[value + 1] for one in alike}
+        if not name:
+            unit = units.pop() if len(units) == 1 else ""
+            names, rest = ", ".join(one[0] for one in alike), [""] * (len(row) - value - 3)
+            row = (names, *row[1:value], "-", unit, *reason, *rest)
+        out.append(row)
+    return out
 
 
 def _short(reason: str, logs: Iterable[str]) -> str:
@@ -199,11 +196,9 @@ def next_of_model(model: Model) -> str:
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
-    by = (
-        "the command"
-        if model.fit.drive == "command"
-        else f"the applied force, {run_coupling(model)}"
-    )
+    by = "the command"
+    if model.fit.drive != "command":
+        by = f"the applied force, {run_coupling(model)}"
     lines = [
         f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
         f" {e.duration:.4g} s, driven by {by}"

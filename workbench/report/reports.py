@@ -26,7 +26,6 @@ from workbench.report.design_tables import (
     drive_table,
     margins_table,
     polynomial_lines,
-    then_of_design,
 )
 from workbench.report.fit import fit_chart, residual
 from workbench.report.friction import friction_curve
@@ -42,11 +41,19 @@ from workbench.report.model_tables import (
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
-from workbench.report.view import Section, View, report_notes, table
+from workbench.report.view import OUT, Section, View, report_notes, table
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.predict import fitted_run
 from workbench.steps.predicted_force import missing_force
+
+THEN = (
+    f"`workbench validate MODEL {OUT}design.json` checks it in simulation, then `workbench export"
+    f" {OUT}design.json --to c` writes it as code"
+)
+THEN_WITHOUT = (
+    "`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and identify again"
+)
 
 
 def identified_view(found: Identified) -> View:
@@ -102,7 +109,7 @@ def design_view(found: Design, rotary: bool = False) -> View:
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
-        then_of_design(found),
+        [THEN_WITHOUT if found.recommended == "none" else THEN],
         then_by_command=found.recommended == "none",
     )
 

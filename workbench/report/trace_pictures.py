@@ -44,7 +44,6 @@ EQUATION_TITLES = {
     "position": "position of the free run",
 }
 ROWS_TAKEN = {"position": "sample by sample, run in windows of 2 s from measured states"}
-WINDOWS = "averaged over short windows"  # rows of the equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,11 +201,14 @@ def over_time(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Sec
         y_range=_limits(residual, factor),
     )  # fmt: skip
     what = f"residual of the {equation} against time, before and after"
-    chart = Chart(
-        f"trace-time-{residual.equation}", what, [panel], parts=parts_of(logs, starts.tolist(), ends.tolist()),
-        caption=f"{equation.capitalize()}, {ROWS_TAKEN.get(residual.equation, WINDOWS)}; a complete"
-        f" model has 95 % of its points in the band, here {', '.join(shares)}.",
-    )  # fmt: skip
+    rows = ROWS_TAKEN.get(residual.equation, "averaged over short windows")
+    caption = (
+        f"{equation.capitalize()}, {rows}; a complete model has 95 % of its points in the band,"
+        f" here {', '.join(shares)}."
+    )
+    parts = parts_of(logs, starts.tolist(), ends.tolist())
+    name = f"trace-time-{residual.equation}"
+    chart = Chart(name, what, [panel], parts=parts, caption=caption)
     return Section(f"What the model leaves over time: {equation}", chart)
 
 

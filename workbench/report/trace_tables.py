@@ -6,24 +6,12 @@ from dataclasses import replace
 
 from identification.effects._base import Param
 from identification.log import Rig
-from identification.model.estimates import Estimate
 from identification.tracing.regression.significance import DRAWS
-from identification.tracing.result import (
-    EffectRival,
-    FoundEffect,
-    Trace,
-)
+from identification.tracing.result import EffectRival, FoundEffect, Trace
 from workbench.cards.parameter_units import shown
-from workbench.cards.readable import (
-    as_shown,
-    in_digits,
-    number,
-    shown_unit,
-    small,
-    units_of,
-)
+from workbench.cards.readable import as_shown, in_digits, number, shown_unit, small, units_of
 from workbench.output import Row
-from workbench.report.model_tables import is_left_out, reasons_once
+from workbench.report.model_tables import estimate_cells, is_left_out, reasons_once
 from workbench.report.trace_words import percent, words
 from workbench.report.view import notes
 from workbench.screen import Part, more, tabled
@@ -49,25 +37,15 @@ def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
          found.noise_y),
         ("actuator_rms", f"actuator equation [{unit}/s]", 1.0, found.noise_actuator),
     )  # fmt: skip
-    rows: list[Row] = [
-        (
-            name,
-            *(
-                _cell(getattr(errors, key), factor)
-                for where in ("train", "test")
-                for errors in (found.before[where], found.after[where])
-            ),
-            "" if floor is None else small(factor * floor),
-        )
-        for key, name, factor, floor in errors
-    ]
+    columns = [one[where] for where in ("train", "test") for one in (found.before, found.after)]
+    rows = list[Row]()
+    for key, name, factor, floor in errors:
+        values = [getattr(one, key) for one in columns]
+        cells = ("-" if value is None else small(factor * value) for value in values)
+        rows.append((name, *cells, "" if floor is None else small(factor * floor)))
     known = [row for row in rows if set(row[1:5]) != {"-"} and "%" not in row[0]]
     fell = [row for row in known if row[1] != row[2] or row[3] != row[4]]
     return tabled(head, fell or known, whole=rows)
-
-
-def _cell(value: float | None, factor: float) -> str:
-    return "-" if value is None else small(factor * value)
 
 
 def effects_table(found: Trace, rig: Rig, logs: Sequence[str] = ()) -> Part:
@@ -76,8 +54,8 @@ def effects_table(found: Trace, rig: Rig, logs: Sequence[str] = ()) -> Part:
     for e in found.effects:
         estimates = effect_estimates(e, rig)
         for p in shown_params(e):
-            value, interval = _value_cells(estimates[p.name])
-            unit = "" if p.unit == "1" else as_shown(estimates[p.name]).unit
+            value, unit, interval = estimate_cells(estimates[p.name], "")
+            unit = "" if p.unit == "1" else unit
             rows.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
     once = effects_once(rows, found, logs)
     if len(found.effects) == 1:
@@ -89,18 +67,6 @@ def effects_table(found: Trace, rig: Rig, logs: Sequence[str] = ()) -> Part:
 def shown_params(of: FoundEffect) -> list[Param]:
     """The parameters of an effect but for sizes that it does without."""
     return [p for p in of.effect.params if not is_left_out(p, of.params[p.name])]
-
-
-def _value_cells(estimate: Estimate) -> tuple[str, str]:
-    """Value and interval, with the digits that mean something."""
-    estimate = as_shown(estimate)
-    if estimate.value is None:
-        return "-", estimate.reason or "not identified"
-    if estimate.low is None or estimate.high is None:
-        return number(estimate.value, 4), estimate.reason or "no interval"
-    numbers = (estimate.value, estimate.low, estimate.high)
-    value, low, high = in_digits(numbers, estimate.value, estimate.sd)
-    return value, f"{low} to {high}"
 
 
 def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row]:
@@ -160,19 +126,15 @@ def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
     """The plain parameters; before and after the effects joined, where any did."""
     out: list[Row] = []
     for name, after in found.parameters_after.items():
-        value, interval = _value_cells(after)
-        after = as_shown(after)
-        before = found.parameters_before.get(name)
+        value, unit, interval = estimate_cells(after, "")
+        before, now = found.parameters_before.get(name), as_shown(after).value
         if not found.effects:
-            out.append((name, value, after.unit, interval))
-        elif before is None or before.value is None or after.value is None:
-            out.append((name, "-", value, after.unit, interval, ""))
+            out.append((name, value, unit, interval))
+        elif before is None or (was := as_shown(before)).value is None or now is None:
+            out.append((name, "-", value, unit, interval, ""))
         else:
-            shown_before = as_shown(before)
-            assert shown_before.value is not None
-            (was,) = in_digits((shown_before.value,), shown_before.value, shown_before.sd)
-            change = percent(shown_before.value, after.value)
-            out.append((name, was, value, after.unit, interval, change))
+            (said,) = in_digits((was.value,), was.value, was.sd)
+            out.append((name, said, value, unit, interval, percent(was.value, now)))
     shortened = reasons_once(out, logs, 2 if found.effects else 1)
     return tabled(CHANGE_HEAD if found.effects else SAME_HEAD, shortened, whole=out)
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from identification.estimation.latent_force import LatentForces
 from identification.tracing.probability import is_probable
-from identification.tracing.result import Change, Dependence, Errors, Trace
+from identification.tracing.result import Change, Dependence, Trace
 from identification.tracing.verdict import listed
 from workbench.cards.readable import force, length, number, shown_unit
 from workbench.report.view import OUT
@@ -37,16 +37,12 @@ def words(key: str) -> str:
 def trace_sentence(traced: Traced) -> str:
     """The verdict in one or two plain sentences, how much of friction the model lacks, and whether
     it is a verdict for the time being."""
-    left_out = traced.trace.not_tried
-    early = f" Ended early, so this is for now; not tried: {'; '.join(left_out)}."
-    return _verdict_sentence(traced) + _of_friction(traced.trace) + (early if left_out else "")
-
-
-def _of_friction(found: Trace) -> str:
-    """The force that is missing on the held-out logs, as a share of friction."""
-    if found.missing is None:
-        return ""
-    return f" Force missing: {before_and_after(found)}."
+    found, said = traced.trace, _verdict_sentence(traced)
+    if found.missing is not None:
+        said += f" Force missing: {before_and_after(found)}."
+    if found.not_tried:
+        said += f" Ended early, so this is for now; not tried: {'; '.join(found.not_tried)}."
+    return said
 
 
 def before_and_after(found: Trace) -> str:
@@ -70,8 +66,11 @@ def _verdict_sentence(traced: Traced) -> str:
         f"{words(e.effect.key)} – {e.effect.meaning} (probability {chance(e.probability)})"
         for e in found.effects
     )
-    error = fall_of_error(traced) if found.effects else ""
-    errors = f" {error}" if error else ""
+    error, errors = reported_error(traced) if found.effects else None, ""
+    if error is not None:
+        noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
+        fall = f"{error.write(error.before)} -> {error.write(error.after)}"
+        errors = f" {error.name} {fall}{noise}."
     changed = ", ".join(_changed(change) for change in found.drift)
     match found.verdict:
         case "unknown" if found.not_tried and not found.effects:
@@ -87,25 +86,23 @@ def _verdict_sentence(traced: Traced) -> str:
                 " its structure holds."
             )
         case "inseparable":
-            others = " or ".join(words(key) for key in dict.fromkeys(equal_rival_keys(found)))
+            equal = [r for r in found.rivals if r.why_not.startswith("explains as much")]
+            keys = dict.fromkeys(one.key for one in equal or found.rivals[:1])
+            others = " or ".join(map(words, keys))
             rival = f" It is not distinguishable from {others}." if others else ""
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
+        case _ if found.effects:
+            return _partly(traced, names, errors)
+        case _ if found.unknown.depends_on:
+            left = _on_signals(found.unknown)
+            return f"Unknown: what is left {left}, and no effect of the library explains it."
         case _:
-            return _partly(traced, names, errors) if found.effects else _unknown(traced)
+            return f"Unknown: {unexplained(traced)}"
 
 
 def chance(probability: float) -> str:
     """A probability as text [%]."""
     return "over 99 %" if probability > CERTAIN else f"{100 * probability:.0f} %"
-
-
-def _unknown(traced: Traced) -> str:
-    unknown = traced.trace.unknown
-    if not unknown.depends_on:
-        return f"Unknown: {unexplained(traced)}"
-    return (
-        f"Unknown: what is left {_on_signals(unknown)}, and no effect of the library explains it."
-    )
 
 
 def _partly(traced: Traced, names: str, errors: str) -> str:
@@ -180,58 +177,27 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
     )
 
 
-def fall_of_error(traced: Traced) -> str:
-    """How the error fell in which the effects show."""
-    error = reported_error(traced)
-    if error is None:
-        return ""
-    noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
-    return f"{error.name} {error.write(error.before)} -> {error.write(error.after)}{noise}."
-
-
 def reported_error(traced: Traced) -> ReportedError | None:
     """The force error, or where that hardly falls the one that falls most."""
     found, rotary = traced.trace, traced.model.rotary
     before, after = found.before["test"], found.after["test"]
     where = "Held-out" if traced.test else "On stretches left out,"
-    noise, rate = found.noise_force, found.noise_actuator
-    every = (
-        ReportedError(
-            f"{where} force error",
-            *_both(before, after, "force_rms"),
-            noise,
-            lambda x: force(x, rotary),
-        ),
-        ReportedError(
-            f"{where} error of the actuator equation",
-            *_both(before, after, "actuator_rms"),
-            rate,
-            lambda x: f"{force(x, rotary)}/s",
-        ),
-        ReportedError(
-            f"{where} position error in 2 s",
-            *_both(before, after, "position_rms"),
-            found.noise_y,
-            lambda x: length(x, rotary),
-        ),
-    )
-    known = [error for error in every if math.isfinite(error.before) and error.before > 0]
-    if not known:
-        return None
-    if known[0] is every[0] and known[0].after <= LEFT_IN_FORCE * known[0].before:
-        return known[0]
-    return min(known, key=lambda error: error.after / error.before)
-
-
-def _both(before: Errors, after: Errors, key: str) -> tuple[float, float]:
-    values = (getattr(before, key), getattr(after, key))
-    return values if None not in values else (math.nan, math.nan)
-
-
-def equal_rival_keys(found: Trace) -> tuple[str, ...]:
-    """Keys of the rivals that explain as much as an effect taken; the first, where none says so."""
-    keys = [r.key for r in found.rivals if r.why_not.startswith("explains as much")]
-    return tuple(keys or [r.key for r in found.rivals[:1]])
+    every: tuple[tuple[str, str, float | None, Callable[[float], str]], ...] = (
+        ("force_rms", "force error", found.noise_force, lambda x: force(x, rotary)),
+        ("actuator_rms", "error of the actuator equation", found.noise_actuator,
+         lambda x: f"{force(x, rotary)}/s"),
+        ("position_rms", "position error in 2 s", found.noise_y, lambda x: length(x, rotary)),
+    )  # fmt: skip
+    known = {
+        key: ReportedError(f"{where} {name}", was, now, noise, write)
+        for key, name, noise, write in every
+        for was, now in [(getattr(before, key), getattr(after, key))]
+        if was is not None and now is not None and math.isfinite(was) and was > 0
+    }
+    of_force = known.get("force_rms")
+    if of_force is not None and of_force.after <= LEFT_IN_FORCE * of_force.before:
+        return of_force
+    return min(known.values(), key=lambda error: error.after / error.before, default=None)
 
 
 def percent(before: float, after: float) -> str:
