@@ -99,11 +99,10 @@ def _objects(what: Compensation, at: int, order: int, one: Harmonic) -> list[tup
     phase = (np.degrees(one.phase) + 180.0) % 360.0
     values = (str(order), f"{phase:.9g}", f"{what.at_motor.travel * one.amplitude:.9g}")
     first = FIRST_OBJECT + 3 * at
+    kinds = (("", "n"), ("deg", "phi"), ("N m", "r"))
     return [
         (f"0x{first + k:02X}", value, unit, f"Cogging compensation Coef {at} {name}")
-        for k, (value, unit, name) in enumerate(
-            zip(values, ("", "deg", "N m"), ("n", "phi", "r"), strict=True)
-        )
+        for k, (value, (unit, name)) in enumerate(zip(values, kinds, strict=True))
     ]
 
 

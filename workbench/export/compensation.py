@@ -57,6 +57,10 @@ class Cost:
     what: str
     force: float | None
 
+    def in_words(self, unit: str) -> str:
+        """The cost, its force in this unit."""
+        return self.what if self.force is None else f"{self.what} {number(self.force)} {unit}"
+
 
 @dataclass(frozen=True)
 class TableFile:
@@ -271,7 +275,7 @@ class Format:
     def __call__(self, what: Compensation) -> TableFile:
         """The file of a model; raises BadModel where a number that it needs is wanting."""
         made = self.content(what)
-        costs = in_file(made.costs, what.force_unit)
+        costs = [one.in_words(what.force_unit) for one in made.costs]
         lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}
         return TableFile(
             f"{what.name}_{self.file}", filled(self.file, **{**lead, **made.values}), self.table,
@@ -331,14 +335,12 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
     curve, out = what.friction, list[Cost]()
     if not signed:
         off, constant = curve.asymmetry, curve.constant_share
-        said = "asymmetry: the table is the mean of both directions, off either way by up to"
+        most = ""
         if abs(constant) > MOST_OF_IT * off > 0:
-            said = (
-                f"asymmetry: the table is the mean of both directions (a constant"
-                f" {number(constant)} {what.force_unit} beside it would take most of it), off"
-                " either way by up to"
-            )
-        out.append(Cost(said, off))
+            beside = f"{number(constant)} {what.force_unit}"
+            most = f" (a constant {beside} beside it would take most of it)"
+        mean = f"asymmetry: the table is the mean of both directions{most}"
+        out.append(Cost(f"{mean}, off either way by up to", off))
     lowest = np.array([curve.low])
     for name, way, level in (
         ("F_sp", "positive", curve.positive(lowest)),
@@ -366,10 +368,9 @@ def other_costs(what: Compensation) -> Iterator[Cost]:
         if effect.place.unit != "N" or effect.evolve is not None or effect.signals:
             yield Cost(f"{said}: {NO_TABLE_HOLDS}", None)
         elif set(effect.depends_on) <= {"y", "v"}:
+            position = is_of_place(one)
             kind = (
-                "a position-dependent force, not friction"
-                if is_of_place(one)
-                else "varies with position"
+                "a position-dependent force, not friction" if position else "varies with position"
             )
             yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))
         else:
@@ -383,13 +384,3 @@ def largest_along(model: Model, one: Acting) -> float:
     speed = np.full(PLACES_ALONG, model.speed or 0.0)
     found = (along(one, plant=model.simulated, way=d, y=y, v=d * speed) for d in (1, -1))
     return max(float(np.max(np.abs(each))) for each in found)
-
-
-def in_file(costs: Iterable[Cost], unit: str) -> list[str]:
-    """Costs as lines of a file."""
-    return [cost_line(one, unit) for one in costs]
-
-
-def cost_line(one: Cost, unit: str) -> str:
-    """A cost in words."""
-    return one.what if one.force is None else f"{one.what} {number(one.force)} {unit}"

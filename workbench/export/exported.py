@@ -54,14 +54,9 @@ class Exported:
 
 
 def exported(
-    found: Design,
-    controller: str | None = None,
-    *,
-    compensated: bool | None = None,
-    scheduled: bool | None = None,
-    precision: Precision = "double",
-    name: str | None = None,
-) -> Exported:
+    found: Design, controller: str | None = None, *, compensated: bool | None = None,
+    scheduled: bool | None = None, precision: Precision = "double", name: str | None = None,
+) -> Exported:  # fmt: skip
     """The controller of the design, by default the recommended one, as a program.
 
     controller: "rst", "pid", "p-pi" or "present". compensated: with the friction compensator, by
@@ -70,13 +65,16 @@ def exported(
     such controller or schedule, recommends none, or is of a version that does not say what the
     drive runs.
     """
-    chosen = controller or found.recommended
+    chosen, choice = controller or found.recommended, found.recommendation
     if chosen == "none":
         have = ", ".join(found.controllers)
         raise BadModel(f"the design recommends no controller; choose one by --controller ({have})")
     loop = _with_schedule(found, chosen, _loop_of(found, chosen), scheduled)
     if compensated is None:
-        compensated = _compensated(found, chosen) and loop.schedule is None
+        compensated = chosen not in ("present", "p-pi")
+        if choice is not None and choice.controller == chosen:
+            compensated = choice.compensator
+        compensated = compensated and loop.schedule is None
     if compensated and isinstance(loop.compensation, FeedForward):
         raise BadModel("a P-PI cascade feeds friction forward, and takes no compensator beside it")
     if compensated:
@@ -86,12 +84,9 @@ def exported(
         loop = replace(loop, compensation=Compensation(found.compensator.value, filters))
     assert found.command is not None
     units = shown(found.motion == "rotary")
+    own = ProgramUnits(units.position, units.force, found.command.unit)
     program = controller_program(
-        identifier(name or found.card),
-        loop.servo,
-        loop.h,
-        ProgramUnits(units.position, units.force, found.command.unit),
-        loop.k_a or 0.0,
+        identifier(name or found.card), loop.servo, loop.h, own, loop.k_a or 0.0
     )
     return Exported(program, loop, found, chosen, _remarks(found, chosen, loop), precision)
 
@@ -112,14 +107,6 @@ def _with_schedule(
         )
     structure: Structure = "pid" if chosen == "pid" else "p-pi"
     return replace(loop, schedule=table.of(structure, one, found.command))
-
-
-def _compensated(found: Design, chosen: str) -> bool:
-    """Whether the controller goes with the compensator where nobody says."""
-    choice = found.recommendation
-    if choice is not None and choice.controller == chosen:
-        return choice.compensator
-    return chosen not in ("present", "p-pi")
 
 
 def _loop_of(found: Design, chosen: str) -> DrivenLoop:

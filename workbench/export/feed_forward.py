@@ -16,7 +16,6 @@ from workbench.export.compensation import (
     Cost,
     TableFile,
     friction_costs,
-    in_file,
 )
 from workbench.export.filled import filled, rows
 from workbench.export.friction_formats import both_ways
@@ -66,25 +65,23 @@ def is_included(one: Acting) -> bool:
 
 def feed_forward_c(what: Compensation) -> tuple[TableFile, ...]:
     """The feed-forward as C99: a header and a source."""
-    header, source = (
-        filled(f"feed_forward.{kind}", **_values(what, "C")) for kind in ("h", "c")
-    )  # fmt: skip
-    first = _file(what, f"{what.name}_feed_forward.c", source, "C99: call it every sample")
-    return first, _file(what, f"{what.name}_feed_forward.h", header, "C99: its header")
+    values = _values(what, "C")
+    source = _file(what, "c", values, "C99: call it every sample")
+    return source, _file(what, "h", values, "C99: its header")
 
 
 def feed_forward_st(what: Compensation) -> tuple[TableFile, ...]:
     """The feed-forward as a function block of IEC 61131-3."""
-    text = filled("feed_forward.st", **_values(what, "ST"))
-    return (_file(what, f"{what.name}_feed_forward.st", text, "a PLC: import it, call it in the"
-                  " axis's task"),)  # fmt: skip
+    where = "a PLC: import it, call it in the axis's task"
+    return (_file(what, "st", _values(what, "ST"), where),)
 
 
-def _file(what: Compensation, name: str, text: str, where: str) -> TableFile:
+def _file(what: Compensation, ending: str, values: dict[str, Any], where: str) -> TableFile:
+    name, text = f"feed_forward.{ending}", filled(f"feed_forward.{ending}", **values)
     v, _, error = both_ways(what, FEED_FORWARD_POINTS)
     units = ("rad, rad/s, rad/s^2, N m" if what.rotary else "m, m/s, m/s^2, N") + " of the axis"
     return TableFile(
-        name, text, "feed-forward", "", units, where, len(v), error, _costs(what),
+        f"{what.name}_{name}", text, "feed-forward", "", units, where, len(v), error, _costs(what),
         _remarks_of(what),
     )  # fmt: skip
 
@@ -116,7 +113,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     return {
         "card": model.card,
         "name": what.name,
-        "costs": in_file(_costs(what), what.force_unit),
+        "costs": [one.in_words(what.force_unit) for one in _costs(what)],
         "remarks": _remarks_of(what),
         "length": "rad" if what.rotary else "m",
         "force": what.force_unit,

@@ -28,9 +28,7 @@ class StructuredText(Syntax):
 
     def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
         head = [f"IF {condition} THEN", *braced(then)]
-        return [*head, "END_IF;"] if not otherwise else [
-            *head, "ELSE", *braced(otherwise), "END_IF;"
-        ]  # fmt: skip
+        return [*head, *(["ELSE", *braced(otherwise)] if otherwise else []), "END_IF;"]
 
     def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
         return [f"FOR {index} := 0 TO {count - 1} DO", *braced(body), "END_FOR;"]
@@ -53,9 +51,7 @@ def st_syntax(precision: Precision) -> StructuredText:
     )  # fmt: skip
 
 
-AT_POSITION_1 = (
-    "_at_1"  # behind a state's name: its entries where the machine has stood at position 1
-)
+AT_POSITION_1 = "_at_1"  # behind a state's name: its entries where it has stood at position 1
 NEVER = "begun"  # whether the block has run before
 EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
 
@@ -133,12 +129,9 @@ def _controller(what: Exported, st: StructuredText) -> Block:
         for one in program.constants
     ]
     tables = [(one.name, one.values, one.meaning) for one in program.tables]
+    stood = "where the machine has stood at position 1"
     tables += [
-        (
-            one.name + AT_POSITION_1,
-            one.at_rest,
-            f"{one.name} where the machine has stood at position 1",
-        )
+        (one.name + AT_POSITION_1, one.at_rest, f"{one.name} {stood}")
         for one in program.states
         if one.array and any(one.at_rest)
     ]
@@ -173,9 +166,8 @@ def _reset(one: State, st: StructuredText) -> list[str]:
     """Lines that put a state at rest at y."""
     place, y = st.name(one.name), st.name("y")
     if one.array:
-        value = (
-            f"{st.name(one.name + AT_POSITION_1)}[j] * {y}" if any(one.at_rest) else st.number(0.0)
-        )
+        moved = f"{st.name(one.name + AT_POSITION_1)}[j] * {y}"
+        value = moved if any(one.at_rest) else st.number(0.0)
         return st.repeated("j", len(one.at_rest), [st.assigned(f"{place}[j]", value)])
     if one.kind == "integer":
         return [st.assigned(place, "0")]

@@ -31,6 +31,7 @@ RANK: Mapping[Operator, int] = {
     "+": 5, "-": 5, "*": 6, "/": 6, "not": 7, "negative": 7,
 }  # fmt: skip
 ATOM = 8
+MIXED = ("and", "or", "<", "<=", ">", ">=")  # put in parentheses within any other
 
 
 @dataclass(frozen=True)
@@ -124,14 +125,7 @@ class Syntax:
     def _inside(self, value: Expression, least: int) -> str:
         """The expression, in parentheses where it binds less than `least`."""
         said, rank = self._ranked(value)
-        mixed = isinstance(value, Operation) and value.operator in (
-            "and",
-            "or",
-            "<",
-            "<=",
-            ">",
-            ">=",
-        )
+        mixed = isinstance(value, Operation) and value.operator in MIXED
         return f"({said})" if rank < least or mixed else said
 
 

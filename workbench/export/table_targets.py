@@ -2,7 +2,7 @@
 files are written and which not, and what they hold, for a terminal and as a document."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from workbench.export.compensation import (
     Format,
     TableFile,
     TablesAsked,
-    cost_line,
 )
 from workbench.export.feed_forward import feed_forward_c, feed_forward_st
 from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE
@@ -63,14 +62,14 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
     for target in dict.fromkeys(targets):
         if target == "csv":
             for table in FORMATS:
-                _tried(_of(table, ""), what, files, left)
+                files += _tried(_of(table, ""), what, left)
             if not files:
                 raise BadModel("; ".join(left))
         elif target in CODE:
             files += CODE[target](what)
         else:
             files += [one(what) for one in _of(target, "")]
-            _for_controls(target, what, controls, files, left)
+            files += _for_controls(target, what, controls, left)
     for control in controls:
         if left and not any(one.control == control for one in files):
             raise BadModel("; ".join(left))
@@ -83,31 +82,28 @@ def _of(table: str, control: str) -> list[Format]:
     return [one for one in FORMATS[table] if one.control == control]
 
 
-def _tried(
-    formats: Iterable[Format], what: Compensation, files: list[TableFile], left: list[str]
-) -> None:
-    """All files of these formats, or why not."""
+def _tried(formats: list[Format], what: Compensation, left: list[str]) -> list[TableFile]:
+    """All files of these formats, or none, and why not among what is `left`."""
     try:
-        files += [one(what) for one in formats]
+        return [one(what) for one in formats]
     except BadModel as error:
         left.append(str(error))
+        return []
 
 
 def _for_controls(
-    target: str, what: Compensation, controls: Sequence[str], files: list[TableFile],
-    left: list[str],
-) -> None:  # fmt: skip
+    target: str, what: Compensation, controls: Sequence[str], left: list[str]
+) -> Iterator[TableFile]:
     """The files of each control; one that is not named is left out where a number is wanting."""
     known = dict.fromkeys(one.control for one in FORMATS[target] if one.control)
     for control in controls or known:
-        formats = _of(target, control)
+        formats, refused = _of(target, control), list[str]()
         if not formats:
             left.append(NOT_THERE[target][control])
-        refused, before = list[str](), len(files)
-        for one in formats:
-            _tried([one], what, files, refused)
-        if controls and refused and len(files) == before:
+        made = [file for one in formats for file in _tried([one], what, refused)]
+        if controls and refused and not made:
             raise BadModel(refused[0])
+        yield from made
         left += refused
 
 
@@ -143,25 +139,24 @@ def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str
 
 def tables_view(what: Compensation, found: Tables, folder: Path) -> Screen:
     """The answer in words, what each file holds, and what none of them can."""
-    rows = [(one.name, one.units, str(one.points), _percent(one.error)) for one in found.files]
-    costs = _costs(found)
+    rows = [
+        (one.name, one.units, str(one.points),
+         "-" if one.error is None else f"{100.0 * one.error:.2f} %")
+        for one in found.files
+    ]  # fmt: skip
+    names = [one.name for one in found.files]
+    beside = f" and {len(names) - 1} beside it" if len(names) > 1 else ""
     remarks = dict.fromkeys(line for one in found.files for line in one.remarks)
-    paste = [f"{one.name}: {one.where}" for one in found.files]
     return screen(
         _sentence(what, found),
         tabled(FILES_HEAD, rows, right=(2, 3)),
-        listed(f"not in {_whose(names)}: {line}" for line, names in _lines(what, costs)),
+        listed(_not_held(what, found)),
         listed(f"note: {line}" for line in (*what.missing, *remarks)),
         listed((f"left out: {line}" for line in found.left_out), most=6),
-        instead((), paste),
+        instead((), [f"{one.name}: {one.where}" for one in found.files]),
         more("the manual page Compensation tables says where each file is pasted"),
-        written(folder, *([one.name for one in found.files][:1])) + _rest(found),
+        written(folder, *names[:1]) + beside,
     )
-
-
-def _rest(found: Tables) -> str:
-    """How many files lie beside the first."""
-    return f" and {len(found.files) - 1} beside it" if len(found.files) > 1 else ""
 
 
 def _sentence(what: Compensation, found: Tables) -> str:
@@ -172,48 +167,34 @@ def _sentence(what: Compensation, found: Tables) -> str:
         return f"{said}."
     curve, (unit, factor) = what.friction, what.speed_unit
     ends = np.array([curve.low, curve.high])
-    up, down = curve.positive(ends), curve.negative(ends)
     slow, fast = (number(factor * v) for v in ends)
+    up, down = (
+        " to ".join(number(float(one)) for one in way(ends))
+        for way in (curve.positive, curve.negative)
+    )
     return (
-        f"{said}; sliding from {slow} to {fast} {unit} takes {number(float(up[0]))} to"
-        f" {number(float(up[1]))} {what.force_unit} in positive and {number(float(down[0]))} to"
-        f" {number(float(down[1]))} {what.force_unit} in negative direction."
+        f"{said}; sliding from {slow} to {fast} {unit} takes {up} {what.force_unit} in positive and"
+        f" {down} {what.force_unit} in negative direction."
     )
 
 
-def _percent(error: float | None) -> str:
-    return "-" if error is None else f"{100.0 * error:.2f} %"
-
-
-def _costs(found: Tables) -> dict[Cost, list[str]]:
-    """Each cost with the files that have it."""
-    out = dict[Cost, list[str]]()
+def _not_held(what: Compensation, found: Tables) -> Iterator[str]:
+    """Costs with the files that have them, the largest first, those without a size last."""
+    files = dict[Cost, list[str]]()
     for one in found.files:
         for cost in one.costs:
             if cost.force != 0.0:
-                out.setdefault(cost, []).append(one.name)
-    return out
-
-
-def _lines(what: Compensation, costs: dict[Cost, list[str]]) -> list[tuple[str, list[str]]]:
-    """Costs in words, the largest first, those without a size last."""
-    order = sorted(costs, key=lambda one: -(one.force if one.force is not None else -1.0))
-    return [(cost_line(one, what.force_unit), costs[one]) for one in order]
-
-
-def _whose(names: list[str]) -> str:
-    """The files that a cost is of."""
-    return names[0] if len(names) == 1 else f"{len(names)} of the files"
+                files.setdefault(cost, []).append(one.name)
+    for cost in sorted(files, key=lambda one: -(one.force if one.force is not None else -1.0)):
+        names = files[cost]
+        whose = names[0] if len(names) == 1 else f"{len(names)} of the files"
+        yield f"not in {whose}: {cost.in_words(what.force_unit)}"
 
 
 def tables_asked(
-    rotary: bool,
-    name: str | None,
-    speed: str | None,
-    per_turn: str | None,
-    rated: str | None,
+    rotary: bool, name: str | None, speed: str | None, per_turn: str | None, rated: str | None,
     encoder: Encoder | None,
-) -> TablesAsked:
+) -> TablesAsked:  # fmt: skip
     """The options in SI; raises BadModel where one is no positive number of its kind."""
     turn = _positive(per_turn, "deg" if rotary else "mm", "--per-turn")
     travel = None if turn is None else (math.radians(turn) if rotary else 1e-3 * turn)

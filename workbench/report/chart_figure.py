@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
+from workbench.report.chart import Chart, Colour, Line, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,20 +101,12 @@ def label(axes: "Axes", x: str, y: str, title: str = "") -> None:
 
 
 FIGURE_COLOURS: dict[Colour, str] = {
-    "measured": MEASURED,
-    "model": MODEL,
-    "reference": REFERENCE,
-    "other": OTHER,
-    "before": BEFORE,
-    "band": BAND,
-    "quiet": GREY,
-}
+    "measured": MEASURED, "model": MODEL, "reference": REFERENCE, "other": OTHER,
+    "before": BEFORE, "band": BAND, "quiet": GREY,
+}  # fmt: skip
 LINE_STYLES: dict[str, dict[str, Any]] = {
-    "line": {},
-    "bold": {"lw": 1.8},
-    "dashed": {"ls": "--"},
-    "dotted": {"ls": ":"},
-}
+    "line": {}, "bold": {"lw": 1.8}, "dashed": {"ls": "--"}, "dotted": {"ls": ":"},
+}  # fmt: skip
 FIGURE_WIDTH, PANEL_HEIGHT = 9.0, 2.3  # inch
 
 
@@ -128,19 +120,16 @@ def chart_figure(chart: Chart) -> "Figure":
             _panel(axes, panel)
         for axes in every[len(chart.panels) :]:
             axes.remove()
-        _legend(drawn, every.tolist()[: len(chart.panels)])
+        # One legend where a panel's names hold for all, else one a panel.
+        used = every[: len(chart.panels)]
+        legends = [axes.get_legend_handles_labels() for axes in used]
+        handles, names = max(legends, key=lambda one: len(one[1]))
+        if all(set(one) <= set(names) for _, one in legends):
+            drawn.legend(handles, names, loc="outside upper right", ncols=4, markerscale=3)
+            return drawn
+        for axes in used:
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, markerscale=3)
     return drawn
-
-
-def _legend(drawn: "Figure", every: "list[Axes]") -> None:
-    """One legend where a panel's names hold for all, else one a panel."""
-    legends = [axes.get_legend_handles_labels() for axes in every]
-    handles, names = max(legends, key=lambda one: len(one[1]))
-    if all(set(one) <= set(names) for _, one in legends):
-        drawn.legend(handles, names, loc="outside upper right", ncols=4, markerscale=3)
-        return
-    for axes in every:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, markerscale=3)
 
 
 def _panel(axes: "Axes", panel: Panel) -> None:
@@ -150,9 +139,12 @@ def _panel(axes: "Axes", panel: Panel) -> None:
             label=area.name,
         )  # fmt: skip
     for band in panel.bands:
-        _band(axes, band)
+        span = axes.axvspan if band.axis == "x" else axes.axhspan
+        colour = FIGURE_COLOURS[band.colour]
+        span(band.low, band.high, color=colour, alpha=0.25, lw=0, label=band.name)
     for mark in panel.marks:
-        _mark(axes, mark)
+        across = axes.axvline if mark.axis == "x" else axes.axhline
+        across(mark.at, color=GREY, lw=0.8, ls="--")
     for one in panel.lines:
         _line(axes, one)
     if panel.log_x:
@@ -166,16 +158,6 @@ def _panel(axes: "Axes", panel: Panel) -> None:
     if panel.y_range:
         axes.set_ylim(panel.y_range)
     label(axes, panel.x, panel.y, panel.title)
-
-
-def _band(axes: "Axes", band: Band) -> None:
-    span = axes.axvspan if band.axis == "x" else axes.axhspan
-    span(band.low, band.high, color=FIGURE_COLOURS[band.colour], alpha=0.25, lw=0, label=band.name)
-
-
-def _mark(axes: "Axes", mark: Mark) -> None:
-    across = axes.axvline if mark.axis == "x" else axes.axhline
-    across(mark.at, color=GREY, lw=0.8, ls="--")
 
 
 def _line(axes: "Axes", one: Line) -> None:

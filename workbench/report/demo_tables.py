@@ -61,41 +61,32 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
     return screen(*parts)
 
 
+def _compensated(design: Design) -> bool:
+    """Whether the design recommends its controller with the compensator."""
+    return design.recommendation is not None and design.recommendation.compensator
+
+
 def controller_sentence(found: Demonstration) -> str:
     """The controller that is recommended, and whether it keeps its limits in simulation."""
-    name = taken(found.design)
     if found.design.recommended == "none":
         return "No controller meets every goal; design.html says what each misses."
+    called = found.design.recommended.upper()
+    if _compensated(found.design):
+        called += " with the friction compensator"
     verdict = "meets all limits in simulation" if found.validation.passed else "misses a limit"
-    return (
-        f"Recommended: {called(name)}, which {verdict}; errors in % of the step or the amplitude:"
-    )
-
-
-def taken(design: Design) -> str:
-    """The loop that a design recommends, by its name in a validation."""
-    recommendation = design.recommendation
-    return design.recommended + (
-        COMPENSATED if recommendation is not None and recommendation.compensator else ""
-    )
-
-
-def called(name: str) -> str:
-    """A loop's name in a sentence."""
-    alone = name.removesuffix(COMPENSATED)
-    return alone.upper() + (" with the friction compensator" if alone != name else "")
+    return f"Recommended: {called}, which {verdict}; errors in % of the step or the amplitude:"
 
 
 def controller_table(found: Demonstration) -> Part:
     """The present controller and the recommended one, side by side."""
-    units, name = shown(found.traced.model.rotary), taken(found.design)
+    units, name = shown(found.traced.model.rotary), found.design.recommended
+    after, beside = name.upper(), _compensated(found.design)
     head = ("controller", "static error", "overshoot", "settling", "tracking error",
             f"peak force [{units.force}]", "modulus margin")  # fmt: skip
-    beside = "+comp" if name.endswith(COMPENSATED) else ""
     figures = {key: places["model"] for key, places in found.validation.figures.items()}
     named = (
         (PRESENT, "before: present"),
-        (name, f"after: {name.removesuffix(COMPENSATED).upper()}{beside}"),
+        (name + COMPENSATED, f"after: {after}+comp") if beside else (name, f"after: {after}"),
     )
     rows = [(said, *_figures(figures[key])) for key, said in named if key in figures]
     return tabled(head, rows, right=())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.log import Log
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.readable import number
@@ -30,39 +31,47 @@ def doctor_view(found: Examined, out: Path | None) -> Screen:
 
 def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     """The lines, of which each kind has at most so many."""
-
-    def _labelled(name: str, texts: Sequence[str], few: int = 1) -> list[str]:
-        return labelled(name, texts, None if most is None else max(most, few))
-
-    lines = [f"{found.file}: {_verdict(found)}", *_labelled("next", [_then(found)])]
-    lines += _labelled("clock", [_clock(found.clock)])
-    lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
-    bad = [one.line for one in found.bad]
-    shortened = bad if most is None else printed_once(bad, [found.file])
-    lines += _labelled("samples", [_plain(found, one) for one in shortened])
-    lines += _labelled("delay", [_delay(one) for one in found.delays])
+    bad, remarks = [one.line for one in found.bad], [*found.remarks]
+    if most is not None:
+        bad = printed_once(bad, [found.file])
+        main = [one for one in remarks if not isinstance(one, MinorRemark)]
+        remarks = printed_once(main, [found.file])
+    ways, can = list[tuple[str, str]](), list[str]()
     if found.ways is not None:
-        ways = found.ways
-        lines += _labelled("direction +", [_way(found, ways.positive)])
-        lines += _labelled("direction -", [_way(found, ways.negative)])
-        lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
-                                      f" {ways.rested:.3g} s"])  # fmt: skip
+        own = found.ways
+        rests = f"reversals: {own.reversals}, rests: {own.rests}, at rest {own.rested:.3g} s"
+        ways = [("direction +", _way(found, own.positive)),
+                ("direction -", _way(found, own.negative)),
+                ("motion", rests)]  # fmt: skip
     if found.identifiability:
-        can = ", ".join(_within(one) for one in found.identifiability if one.can)
-        lines += _labelled("identifiable", [can or "nothing"])
-    lines += _labelled("only if", _open(found.identifiability))
-    lines += _labelled("unidentifiable", _not_identifiable(found.identifiability), 6)
+        can = [", ".join(_within(one) for one in found.identifiability if one.can) or "nothing"]
+    shows = list[str]()
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]
-        lines += _labelled("effects", [f"would show: {', '.join(shown) or 'none'}",
-                                       f"would not: {', '.join(hidden) or 'none'}"])  # fmt: skip
-    lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
-    said = [one for one in found.remarks if most is None or not isinstance(one, MinorRemark)]
-    said = said if most is None else printed_once(said, [found.file])
-    lines += _labelled("note", [_plain(found, one) for one in said])
-    if found.refused:
-        lines += _labelled("refused", [_plain(found, found.refused)])
+        shows = [f"would show: {', '.join(shown) or 'none'}",
+                 f"would not: {', '.join(hidden) or 'none'}"]  # fmt: skip
+    # Each kind: its label, its texts, and of how many a screen has room at least.
+    kinds: list[tuple[str, Sequence[str], int]] = [
+        ("next", [_then(found)], 1),
+        ("clock", [_clock(found.clock)], 1),
+        ("signal", [_sensor(found, one) for one in found.sensors], 8),
+        ("samples", [_plain(found, one) for one in bad], 1),
+        ("delay", [_delay(one) for one in found.delays], 1),
+        *((name, [text], 1) for name, text in ways),
+        ("identifiable", can, 1),
+        ("only if", _together((one.only_if, one.name) for one in found.identifiability
+                              if one.only_if), 1),
+        ("unidentifiable", _together((one.why, one.name) for one in found.identifiability
+                                     if not (one.can or one.only_if)), 6),
+        ("effects", shows, 1),
+        ("add", [one.removeprefix("add ") for one in found.add], 1),
+        ("note", [_plain(found, one) for one in remarks], 1),
+        ("refused", [_plain(found, found.refused)] if found.refused else [], 1),
+    ]  # fmt: skip
+    lines = [f"{found.file}: {_verdict(found)}"]
+    for name, texts, few in kinds:
+        lines += labelled(name, texts, None if most is None else max(most, few))
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
     return lines
@@ -153,17 +162,6 @@ def _way(found: Examined, one: Way) -> str:
     )
 
 
-def _not_identifiable(parameters: Iterable[Identifiable]) -> list[str]:
-    """The reasons, each with the parameters that it holds for."""
-    return _together((one.why, one.name) for one in parameters if not (one.can or one.only_if))
-
-
-def _open(parameters: Iterable[Identifiable]) -> list[str]:
-    """On what it depends whether others are identifiable, each with the parameters that it holds
-    for."""
-    return _together((one.only_if, one.name) for one in parameters if one.only_if)
-
-
 def _together(said: Iterable[tuple[str, str]]) -> list[str]:
     """A line for each text of (text, name), with all its names."""
     names: dict[str, list[str]] = {}
@@ -191,12 +189,9 @@ def doctor_charts(found: CheckedLog) -> list[Chart]:
     clock = _clock_chart(found)
     if found.log is None:
         return [Chart("doctor", f"the clock of {found.file}", [clock])]
-    time = Chart(
-        "doctor", f"position, drive and clock of {found.file} over time",
-        [_position(found), *_drive(found), clock],
-    )  # fmt: skip
-    over = _over_speed(found)
-    return [time] if over is None else [time, over]
+    what, log = f"position, drive and clock of {found.file} over time", found.log
+    time = Chart("doctor", what, [_position(found, log), *_drive(found, log), clock])
+    return [time, *_over_speed(found, log)]
 
 
 def unit_of(found: CheckedLog, name: str) -> tuple[float, str]:
@@ -210,9 +205,7 @@ def speed_unit(found: CheckedLog) -> tuple[float, str]:
     return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
 
 
-def _position(found: CheckedLog) -> Panel:
-    log = found.log
-    assert log is not None
+def _position(found: CheckedLog, log: Log) -> Panel:
     factor, unit = unit_of(found, "y")
     t = log["t"]
     lines = [Line("position", t, factor * log["y"], "measured")]
@@ -228,9 +221,7 @@ def _position(found: CheckedLog) -> Panel:
     return Panel("", f"position [{unit}]", lines, bands=bands)
 
 
-def _drive(found: CheckedLog) -> list[Panel]:
-    log = found.log
-    assert log is not None
+def _drive(found: CheckedLog, log: Log) -> list[Panel]:
     out = []
     for name in ("F", "u"):
         if name in log and not (name == "F" and found.rig.kind == "motor"):
@@ -249,12 +240,10 @@ def _clock_chart(found: CheckedLog) -> Panel:
     return Panel("time [s]", label, [line], y_range=(0.0, top), height=130)
 
 
-def _over_speed(found: CheckedLog) -> Chart | None:
-    log = found.log
-    assert log is not None
+def _over_speed(found: CheckedLog, log: Log) -> list[Chart]:
     name = "F" if "F" in log else "u"
     if name not in log:
-        return None
+        return []
     motion = differentiate(log["y"], log.h)
     factor, unit = unit_of(found, name)
     speed, per = speed_unit(found)
@@ -263,4 +252,4 @@ def _over_speed(found: CheckedLog) -> Chart | None:
     dots = Line(DRIVE_WORDS[name], speed * motion.v[at], factor * log[name][at], "measured", "dots")
     band = Band("velocity within its noise", -sure, sure, "x", "band")
     panel = Panel(f"velocity [{per}]", f"{DRIVE_WORDS[name]} [{unit}]", [dots], bands=[band])
-    return Chart("speed", f"{DRIVE_WORDS[name]} of {found.file} over velocity", [panel])
+    return [Chart("speed", f"{DRIVE_WORDS[name]} of {found.file} over velocity", [panel])]

@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from workbench.output import Row, next_step
-from workbench.screen import Part, Screen, listed, screen, tabled
+from workbench.screen import Screen, listed, screen, tabled
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
 MOST_LEFT_OUT = 5  # columns that one screen names
-NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
 def proposal_view(of: Proposal, card: Path) -> Screen:
@@ -16,19 +15,18 @@ def proposal_view(of: Proposal, card: Path) -> Screen:
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
     guesses = [row[0] for row in rows if row[3] == "guess"]
     looked = f"check the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
-    parts: list[Part | str] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
-    parts.append(next_step(NEXT_COMMAND.format(log=of.path, card=card)))
-    if of.refused:
-        parts.append(f"With this card the log cannot be read yet: {of.refused}")
+    refused = f"With this card the log cannot be read yet: {of.refused}"
     left_out = (f"left out: {shown} ({why})" for shown, why in of.unused.items())
-    parts += [
+    return screen(
+        f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}.",
+        next_step(f"workbench doctor {of.path} --card {card}"),
+        *([refused] if of.refused else []),
         listed(f"hardly identifiable: {line}" for line in of.hardly),
         tabled(("", "column or value", "unit", "", "why"), rows, right=()),
         listed(f"note: {line}" for line in of.remarks),
         listed(left_out, MOST_LEFT_OUT),
         f"written: {card}",
-    ]
-    return screen(*parts)
+    )
 
 
 def _signal_row(one: SignalGuess) -> Row:

@@ -233,13 +233,12 @@ def plant_lines(model: Model) -> list[str]:
 def runs_to_add(model: Model) -> tuple[str, ...]:
     """Runs that would identify what neither the gate before the fit nor the fit could."""
     found = {**model.friction, **(model.actuator or {})}
-    return tuple(
-        dict.fromkeys(
-            one.add.removeprefix("add ")
-            for one in model.identifiability
-            if one.add and one.name in found and not found[one.name].known
-        )
+    runs = (
+        one.add.removeprefix("add ")
+        for one in model.identifiability
+        if one.add and one.name in found and not found[one.name].known
     )
+    return tuple(dict.fromkeys(runs))
 
 
 def run_coupling(model: Model) -> str:

@@ -114,7 +114,11 @@ def velocity_view(
             parts = [*rest, notes(found.remarks)]
             sections = [Section("The controller", [*rest, *found.remarks])]
         case VelocityValidation():
-            what, sentence, loops = "Validation for", _passed(found), _validation_table(found)
+            what, loops, many = "Validation for", _validation_table(found), len(found.figures)
+            failed = sum(bool(one.misses) for one in found.figures.values())
+            sentence = f"Not passed: on {failed} of {many} plants a limit is missed."
+            if found.passed:
+                sentence = f"Passed: the loop meets every limit on {many} plants."
             files = {"validation.json": partial(velocity_validation_document, found)}
             parts, sections = [loops], [Section("The loop", loops)]
     content = next(iter(files.values()))
@@ -230,14 +234,6 @@ def _validation_table(found: VelocityValidation) -> Part:
         shares = [f"{100 * value:.2g} %" for value in (one.standstill, one.overshoot, one.tracking)]
         rows.append((place, *shares, *shown, "; ".join(one.misses) or "nothing"))
     return tabled(VALIDATED, rows, (1, 2, 3, 4, 5))
-
-
-def _passed(found: VelocityValidation) -> str:
-    many = len(found.figures)
-    if found.passed:
-        return f"Passed: the loop meets every limit on {many} plants."
-    failed = sum(bool(one.misses) for one in found.figures.values())
-    return f"Not passed: on {failed} of {many} plants a limit is missed."
 
 
 def after_velocity_validation(found: VelocityValidation, model_file: Path) -> Step | None:
