@@ -64,8 +64,7 @@ def _sections(found: Drifted) -> list[Section]:
         title = f"Parameters before and after, {last.source.file}"
         sections.append(Section(title, shift_table(last)))
     lines = [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
-    notes = report_notes(lines, logs_of_drift(found))
-    return [*sections, Section("Notes", notes)]
+    return [*sections, Section("Notes", report_notes(lines, logs_of_drift(found)))]
 
 
 def _judged(found: Drifted) -> list[Tested]:
@@ -119,7 +118,8 @@ def _over_logs(found: Drifted) -> Panel:
     number = np.arange(1.0, len(seen) + 1.0)
     lines = []
     for name, key, colour in STATISTICS:
-        known = _known([getattr(one, key) for one in seen])
+        values = [getattr(one, key) for one in seen]
+        known = np.array([np.nan if x is None else max(x, LEAST_STATISTIC) for x in values])
         lines += [Line("", number, known, colour), Line(name, number, known, colour, "dots")]
     most = max([1.0, *(float(np.nanmax(one.y, initial=0.0)) for one in lines)])
     wide = most > LINEAR_UP_TO
@@ -133,40 +133,32 @@ def _over_logs(found: Drifted) -> Panel:
     )  # fmt: skip
 
 
-def _known(values: Sequence[float | None]) -> Array:
-    return np.array([np.nan if one is None else max(one, LEAST_STATISTIC) for one in values])
-
-
 def drift_sentence(found: Drifted) -> str:
     """The verdict over all runs in one or two plain sentences."""
     tests = [one.test for one in found.tests]
-    if found.verdict == "structure":
-        names = _files(found, "structure")
-        return (
-            f"Another structure: no parameters of the model follow {names}. This is no drift;"
-            " trace finds the effect that joined."
-        )
-    if found.verdict == "drift":
-        last = [test for test in tests if test.verdict == "drift"][-1]
-        return f"Drift in {_files(found, 'drift')}: {_what_changed(last)}; the structure holds."
-    if found.verdict == "not_judged":
-        newest = [test for test in tests if test.tested] or tests
-        return f"INCONCLUSIVE, which is no all-clear: {newest[-1].reason}"
+    match found.verdict:
+        case "structure":
+            names = _files(found, "structure")
+            return (
+                f"Another structure: no parameters of the model follow {names}. This is no drift;"
+                " trace finds the effect that joined."
+            )
+        case "drift":
+            last = [test for test in tests if test.verdict == "drift"][-1]
+            parts = [", ".join(_changed(shift) for shift in last.moved)] if last.moved else []
+            if last.unsure:
+                first = "something more" if parts else "something changed"
+                names = ", ".join(last.unsure)
+                parts.append(f"{first}, this log cannot say which of: {names}")
+            return f"Drift in {_files(found, 'drift')}: {'; '.join(parts)}; the structure holds."
+        case "not_judged":
+            newest = [test for test in tests if test.tested] or tests
+            return f"INCONCLUSIVE, which is no all-clear: {newest[-1].reason}"
     known = sum(test.verdict == "none" for test in tests)
     margin = f"{100 * found.settings.margin:.3g} %"
     said = f"No drift in {known} of {len(tests)} log(s): no change significantly beyond {margin}."
     coarse = sum(test.verdict == "not_judged" for test in tests)
     return said + (f" {coarse} INCONCLUSIVE: see the notes." if coarse else "")
-
-
-def _what_changed(test: DriftTest) -> str:
-    """The parameters that changed, and those of which nobody can say it."""
-    parts = [", ".join(_changed(shift) for shift in test.moved)] if test.moved else []
-    if test.unsure:
-        names = ", ".join(test.unsure)
-        first = "something changed" if not parts else "something more"
-        parts.append(f"{first}, this log cannot say which of: {names}")
-    return "; ".join(parts)
 
 
 def detectable_sentence(test: DriftTest, limit: float) -> str:

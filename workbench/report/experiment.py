@@ -123,12 +123,15 @@ def experiment_view(found: Experiment) -> View:
 
 
 def _sections(found: Experiment) -> list[Section]:
-    units = shown(found.motion == "rotary")
-    pieces = [
-        (str(i + 1), PIECE_NAMES[one.kind], f"{one.amplitude:.4g} {units.position}",
-         _rate(found, i))
-        for i, one in enumerate(found.segments)
-    ]  # fmt: skip
+    units, pieces = shown(found.motion == "rotary"), list[Row]()
+    for i, one in enumerate(found.segments, 1):
+        pace = f"{1.0 / one.rate:.3g} s each"
+        if one.kind in ("strokes", "creep"):
+            pace = f"{one.rate:.3g} {units.velocity}"
+        elif one.kind in ("sine", "sweep", "multisine"):
+            pace = f"{one.rate:.3g} Hz"
+        size = f"{one.amplitude:.4g} {units.position}"
+        pieces.append((str(i), PIECE_NAMES[one.kind], size, pace))
     lines = [*limit_lines(found), *search_lines(found), *found.remarks]
     promised = table(_promised(found), lines)
     sections = [
@@ -140,15 +143,6 @@ def _sections(found: Experiment) -> list[Section]:
         between = ("if the machine has", "rival", "deviations of the noise")
         sections.append(Section("What it discriminates", tabled(between, apart)))
     return [*sections, Section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
-
-
-def _rate(found: Experiment, index: int) -> str:
-    one = found.segments[index]
-    if one.kind in ("strokes", "creep"):
-        return f"{one.rate:.3g} {shown(found.motion == 'rotary').velocity}"
-    if one.kind in ("sine", "sweep", "multisine"):
-        return f"{one.rate:.3g} Hz"
-    return f"{1.0 / one.rate:.3g} s each"
 
 
 def run_chart(found: Experiment) -> Chart:

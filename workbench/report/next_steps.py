@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted
     from workbench.steps.experiment.planned import Experiment
-    from workbench.steps.loop_figures import Limits, LoopFigures
     from workbench.steps.robust.robust import Robust
     from workbench.steps.validate import Validation
 
@@ -113,23 +112,14 @@ def after_validate(
         return step("an effect is missing", "trace", *logs, "--card", _card_of(model, card))
     words = ("design", str(model_file), *(("--card", card) if card else ()))
     one, limits, controller = failed["model"], found.limits, of.controllers[found.judged]
-    if one.stable and not _keeps_margins(one, limits):
+    m, pushed = one.margins, one.force_peak > limits.force * one.force_seen or one.limited > 0.0
+    slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
+    if one.stable and not (m is not None and m.modulus >= limits.modulus and slow):
         asked = ("--modulus", f"{limits.modulus:g}", "--delay", f"{limits.delay:g}")
         return step("the margins that were missed", *words, *asked)
-    if _too_fast(one, limits):
+    if not one.stable or one.overshoot > limits.overshoot or pushed:
         return step("a slower loop", *words, "--poles", _poles(controller, SLOWER))
     return step("a faster loop", *words, "--poles", _poles(controller, FASTER))
-
-
-def _keeps_margins(one: "LoopFigures", limits: "Limits") -> bool:
-    m = one.margins
-    slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
-    return m is not None and m.modulus >= limits.modulus and slow
-
-
-def _too_fast(one: "LoopFigures", limits: "Limits") -> bool:
-    pushed = one.force_peak > limits.force * one.force_seen or one.limited > 0.0
-    return not one.stable or one.overshoot > limits.overshoot or pushed
 
 
 def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None:

@@ -6,7 +6,6 @@ from workbench.report.friction import friction_before_after, trace_friction_char
 from workbench.report.missing_force import Which, missing_chart, missing_over_time
 from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import (
-    Picture,
     against_signal,
     free_curves,
     in_equation,
@@ -28,7 +27,6 @@ from workbench.report.trace_words import then_of, trace_sentence, words
 from workbench.report.view import Section, View, report_notes
 from workbench.steps.trace import Traced, trace_document
 
-EVERY_EQUATION = ("mechanical", "actuator")
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
     " transducer shows: only the free run identifies it, no residual of an equation."
@@ -67,20 +65,30 @@ def _main_chart(traced: Traced) -> Chart:
 
 def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
-    drawn = pictures(found)
+    drawn, command = pictures(found), model.rig.command_unit
     logs = [source.file for source in traced.train]
     sections = missing_over_time(found, model.rotary, *_unseen(traced))
-    sections += [*_drawn(traced, drawn), *_hidden(traced, drawn)]
+    # What is left of each equation against every signal that explains it, then over time.
+    sections += [against_signal(picture, model.rotary, command) for picture in drawn]
+    left = {picture.residual.equation: picture.residual for picture in drawn}
+    seen = set(left) if found.residuals else {"mechanical", "actuator"}
+    if found.missing_force is not None:  # the report begins with it
+        left.pop("mechanical", None)
+    sections += [over_time(residual, model.rotary, logs) for residual in left.values()]
+    hidden = [e.effect for e in found.effects if in_equation(e.effect) not in seen]
+    if hidden:
+        sections.append(
+            Section("Where it shows", [HIDDEN.format(words(one.key)) for one in hidden])
+        )
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
     errors = errors_table(found, model.rotary, bool(traced.test))
     sections.append(Section("Before and after", errors))
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
-        effects = effects_table(found, model.rig)
-        sections.append(Section(title, effects, effect_lines(found)))
+        sections.append(Section(title, effects_table(found, model.rig), effect_lines(found)))
     if found.curves:
-        sections.append(free_curves(found.curves, model.rotary, model.rig.command_unit))
+        sections.append(free_curves(found.curves, model.rotary, command))
     sections.append(friction_before_after(traced))
     plain = "Parameters before and after" if found.effects else "Parameters"
     tables = {
@@ -94,28 +102,7 @@ def _sections(traced: Traced) -> list[Section]:
     return [*sections, Section("Notes", notes)] if notes else sections
 
 
-def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
-    """What is left of each equation against every signal that explains it, then over time."""
-    model, logs = traced.model, [source.file for source in traced.train]
-    out = [against_signal(picture, model.rotary, model.rig.command_unit) for picture in drawn]
-    of = {picture.residual.equation: picture.residual for picture in drawn}
-    if traced.trace.missing_force is not None:  # the report begins with it
-        of.pop("mechanical", None)
-    return [*out, *(over_time(residual, model.rotary, logs) for residual in of.values())]
-
-
 def _unseen(traced: Traced) -> tuple[list[str], Which]:
     """Names of the logs that the model has not seen, or of the others where there are none."""
     names = [source.file for source in traced.test or traced.train]
     return names, "test" if traced.test else "training"
-
-
-def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:
-    """A line for each effect that no residual of an equation shows."""
-    seen = {picture.residual.equation for picture in drawn}
-    lines = [
-        HIDDEN.format(words(e.effect.key))
-        for e in traced.trace.effects
-        if in_equation(e.effect) not in (seen if traced.trace.residuals else EVERY_EQUATION)
-    ]
-    return [Section("Where it shows", lines)] if lines else []

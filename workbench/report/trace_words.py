@@ -71,7 +71,7 @@ def _verdict_sentence(traced: Traced) -> str:
         noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
         fall = f"{error.write(error.before)} -> {error.write(error.after)}"
         errors = f" {error.name} {fall}{noise}."
-    changed = ", ".join(_changed(change) for change in found.drift)
+    changed = ", ".join(map(_changed, found.drift))
     match found.verdict:
         case "unknown" if found.not_tried and not found.effects:
             return f"Open: {unexplained(traced, found.unknown.depends_on)}"

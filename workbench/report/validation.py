@@ -209,7 +209,11 @@ def _step_chart(
     runs = _runs(traces, place, "step")
     some = next(iter(runs.values()))
     begins = [int(at) for at in np.flatnonzero(np.diff(some.r))[:2] + 1]
-    span = _span(found, place, begins[1] - begins[0], some)
+    # Until the slowest loop has long settled.
+    times = [one[place].settling for one in found.figures.values() if place in one]
+    most, h = begins[1] - begins[0], float(some.t[1] - some.t[0])
+    settled = SETTLING_TIMES_SHOWN * float(np.median(times)) / h
+    span = int(np.clip(settled, min(50, most), most))
     command = first.command_unit if first.command_peak is not None else units_of(rotary).force.name
     limit = first.command_limit
     panels = []
@@ -246,7 +250,9 @@ def _error_chart(traces: Mapping[tuple[str, str], Traces], place: str, rotary: b
     for kind, title in ERRORS_SHOWN:
         runs = _runs(traces, place, kind)
         some = next(iter(runs.values()))
-        begin = 0 if kind == "smooth" else _rest(some)
+        begin = 0
+        if kind == "step":  # the last half of the last dwell
+            begin = (int(np.flatnonzero(np.diff(some.r))[-1]) + 1 + len(some.r)) // 2
         span = len(some.t) - begin
         lines = [_of(name, run, run.r - run.y, begin, span, factor) for name, run in runs.items()]
         start = "time [s]" if kind == "smooth" else "time, after half of the dwell [s]"
@@ -260,19 +266,6 @@ def _runs(
     traces: Mapping[tuple[str, str], Traces], place: str, kind: Literal["step", "smooth"]
 ) -> dict[str, LoopRun]:
     return {name: getattr(run, kind) for (name, where), run in traces.items() if where == place}
-
-
-def _span(found: Validation, place: str, most: int, run: LoopRun) -> int:
-    """Samples after a step in which the loops differ: until the slowest has long settled."""
-    times = [one[place].settling for one in found.figures.values() if place in one]
-    h = float(run.t[1] - run.t[0])
-    return int(np.clip(SETTLING_TIMES_SHOWN * float(np.median(times)) / h, min(50, most), most))
-
-
-def _rest(run: LoopRun) -> int:
-    """First sample of the last half of the last dwell."""
-    last = int(np.flatnonzero(np.diff(run.r))[-1]) + 1
-    return (last + len(run.r)) // 2
 
 
 def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
