@@ -15,16 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from identification.errors import NotIdentifiable, UserError
-from workbench.ending import (
-    BAD_INPUT,
-    DONE,
-    FAULT,
-    REFUSAL,
-    Refused,
-    Step,
-    step,
-    write_status,
-)
+from workbench.ending import BAD_INPUT, DONE, FAULT, REFUSAL, Refused, Step, step, write_status
 from workbench.threads import one_thread_by_default
 
 COMMANDS = {
@@ -102,13 +93,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-        rows = [
-            ("0", DONE),
-            ("1", REFUSAL),
-            ("2", BAD_INPUT),
-            ("3", FAULT),
-            ("130", "Ctrl-C"),
-        ]
+        rows = [("0", DONE), ("1", REFUSAL), ("2", BAD_INPUT), ("3", FAULT), ("130", "Ctrl-C")]
         write_status(formatter, rows)
         with formatter.section("Completion of commands, options and files by the Tab key"):
             formatter.write_dl([*COMPLETION.items()])
@@ -188,7 +173,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
             traceback.print_exception(error)
         then = _then(error, arguments) if status == 1 else None
-        if then and _as_json(arguments):
+        options = arguments[: arguments.index("--")] if "--" in arguments else arguments
+        if then and "--json" in options:
             _echo_refusal(str(error), then)
     _flush_or_drop()
     for line in [message, str(then)] if then else [message]:
@@ -231,12 +217,6 @@ def _run(arguments: Sequence[str]) -> int:
         status = stop.exit_code
     sys.stdout.flush()
     return int(status or 0)
-
-
-def _as_json(arguments: Sequence[str]) -> bool:
-    """Whether the command line asks for JSON; what follows "--" is no option."""
-    options = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    return "--json" in options
 
 
 def _then(error: BaseException, arguments: Sequence[str]) -> Step:

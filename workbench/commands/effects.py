@@ -86,9 +86,9 @@ def paragraph(one: "Effect") -> list[str]:
 
 
 def _checked(broken: Mapping[str, Mapping[str, str]], count: int) -> str:
-    lines = []
-    for key, found in broken.items():
-        if not found:
-            lines.append(f"{key}: holds to all {count} checks")
-        lines += [f"{key}: not so: {name}: {said}" for name, said in found.items()]
-    return "\n".join(lines)
+    return "\n".join(
+        line
+        for key, found in broken.items()
+        for line in [f"{key}: not so: {name}: {said}" for name, said in found.items()]
+        or [f"{key}: holds to all {count} checks"]
+    )

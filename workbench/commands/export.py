@@ -129,10 +129,20 @@ def command(given: ExportOptions) -> int:
     with OutputFolder("export", given.out, now=now) as folder:
         for each, content in files.items():
             folder.write(each, content)
-    emit(
-        _document(what, tuple(files), folder.final),
-        lambda: _view(what, targets, tuple(files), folder.final),
-    )
+    program, end = what.program, folder.final
+    document = {
+        "name": program.name,
+        "controller": what.controller,
+        "compensator": what.loop.compensation is not None,
+        "precision": what.precision,
+        "h": program.h,
+        "inputs": program.inputs,
+        "output": program.output,
+        "remarks": what.remarks,
+        "files": tuple(files),
+        "out": end,
+    }
+    emit(document, lambda: _view(what, targets, tuple(files), end))
     return 0
 
 
@@ -169,27 +179,9 @@ def _tables(given: ExportOptions) -> int:
     with results("export", given.out) as folder:
         for one in found.files:
             folder.write(one.name, one.text)
-    emit(
-        tables_document(what, found, folder.final),
-        lambda: tables_view(what, found, folder.final),
-    )
+    end = folder.final
+    emit(tables_document(what, found, end), lambda: tables_view(what, found, end))
     return 0
-
-
-def _document(what: "Exported", files: tuple[str, ...], folder: Path) -> dict[str, object]:
-    program = what.program
-    return {
-        "name": program.name,
-        "controller": what.controller,
-        "compensator": what.loop.compensation is not None,
-        "precision": what.precision,
-        "h": program.h,
-        "inputs": program.inputs,
-        "output": program.output,
-        "remarks": what.remarks,
-        "files": files,
-        "out": folder,
-    }
 
 
 def _view(

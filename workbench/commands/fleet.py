@@ -69,16 +69,22 @@ def command(given: FleetOptions) -> int:
     registry and DIR/results/*.parquet while the run goes on. A run that was killed goes on where it
     was; logs that are done are skipped.
     """
+    from workbench.cards.card import load_card
     from workbench.fleet.finding import find_logs
     from workbench.fleet.run import FleetRun, FleetSettings
     from workbench.fleet.store import ResultStore
+    from workbench.logs.sources import card_path
 
     if given.address is not None and given.workers is not None:
         raise click.UsageError(
             "--workers is for processes of this computer; leave one of both out."
         )
     logs, out, where = given.logs, given.out, None if given.no_registry else (given.where or "")
-    text = None if given.card is None else _card_text(given.card)
+    text = None
+    if given.card is not None:
+        path = card_path(given.card)
+        load_card(path, with_recipe=False)  # raises BadCard where it is not sound
+        text = path.read_text(encoding="utf-8-sig")
     found = find_logs(logs, leave_out=out)
     with ExitStack() as stack:
         store = stack.enter_context(ResultStore(out))
@@ -87,7 +93,12 @@ def command(given: FleetOptions) -> int:
         advance = stack.enter_context(progress("fleet", float(len(found))))
         settings = FleetSettings(logs, text, given.seed)
         done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
-    result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
+    bad = [
+        {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
+         "reason": one.reason}
+        for one in done.bad
+    ]  # fmt: skip
+    result = {**asdict(done), "bad": bad, "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
     then = after_fleet(done, logs, given.card, where, in_registry=not given.no_registry)
     emit(result, lambda: fleet_view(done, out), then)
@@ -116,41 +127,20 @@ def after_fleet(
 def fleet_view(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
     from workbench.fleet.run import per_core
-    from workbench.screen import Part, screen, tabled
+    from workbench.screen import screen, tabled
 
     counted = ", ".join(f"{count} {name}" for name, count in sorted(done.verdicts.items()))
-    parts: list[Part | str] = [
-        f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before"
-    ]
-    if done.later:
-        parts.append(f"{done.later} log(s) left: their machines are in another worker's hands")
-    if done.bad:
-        rows = [(one.log.machine, one.verdict, one.reason) for one in done.bad]
-        parts.append(tabled(("machine", "verdict", "reason"), rows, (), most=MOST_BAD))
-    each = per_core(done)
-    if each is not None:
-        parts.append(
-            f"{done.seconds:.1f} s, {each:.2f} processor seconds a log,"
-            f" at most {done.memory / 2**20:.0f} MiB a worker"
-        )
-    parts.append(f"results: {out / 'results'}")
-    return screen(*parts)
-
-
-def _bad(one: Any) -> dict[str, Any]:
-    """A result to check, as JSON has it."""
-    return {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
-            "reason": one.reason}  # fmt: skip
-
-
-def _card_text(name: str) -> str:
-    """The text of a card that is sound; raises BadCard."""
-    from workbench.cards.card import load_card
-    from workbench.logs.sources import card_path
-
-    path = card_path(name)
-    load_card(path, with_recipe=False)
-    return path.read_text(encoding="utf-8-sig")
+    left = f"{done.later} log(s) left: their machines are in another worker's hands"
+    rows = [(one.log.machine, one.verdict, one.reason) for one in done.bad]
+    each, used = per_core(done), f"at most {done.memory / 2**20:.0f} MiB a worker"
+    return screen(
+        f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before",
+        *([left] if done.later else []),
+        tabled(("machine", "verdict", "reason"), rows, (), most=MOST_BAD),
+        *([] if each is None else
+          [f"{done.seconds:.1f} s, {each:.2f} processor seconds a log, {used}"]),
+        f"results: {out / 'results'}",
+    )  # fmt: skip
 
 
 @contextmanager
@@ -174,11 +164,7 @@ def _cluster(given: FleetOptions) -> Any:
 
     if given.address is not None:
         return cluster_at(given.address, given.timeout)
-    return local_cluster(given.workers or _cores(), given.attempts)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    cores = os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):  # those that this process may use
+        cores = len(os.sched_getaffinity(0))
+    return local_cluster(given.workers or cores, given.attempts)

@@ -45,24 +45,23 @@ def command(
     from workbench.steps.first_card.proposal import proposed
     from workbench.steps.first_card.written import checked_proposal, written
 
-    card = _place(out)
+    card = out or Path(CARD)
+    card = card / CARD if card.is_dir() else card
     asking = not (yes or is_given(JSON)) and sys.stdin.isatty() and sys.stdout.isatty()
     _refuse_existing(card, force, asking)
     with progress("looking"):
         found = proposed(log, name, axis)
     if asking and axis is None and len(found.axes) > 1:
-        found = proposed(log, name, _asked_axis(found))
+        choice = click.Choice(found.axes, case_sensitive=False)
+        own = found.axis or found.axes[0]
+        said = click.prompt("Several axes in this log; the card is of", type=choice, default=own)
+        found = proposed(log, name, str(said))
     if asking:
         found = _asked(found)
     with progress("reading"):
         found = checked_proposal(found)
     write_whole(card, written(found, asked=asking), "--out")
     emit({**found.as_json(), "out": card}, lambda: proposal_view(found, card))
-
-
-def _place(out: Path | None) -> Path:
-    path = Path(CARD) if out is None else out
-    return path / CARD if path.is_dir() else path
 
 
 def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
@@ -74,13 +73,6 @@ def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
     raise click.UsageError(
         f"{card} is there and would be replaced; name another file with --out, or give --force."
     )
-
-
-def _asked_axis(of: "Proposal") -> str:
-    """Which of several axes the card is to be of."""
-    choice = click.Choice(of.axes, case_sensitive=False)
-    own = of.axis or of.axes[0]
-    return str(click.prompt("Several axes in this log; the card is of", type=choice, default=own))
 
 
 def _asked(of: "Proposal") -> "Proposal":

@@ -64,13 +64,13 @@ def after_pass(done: "PassReport", where: str | None) -> Step | None:
 
 def undelivered(alarms: "Delivery") -> str:
     """What the webhook has not taken, in one line."""
-    parts = []
-    if alarms.waiting:
-        parts.append(f"{alarms.waiting} alarm(s) not taken yet, tried again by later passes")
-    if alarms.given_up:
-        parts.append(f"{alarms.given_up} alarm(s) given up after a day")
+    counts = {
+        f"{alarms.waiting} alarm(s) not taken yet, tried again by later passes": alarms.waiting,
+        f"{alarms.given_up} alarm(s) given up after a day": alarms.given_up,
+    }
+    said = ", ".join(text for text, count in counts.items() if count)
     why = f" ({alarms.reason})" if alarms.reason else ""
-    return f"--webhook: {', '.join(parts)}{why}; check the receiver"
+    return f"--webhook: {said}{why}; check the receiver"
 
 
 def pass_view(done: "PassReport") -> "Screen":
