@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -123,20 +123,14 @@ FORCE_OPTION = option(
 )  # fmt: skip
 
 
-def given_options(*options: str) -> Iterator[click.Parameter]:
-    """Those of these options, by the names of their values, that the running command is given."""
+def refuse_given(why: str, *options: str) -> None:
+    """Raises a usage error where one of these options, by the names of their values, is given; why:
+    it may not be, and what to do (`{}` stands for the option)."""
     context = click.get_current_context()
     for one in context.command.params:
         source = context.get_parameter_source(one.name or "")
         if one.name in options and source is click.core.ParameterSource.COMMANDLINE:
-            yield one
-
-
-def refuse_given(why: str, *options: str) -> None:
-    """Raises a usage error where one of these options is given; why: it may not be, and what to do
-    (`{}` stands for the option)."""
-    for one in given_options(*options):
-        raise click.UsageError(why.format(one.opts[0]))
+            raise click.UsageError(why.format(one.opts[0]))
 
 
 def refuse_for_velocity(*options: str) -> None:

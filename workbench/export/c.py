@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from design.program import Program, State, Variable
+from design.program import Program, Variable
 from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, lead_of, rows, title_of
 from workbench.export.syntax import INDENT, Syntax, braced
@@ -79,9 +79,16 @@ def c_files(what: Exported) -> dict[str, str]:
         "output": program.output,
         "position_unit": program.inputs[0].unit,
         "samples": len(test.outputs),
-        "states": [_declared_state(one, program.name) for one in program.states],
+        "states": [
+            {
+                "type": "int" if one.kind == "integer" else f"{program.name}_real",
+                "declared": one.name + (f"[{len(one.at_rest)}]" if one.array else ""),
+                "meaning": one.meaning,
+            }
+            for one in program.states
+        ],
     }
-    reset = [line for one in program.states for line in _reset(one, c)]
+    reset = [line for one in program.states for line in c.reset(one)]
     source = filled(
         "controller.c",
         **common,
@@ -113,12 +120,6 @@ def _numbers(values: tuple[float, ...], c: C) -> dict[str, object]:
     return {"size": len(values), "lines": rows(c.number(v) for v in values)}
 
 
-def _declared_state(one: State, name: str) -> dict[str, str]:
-    kind = "int" if one.kind == "integer" else f"{name}_real"
-    size = f"[{len(one.at_rest)}]" if one.array else ""
-    return {"type": kind, "declared": one.name + size, "meaning": one.meaning}
-
-
 def _declared_locals(variables: tuple[Variable, ...], c: C) -> list[str]:
     """Declarations, one a kind."""
     kinds: dict[str, list[str]] = {}
@@ -144,18 +145,6 @@ def _helpers(what: Exported, c: C) -> Iterator[str]:
         function = c.functions[key]
         if f"{function}(" in used:
             yield f"static real {function}({given})\n{{\n    return {body};\n}}"
-
-
-def _reset(one: State, c: C) -> Iterator[str]:
-    """Lines that put a state at rest at y."""
-    place = c.name(one.name)
-    if not one.array:
-        still = "0" if one.kind == "integer" else c.number(0.0)
-        value = {0.0: still, 1.0: "y"}.get(one.at_rest[0], f"{c.number(one.at_rest[0])} * y")
-        yield c.assigned(place, value)
-        return
-    value = f"{one.name}_at_1[j] * y" if any(one.at_rest) else c.number(0.0)
-    yield from c.repeated("j", len(one.at_rest), [c.assigned(f"{place}[j]", value)])
 
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of the files inside, so that the same design gives the same bytes

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 
-from design.program import Kind, State
+from design.program import Kind
 from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, lead_of, rows, title_of
-from workbench.export.syntax import INDENT, Syntax, braced
+from workbench.export.syntax import AT_POSITION_1, INDENT, Syntax, braced
 
 # Words of the standard, and operators of its Instruction List, that a name here may meet.
 RESERVED = ("s", "n", "d", "l", "p", "t", "in", "to", "by", "of", "on", "step", "limit", "mod")
@@ -51,7 +51,6 @@ def st_syntax(precision: Precision) -> StructuredText:
     )  # fmt: skip
 
 
-AT_POSITION_1 = "_at_1"  # behind a state's name: its entries where it has stood at position 1
 NEVER = "begun"  # whether the block has run before
 EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
 
@@ -151,7 +150,7 @@ def _controller(what: Exported, st: StructuredText) -> Block:
         own.append(Declared("j", types["integer"], ""))
     output = program.output
     first = [f"IF reset OR NOT {NEVER} THEN", f"{INDENT}{NEVER} := TRUE;"]
-    first += [INDENT + line for one in program.states for line in _reset(one, st)]
+    first += [INDENT + line for one in program.states for line in st.reset(one)]
     return Block(
         f"FB_{program.name}",
         (*inputs, begin),
@@ -160,19 +159,6 @@ def _controller(what: Exported, st: StructuredText) -> Block:
         (*stored, started, *own),
         (*first, "END_IF;", *st.lines(program.statements)),
     )
-
-
-def _reset(one: State, st: StructuredText) -> list[str]:
-    """Lines that put a state at rest at y."""
-    place, y = st.name(one.name), st.name("y")
-    if one.array:
-        moved = f"{st.name(one.name + AT_POSITION_1)}[j] * {y}"
-        value = moved if any(one.at_rest) else st.number(0.0)
-        return st.repeated("j", len(one.at_rest), [st.assigned(f"{place}[j]", value)])
-    if one.kind == "integer":
-        return [st.assigned(place, "0")]
-    at = one.at_rest[0]
-    return [st.assigned(place, y if at == 1.0 else st.number(0.0))]
 
 
 def _test(what: Exported, st: StructuredText) -> Block:
@@ -197,14 +183,12 @@ def _test(what: Exported, st: StructuredText) -> Block:
     return Block(
         f"FB_{program.name}_test",
         (),
-        (
-            Declared("passed", "BOOL", "whether the block gives what the simulation gave"),
-            Declared("worst", real, f"[{program.output.unit}] largest difference"),
-        ),
+        (Declared("passed", "BOOL", "whether the block gives what the simulation gave"),
+         Declared("worst", real, f"[{program.output.unit}] largest difference")),
         (*tables, wanted),
         (Declared("block", f"FB_{program.name}", ""), Declared("k", types["integer"], "")),
         body,
-    )
+    )  # fmt: skip
 
 
 ELEMENTARY = ("BOOL", "DINT", "REAL", "LREAL")

@@ -18,6 +18,7 @@ from design.program import (
     Operator,
     Remark,
     Repeat,
+    State,
     Statement,
     Variable,
 )
@@ -25,6 +26,7 @@ from identification.errors import BadModel
 from workbench.export.exported import Precision
 
 INDENT = "    "
+AT_POSITION_1 = "_at_1"  # behind a state's name: its entries where it has stood at position 1
 # How tightly an operator binds; one of the same rank on the right is put in parentheses.
 RANK: Mapping[Operator, int] = {
     "or": 1, "and": 2, "==": 3, "!=": 3, "<": 4, "<=": 4, ">": 4, ">=": 4,
@@ -80,6 +82,17 @@ class Syntax:
         """A name as the language takes it."""
         own = self.names.get(name, name)
         return self.state_prefix + own if name in self.states else own
+
+    def reset(self, one: State) -> list[str]:
+        """Lines that put a state at rest at y."""
+        place, y = self.name(one.name), self.name("y")
+        if one.array:
+            moved = f"{self.name(one.name + AT_POSITION_1)}[j] * {y}"
+            value = moved if any(one.at_rest) else self.number(0.0)
+            return self.repeated("j", len(one.at_rest), [self.assigned(f"{place}[j]", value)])
+        still = "0" if one.kind == "integer" else self.number(0.0)
+        at = one.at_rest[0]
+        return [self.assigned(place, {0.0: still, 1.0: y}.get(at, f"{self.number(at)} * {y}"))]
 
     def lines(self, statements: Sequence[Statement], depth: int = 0) -> list[str]:
         """The statements, indented by `depth`."""

@@ -67,7 +67,7 @@ def sources(
     if not every:
         raise BadLog("no log given; give a DataFrame, a path, or a list of them")
     found = [
-        one if isinstance(one, str | os.PathLike) else _recorded(one, k)
+        os.fspath(one) if isinstance(one, str | os.PathLike) else _recorded(one, k)
         for k, one in enumerate(every)
     ]
     if card is not None:
@@ -75,12 +75,12 @@ def sources(
             raise BadCard(
                 "a card, and rig or signals beside it; a card says both, give one of them"
             )
-        return sources_of([_named(one) for one in found], read_card(card))
+        return sources_of(found, read_card(card))
     if rig is None:
         raise BadCard('no machine given; give card = "card.toml", or rig = "motor" and the like')
-    names = _columns(found[0])
-    made = _card(rig, signals, names)
-    return sources_of([_named(one) for one in found], made)
+    first = found[0]
+    table = first.table if isinstance(first, Recorded) else read_table(Path(first), FileSpec())
+    return sources_of(found, _card(rig, signals, table.names))
 
 
 def read_card(card: CardLike) -> Card:
@@ -88,18 +88,6 @@ def read_card(card: CardLike) -> Card:
     if isinstance(card, Card):
         return card
     return load_card(card_path(os.fspath(card)), with_recipe=False)
-
-
-def _named(log: Any) -> str | Recorded:
-    return log if isinstance(log, Recorded) else os.fspath(log)
-
-
-def _columns(log: Any) -> tuple[str, ...]:
-    """Names of the log's columns, by which signals are found."""
-    if isinstance(log, Recorded):
-        return log.table.names
-    path = Path(os.fspath(log))
-    return read_table(path, FileSpec()).names
 
 
 def _recorded(log: Any, number: int) -> Recorded:

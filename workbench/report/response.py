@@ -41,15 +41,13 @@ COHERENCE_SAID = (
 def response_sentence(found: Responded) -> str:
     """What the logs show of the machine, in a sentence or two."""
     body = found.found.body
-    spans = ranges(body.f, body.seen)
-    said = f"The plant is identified {_spans(spans)}"
-    peaks = found.peaks
-    if not peaks:
+    said = f"The plant is identified {_spans(ranges(body.f, body.seen))}"
+    if not found.peaks:
         return f"{said}; no resonance stands out there."
     named = [
         f"{'a resonance' if one.kind == 'resonance' else 'an anti-resonance'} at"
         f" {number(one.frequency.value)} Hz (damping {number(one.damping.value, 2)})"
-        for one in peaks
+        for one in found.peaks
     ]
     return f"{said}, with {_and(named)}."
 
@@ -82,14 +80,14 @@ def loop_line(found: Responded) -> str:
     by = "the logs" if found.found.controller is not None else "the card's controller"
     if m.crossover is None:
         return f"open loop (by {by}): {_where_it_crosses(found.open_loop)}"
-    said = [f"crosses 0 dB at {number(m.crossover)} Hz"]
-    if m.phase_deg is not None:
-        said.append(f"phase margin {number(m.phase_deg)} deg")
     gain = "not within what the logs show" if m.gain_db is None else f"{number(m.gain_db)} dB"
-    said.append(f"gain margin {gain}")
-    if m.delay_s is not None:
-        said.append(f"delay margin {number(1e3 * m.delay_s)} ms")
-    return f"open loop (by {by}): {', '.join(said)}"
+    said = (
+        f"crosses 0 dB at {number(m.crossover)} Hz",
+        "" if m.phase_deg is None else f"phase margin {number(m.phase_deg)} deg",
+        f"gain margin {gain}",
+        "" if m.delay_s is None else f"delay margin {number(1e3 * m.delay_s)} ms",
+    )
+    return f"open loop (by {by}): {', '.join(filter(None, said))}"
 
 
 def _where_it_crosses(loop: Response) -> str:
@@ -246,20 +244,20 @@ def _bode(
         Area("95 %", x, low, decibels(np.abs(H) * (1.0 + half)), "measured"),
         Area("95 %", x, phase - spread, phase + spread, "measured"),
     )
-    magnitude = [Line("measured", x, size, "measured")]
-    turn = [Line("measured", x, phase, "measured")]
+    magnitude, turn, coherence = list[Line](), list[Line](), list[Line]()
     if beside is not None:
-        left_in = np.where(beside.seen, beside.H, np.nan)[use]
-        magnitude.insert(0, Line("friction left in", x, decibels(np.abs(left_in)), "before"))
-        turn.insert(0, Line("friction left in", x, _near(degrees(left_in), phase), "before"))
+        name, left_in = "friction left in", np.where(beside.seen, beside.H, np.nan)[use]
+        magnitude.append(Line(name, x, decibels(np.abs(left_in)), "before"))
+        turn.append(Line(name, x, _near(degrees(left_in), phase), "before"))
+        coherence.append(Line(name, x, beside.coherence[use], "before"))
+    magnitude.append(Line("measured", x, size, "measured"))
+    turn.append(Line("measured", x, phase, "measured"))
+    coherence.append(Line("measured", x, one.coherence[use], "measured"))
     for name, curve in others:
         if curve is not None:
             own = curve[use]
             magnitude.append(Line(name, x, decibels(np.abs(own)), "model", "dashed"))
             turn.append(Line(name, x, _near(degrees(own), phase), "model", "dashed"))
-    coherence = [Line("measured", x, one.coherence[use], "measured")]
-    if beside is not None:
-        coherence.insert(0, Line("friction left in", x, beside.coherence[use], "before"))
     shown_range = _round_range(x)
     level = [[], []] if levels is None else [[Mark(one)] for one in levels]
     return [
