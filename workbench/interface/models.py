@@ -52,16 +52,9 @@ class _OfModel(Result):
         """Value, unit, deviation and 95 % interval of each parameter, or why there is none."""
         import pandas as pd
 
-        effects = {
-            f"{key}.{name}": one
-            for key, found in self.model.effects.items()
-            for name, one in found.items()
-        }
-        every: dict[str, Estimate] = {
-            **self.model.friction,
-            **(self.model.actuator or {}),
-            **effects,
-        }
+        every: dict[str, Estimate] = {**self.model.friction, **(self.model.actuator or {})}
+        for key, found in self.model.effects.items():
+            every |= {f"{key}.{name}": one for name, one in found.items()}
         columns = ("value", "unit", "sd", "low", "high", "reason")
         rows = {name: [getattr(one, key) for key in columns] for name, one in every.items()}
         return pd.DataFrame.from_dict(rows, orient="index", columns=list(columns))
@@ -100,21 +93,13 @@ class IdentifyResult(_OfModel):
         An effect's parameters are named as key.name. Attributes: units, verdict, converged.
         Raises BadModel where none was sampled, MissingLibrary without arviz.
         """
-        posterior_samples = self.found.posterior_samples
-        if posterior_samples is None:
+        of = self.found.posterior_samples
+        if of is None:
             raise BadModel("no posterior was sampled; call identify(..., posterior=True)")
-        arviz = _arviz()
-        posterior = {
-            name: posterior_samples.chains[:, :, k]
-            for k, name in enumerate(posterior_samples.names)
-        }
-        units = {name: self.found.fit.estimates[name].unit for name in posterior_samples.names}
-        said = {
-            "units": str(units),
-            "verdict": posterior_samples.verdict,
-            "converged": int(posterior_samples.converged),
-        }
-        return arviz.from_dict(posterior=posterior, attrs=said)
+        posterior = {name: of.chains[:, :, k] for k, name in enumerate(of.names)}
+        units = str({name: self.found.fit.estimates[name].unit for name in of.names})
+        said = {"units": units, "verdict": of.verdict, "converged": int(of.converged)}
+        return _arviz().from_dict(posterior=posterior, attrs=said)
 
     def _made(self) -> View:
         return identified_view(self.found)

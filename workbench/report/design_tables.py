@@ -37,17 +37,15 @@ def margins_table(found: Design) -> Part:
 def drive_table(found: Design) -> Part:
     """The same in a drive engineer's words; without rows of an older file."""
     rows = []
-    for name, one in found.controllers.items():
-        m = one.margins
-        if m.crossover_hz is None and m.bandwidth_hz is None:
-            continue
-        rows.append((
-            name.upper(),
+    for name, m in ((name, one.margins) for name, one in found.controllers.items()):
+        said = (
             *("-" if f is None else f"{number(f)} Hz" for f in (m.crossover_hz, m.bandwidth_hz)),
             "any" if m.gain_db is None else f"{number(m.gain_db)} dB",
             "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
             "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
-        ))  # fmt: skip
+        )
+        if said[:2] != ("-", "-"):
+            rows.append((name.upper(), *said))
     return tabled(IN_DRIVES_HEAD, rows)
 
 
@@ -181,19 +179,18 @@ def schedule_rows(found: Design, rotary: bool = False) -> list[str]:
         return out
     units, over = shown(rotary), _unit_over(table.over, rotary)
     for name, one in table.controllers.items():
-        for at, point, friction in zip(table.at, one.points, table.friction, strict=True):
-            said = ""
+        for at, point, rubs in zip(table.at, one.points, table.friction, strict=True):
+            said = "R, S, T in design.json"
             if (c := point.cascade) is not None:
                 said = (
                     f"Kv = {number(c.k_v)} 1/s, Kp = {number(c.k_p)} {units.force} s/"
-                    f"{units.position}, Tn = {number(1e3 * c.T_n)} ms, friction"
-                    f" {number(friction[0])} and {number(friction[1])} {units.force}"
+                    f"{units.position}, Tn = {number(1e3 * c.T_n)} ms, friction {number(rubs[0])}"
+                    f" and {number(rubs[1])} {units.force}"
                 )
             elif (g := point.gains) is not None:
-                said = (
-                    f"k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s"
-                )
-            out.append(f"{name.upper()} at {number(at)}{over}: {said or 'R, S, T in design.json'}")
+                gain = f"k_R = {g.k_R:.5g} {units.stiffness}"
+                said = f"{gain}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s"
+            out.append(f"{name.upper()} at {number(at)}{over}: {said}")
     return out
 
 

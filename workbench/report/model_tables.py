@@ -154,8 +154,8 @@ def summary(model: Model, missing: LatentForces | None) -> str:
     share = None if missing is None else missing.share(max(model.karnopp.F_cp, model.karnopp.F_cn))
     if missing is None or share is None:
         return _found(model, shows=False)
-    said = share_of_friction(share, missing)
     shows = share > OF_ACCOUNT and not missing.is_a_bound
+    said = share_of_friction(share, missing)
     return f"{_found(model, shows)} Force missing: {said} of friction."
 
 

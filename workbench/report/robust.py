@@ -43,16 +43,13 @@ def robust_sentence(found: Robust) -> str:
         )
     called = promise.controller.upper()
     with_it = " with the compensator" if promise.compensator else ""
-    least = min(
-        (one.share for one in promise.measures.values() if one.share is not None), default=1.0
-    )
+    drawn = f"{found.asked.draws} machines drawn"
     if promise.every == 1.0:
-        return (
-            f"{called}{with_it}: meets every limit on each of {found.asked.draws} machines drawn."
-        )
+        return f"{called}{with_it}: meets every limit on each of {drawn}."
+    shares = [one.share for one in promise.measures.values() if one.share is not None]
     return (
-        f"{called}{with_it}: each limit holds on at least {100 * least:.0f} % of"
-        f" {found.asked.draws} machines drawn, all of them at once on {100 * promise.every:.0f} %."
+        f"{called}{with_it}: each limit holds on at least {100 * min(shares, default=1.0):.0f} % of"
+        f" {drawn}, all of them at once on {100 * promise.every:.0f} %."
     )
 
 

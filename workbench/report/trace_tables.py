@@ -7,7 +7,7 @@ from dataclasses import replace
 from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
-from identification.tracing.result import EffectRival, FoundEffect, Trace
+from identification.tracing.result import FoundEffect, Trace
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, number, shown_unit, small, units_of
 from workbench.output import Row
@@ -98,26 +98,18 @@ def _worth(e: FoundEffect) -> str:
     chance = "p < 1e-4" if e.p_value < 1e-4 else f"p = {e.p_value:.2g}"
     if math.isclose(e.p_value, FLOOR):
         chance = f"p < {FLOOR:.1g}, none of {DRAWS} draws"
-    return (
-        f"It explains {100 * e.explained:.3g} % of what was missing where it shows"
-        f" (by chance: {chance})"
-    )
+    share = f"{100 * e.explained:.3g} %"
+    return f"It explains {share} of what was missing where it shows (by chance: {chance})"
 
 
 def rivals_table(found: Trace, rotary: bool) -> Part:
     """Rivals in the order of the force error that they leave; last those that leave none."""
     unit = shown(rotary).force
-
-    def left(rival: EffectRival) -> float:
-        return math.inf if rival.test_force_rms is None else rival.test_force_rms
-
+    left = [(one.test_force_rms, one) for one in found.rivals]
+    left.sort(key=lambda both: math.inf if both[0] is None else both[0])
     rows = [
-        (
-            words(r.key),
-            "-" if r.test_force_rms is None else f"{number(r.test_force_rms)} {unit}",
-            r.why_not,
-        )
-        for r in sorted(found.rivals, key=left)
+        (words(one.key), "-" if rms is None else f"{number(rms)} {unit}", one.why_not)
+        for rms, one in left
     ]
     return tabled(RIVAL_HEAD, rows)
 
@@ -141,17 +133,12 @@ def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
 
 def differences_table(found: Trace) -> Part:
     """Parameters that differ between training and test logs."""
-    rows = [
-        (
-            c.name,
-            number(factor * c.before, 4),
-            f"{number(factor * c.after, 4)} ± {number(factor * 1.96 * c.sd, 2)}",
-            unit,
-            percent(c.before, c.after),
-        )
-        for c in found.drift
-        for unit, factor in (shown_unit(c.unit),)
-    ]
+    rows = list[Row]()
+    for c in found.drift:
+        unit, factor = shown_unit(c.unit)
+        after = f"{number(factor * c.after, 4)} ± {number(factor * 1.96 * c.sd, 2)}"
+        change = percent(c.before, c.after)
+        rows.append((c.name, number(factor * c.before, 4), after, unit, change))
     return tabled(DRIFT_HEAD, rows)
 
 
