@@ -182,31 +182,17 @@ def _caption(model: Model) -> str:
     return text
 
 
-def friction_before_after(traced: Traced) -> Section:
-    """Friction against velocity at all speeds and at low ones, before and after.
+def trace_friction_chart(traced: Traced) -> Chart:
+    """Friction against velocity at all speeds and at low ones, before and after a trace.
 
     Where the machine has drifted without lacking an effect, on training and test logs.
     """
-    speeds = _of_speed(traced)
-    other = [words(a.key) for a in traced.model.acting if a not in speeds]
-    caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
-    if other:
-        caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
-    return Section("Friction", replace(trace_friction_chart(traced), caption=caption))
-
-
-def _of_speed(traced: Traced) -> list[Acting]:
-    """The effects that are a function of velocity."""
-    every = traced.model.acting
-    return [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
-
-
-def trace_friction_chart(traced: Traced) -> Chart:
-    """The chart of `friction_before_after`."""
     found, model, after = traced.trace, traced.model, traced.model.karnopp
+    every = model.acting
+    speeds = [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
     drifted = bool(found.drift) and not found.effects
     curves: list[tuple[Karnopp, list[Acting], Colour, str]] = [
-        (after, _of_speed(traced), "model", "after" if found.effects else "model")
+        (after, speeds, "model", "after" if found.effects else "model")
     ]
     if found.effects:
         before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
@@ -234,5 +220,9 @@ def trace_friction_chart(traced: Traced) -> Chart:
                 title, units_of(model.rotary), dots, lines, (-high, high), (-top, top), after
             )
         )
+    caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
+    other = [words(a.key) for a in every if a not in speeds]
+    if other:
+        caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
     what = "friction force against velocity, before and after"
-    return Chart("trace-friction", what, panels, columns=2, shared_x=False)
+    return Chart("trace-friction", what, panels, 2, shared_x=False, caption=caption)

@@ -93,10 +93,12 @@ def design_view(found: Design, rotary: bool = False) -> View:
     """The controllers, their margins, what they do to noise, how fast they are."""
 
     def sections() -> Sequence[Section]:
+        one = found.p_pi
+        has_filter = one is not None and one.cascade is not None and one.series is not None
         return (
             Section("Step response", step_chart(found)),
             controllers(found, rotary),
-            *bode_section(found),
+            *([Section(BODE_TITLE, bode_chart(found))] if has_filter else []),
             Section("Sensitivity", sensitivity_chart(found, rotary)),
             *program_sections(found),
         )
@@ -198,14 +200,7 @@ def _db(values: object, least: float = 1e-12) -> Array:
 LOWEST_DRAWN = 1e-3  # of half the sampling rate
 POINTS_OF_BODE = 1200
 HERTZ = "frequency [Hz]"
-
-
-def bode_section(found: Design) -> list[Section]:
-    """The chart of `bode_chart`; nothing where there is no filter."""
-    one = found.p_pi
-    if one is None or one.cascade is None or one.series is None:
-        return []
-    return [Section("Bode plot, before and after the filter", bode_chart(found))]
+BODE_TITLE = "Bode plot, before and after the filter"
 
 
 def bode_chart(found: Design) -> Chart:

@@ -2,7 +2,7 @@
 
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
-from workbench.report.friction import friction_before_after, trace_friction_chart
+from workbench.report.friction import trace_friction_chart
 from workbench.report.missing_force import Which, missing_chart, missing_over_time
 from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import (
@@ -89,7 +89,7 @@ def _sections(traced: Traced) -> list[Section]:
         sections.append(Section(title, effects_table(found, model.rig), effect_lines(found)))
     if found.curves:
         sections.append(free_curves(found.curves, model.rotary, command))
-    sections.append(friction_before_after(traced))
+    sections.append(Section("Friction", trace_friction_chart(traced)))
     plain = "Parameters before and after" if found.effects else "Parameters"
     tables = {
         "Rivals, by the force that they leave": rivals_table(found, model.rotary),
