@@ -11,7 +11,7 @@ from identification.effects._base import Acting
 from identification.log import Log
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.inverse_model import zoh_force
-from identification.model.karnopp import Karnopp
+from identification.model.karnopp import NAMES, Karnopp
 from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
@@ -168,7 +168,8 @@ def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     J = np.array([change[fit.free[i]] for i in at])
     variance = np.einsum("in,ij,jn->n", J, fit.covariance[np.ix_(at, at)], J)
     half = NORMAL_95 * np.sqrt(np.maximum(variance, 0.0))
-    return _slip(v, p) - half, _slip(v, p) + half
+    middle = sliding_friction(v, p, ())
+    return middle - half, middle + half
 
 
 def _caption(model: Model) -> str:
