@@ -22,7 +22,7 @@ from workbench.files import REPORT_FILE
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE
-from workbench.registry.bench import TaskKind
+from workbench.registry.values import TaskKind
 from workbench.report.fit import fit_chart, residual
 from workbench.report.missing_force import missing_over_time
 from workbench.report.model_tables import (

@@ -18,7 +18,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
-from workbench.registry.access import Access, Role
+from workbench.registry.access import Access
+from workbench.registry.values import Role
 
 TOKEN_COOKIE = "workbench_token"
 CSRF_FIELD, CSRF_HEADER = "csrf", "x-csrf"

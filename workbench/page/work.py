@@ -24,7 +24,8 @@ from workbench.page.dropped import (
 )
 from workbench.page.pages import go, show
 from workbench.page.visitors import Visitor, changing, form_of, reading
-from workbench.registry.bench import Bench, TaskKind, WorkItem
+from workbench.registry.bench import Bench, WorkItem
+from workbench.registry.values import TaskKind
 
 KINDS_OF_WORK: dict[str, TaskKind] = {"identify": "identify", "trace": "trace"}
 GIVEN_OUT = ("model.json", "trace.json", "design.json", "validation.json")

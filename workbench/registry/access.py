@@ -6,17 +6,16 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
+from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
-from workbench.registry.page_tables import AccessTokenEndRow, AccessTokenRow, AuditRow
-from workbench.registry.rows import storable_text
+from workbench.registry.tables import AccessTokenEndRow, AccessTokenRow, AuditRow
+from workbench.registry.values import Role, of_row
 
-Role = Literal["read", "change"]
 TOKEN_PREFIX = "wb_"  # by which a token is known as one where it should not be
 RANDOM_BYTES = 32
 _PERSON = re.compile(r"[\w.@+-]{1,64}")
@@ -44,11 +43,11 @@ class Audited:
     detail: str
 
 
+@dataclass(frozen=True)
 class Access:
     """The tokens of a registry."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    database: Database
 
     def add(self, name: str, role: Role, *, by: str, now: datetime) -> str:
         """A new token, which is shown only now; the registry keeps its hash.
@@ -60,7 +59,7 @@ class Access:
                 f"token {name!r}: letters, digits and . _ @ + - needed, at most 64, as anna"
             )
         secret = TOKEN_PREFIX + secrets.token_urlsafe(RANDOM_BYTES)
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             if session.scalar(select(AccessTokenRow.id).where(AccessTokenRow.name == name)):
                 raise BadRegistry(
                     f"token {name!r}: exists already, active or revoked; give another name"
@@ -72,7 +71,7 @@ class Access:
 
     def revoke(self, name: str, *, by: str, now: datetime) -> None:
         """From now on the token is not taken; raises BadRegistry where there is no such."""
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             row = session.scalar(select(AccessTokenRow).where(AccessTokenRow.name == name))
             if row is None or session.get(AccessTokenEndRow, row.id) is not None:
                 raise BadRegistry(f"token {name!r}: there is none; 'workbench token list' has them")
@@ -81,35 +80,28 @@ class Access:
 
     def tokens(self) -> tuple[AccessToken, ...]:
         """Every token by name."""
-        query = (
-            select(AccessTokenRow, AccessTokenEndRow.at)
-            .outerjoin(AccessTokenEndRow, AccessTokenEndRow.token_id == AccessTokenRow.id)
-            .order_by(AccessTokenRow.name)
-        )
-        with self._database.reading() as session:
-            return tuple(_token(row, ended) for row, ended in session.execute(query))
+        return self._found(_TOKENS.order_by(AccessTokenRow.name))
 
     def of(self, secret: str) -> AccessToken | None:
         """The token of that secret; None where there is none, or it was revoked."""
-        query = (
-            select(AccessTokenRow, AccessTokenEndRow.at)
-            .outerjoin(AccessTokenEndRow, AccessTokenEndRow.token_id == AccessTokenRow.id)
-            .where(AccessTokenRow.sha256 == hashed(secret))
-        )
-        with self._database.reading() as session:
-            found = session.execute(query.where(AccessTokenEndRow.token_id.is_(None))).first()
-            return None if found is None else _token(found[0], None)
+        own = (AccessTokenRow.sha256 == hashed(secret), AccessTokenEndRow.at.is_(None))
+        return next(iter(self._found(_TOKENS.where(*own))), None)
 
     def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[Audited]:
         """The last changes, of one subject or all; the newest first."""
         query = select(AuditRow).order_by(AuditRow.id.desc()).limit(last)
         if subject is not None:
             query = query.where(AuditRow.subject == subject)
-        with self._database.reading() as session:
-            return [
-                Audited(row.at, row.made_by, row.kind, row.subject, row.detail)
-                for row in session.scalars(query)
-            ]
+        return [of_row(Audited, row) for (row,) in self.database.rows(query)]
+
+    def _found(self, query: Select[*tuple[Any, ...]]) -> tuple[AccessToken, ...]:
+        rows = self.database.rows(query)
+        return tuple(of_row(AccessToken, row, ended=ended) for row, ended in rows)
+
+
+_TOKENS = select(AccessTokenRow, AccessTokenEndRow.at).outerjoin(
+    AccessTokenEndRow, AccessTokenEndRow.token_id == AccessTokenRow.id
+)
 
 
 def hashed(secret: str) -> str:
@@ -119,8 +111,7 @@ def hashed(secret: str) -> str:
 
 def note(session: Session, kind: str, subject: str, detail: str, *, by: str, now: datetime) -> None:
     """Write a change into the audit, within the transaction that makes it."""
-    texts = {"kind": kind, "subject": storable_text(subject), "detail": storable_text(detail)}
-    session.add(AuditRow(at=now, made_by=by, **texts))
+    session.add(AuditRow(kind=kind, subject=subject, detail=detail, made_by=by, at=now))
 
 
 def audit(
@@ -129,8 +120,3 @@ def audit(
     """Write a change of files, which no transaction holds, into the audit."""
     with database.writing() as session:
         note(session, kind, subject, detail, by=by, now=now)
-
-
-def _token(row: AccessTokenRow, ended: datetime | None) -> AccessToken:
-    role: Role = "change" if row.role == "change" else "read"
-    return AccessToken(row.name, role, row.made_by, row.at, ended)

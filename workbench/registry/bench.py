@@ -9,18 +9,18 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from sqlalchemy import ColumnElement, CursorResult, and_, func, or_, select, update
+from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy.orm import Session
 
 from workbench.registry.access import note
-from workbench.registry.database import Database
+from workbench.registry.database import Database, changed
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.page_tables import TaskRow, UploadRow
-from workbench.registry.rows import storable_text
+from workbench.registry.tables import TaskRow, UploadRow
+from workbench.registry.values import TaskKind, TaskState, of_row
 
-TaskKind = Literal["identify", "trace"]
-TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
+Row = TypeVar("Row", UploadRow, TaskRow)
 EndState = Literal["done", "failed"]
 UNDER_WAY = ("waiting", "running")
 MOST_BEGUN = 3  # times that a task is begun; one that kills its workers is given up
@@ -63,106 +63,83 @@ class WorkClaim:
     token: str
 
 
+@dataclass(frozen=True)
 class Bench:
     """The uploads of a registry and the tasks on them."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    database: Database
 
     def add(self, upload: Upload) -> None:
         """Note an upload, with who made it."""
-        with self._database.writing() as session:
-            values = {**vars(upload), "file": storable_text(upload.file)}
-            session.add(UploadRow(**values))
+        with self.database.writing() as session:
+            session.add(UploadRow(**vars(upload)))
             detail = f"{upload.file}, {upload.size} bytes"
             note(session, "log_dropped", upload.id, detail, by=upload.made_by, now=upload.at)
 
     def upload(self, upload: str) -> Upload:
         """The upload; raises BadRegistry where there is none."""
-        with self._database.reading() as session:
-            row = session.get(UploadRow, upload)
-            if row is None:
-                raise BadRegistry(f"no upload {upload!r}")
-            return _upload(row)
+        with self.database.reading() as session:
+            return of_row(Upload, _there(session, UploadRow, upload))
 
     def uploads(self) -> Sequence[Upload]:
         """The last uploads, the newest first."""
         query = select(UploadRow).order_by(UploadRow.at.desc(), UploadRow.id).limit(SHOWN_UPLOADS)
-        with self._database.reading() as session:
-            return [_upload(row) for row in session.scalars(query)]
+        return [of_row(Upload, row) for (row,) in self.database.rows(query)]
 
     def ask(self, upload: str, kind: TaskKind, *, by: str, now: datetime) -> WorkItem:
         """A task that waits from now on; the one there is where the same is under way."""
-        same = and_(TaskRow.upload_id == upload, TaskRow.kind == kind, TaskRow.state.in_(UNDER_WAY))
-        with self._database.writing() as session:
-            # The upload's row is the lock of its tasks.
-            found = session.scalar(
-                select(UploadRow.id).where(UploadRow.id == upload).with_for_update()
-            )
-            if found is None:
-                raise BadRegistry(f"no upload {upload!r}")
+        same = and_(TaskRow.upload == upload, TaskRow.kind == kind, TaskRow.state.in_(UNDER_WAY))
+        with self.database.writing() as session:
+            _there(session, UploadRow, upload, lock=True)  # which locks its tasks
             row = session.scalar(select(TaskRow).where(same))
             if row is None:
-                row = TaskRow(upload_id=upload, kind=kind, state="waiting", stage="", share=0.0,
+                row = TaskRow(upload=upload, kind=kind, state="waiting", stage="", share=0.0,
                               said="", begun=0, made_by=by, at=now)  # fmt: skip
                 session.add(row)
                 note(session, f"{kind}_asked", upload, "", by=by, now=now)
                 session.flush()
-            return _task(row)
+            return of_row(WorkItem, row)
 
     def cancel(self, task: int, *, by: str, now: datetime) -> WorkItem:
         """The task, cancelled if it was not over; its worker stops at its next look."""
-        with self._database.writing() as session:
-            row = session.scalar(select(TaskRow).where(TaskRow.id == task).with_for_update())
-            if row is None:
-                raise BadRegistry(f"no task {task}")
+        with self.database.writing() as session:
+            row = _there(session, TaskRow, task, lock=True)
             if row.state in UNDER_WAY:
                 row.state, row.ended_at, row.said = "cancelled", now, f"cancelled by {by}"
-                note(session, f"{row.kind}_cancelled", row.upload_id, "", by=by, now=now)
-            return _task(row)
+                note(session, f"{row.kind}_cancelled", row.upload, "", by=by, now=now)
+            return of_row(WorkItem, row)
 
     def task(self, task: int) -> WorkItem:
         """The task; raises BadRegistry where there is none."""
-        with self._database.reading() as session:
-            row = session.get(TaskRow, task)
-            if row is None:
-                raise BadRegistry(f"no task {task}")
-            return _task(row)
+        with self.database.reading() as session:
+            return of_row(WorkItem, _there(session, TaskRow, task))
 
     def tasks(self, upload: str) -> Sequence[WorkItem]:
         """The upload's tasks in the order in which they were asked for."""
-        query = select(TaskRow).where(TaskRow.upload_id == upload).order_by(TaskRow.id)
-        with self._database.reading() as session:
-            return [_task(row) for row in session.scalars(query)]
+        query = select(TaskRow).where(TaskRow.upload == upload).order_by(TaskRow.id)
+        return [of_row(WorkItem, row) for (row,) in self.database.rows(query)]
 
     def counts(self) -> dict[str, int]:
         """How many tasks there are in each state."""
         query = select(TaskRow.state, func.count()).group_by(TaskRow.state)
-        with self._database.reading() as session:
-            return {state: count for state, count in session.execute(query)}
+        return {state: count for state, count in self.database.rows(query)}
 
     def claim(self, owner: str, *, lease: timedelta, now: datetime) -> WorkClaim | None:
         """The next task for this worker until the lease ends; None where none waits."""
         silent = and_(TaskRow.state == "running", TaskRow.until <= now)
         free = or_(TaskRow.state == "waiting", silent)
-        with self._database.reading() as session:
-            if session.scalar(select(TaskRow.id).where(free).limit(1)) is None:
-                return None  # no lock is taken where nothing waits
+        if not self.database.rows(select(TaskRow.id).where(free).limit(1)):
+            return None  # no lock is taken where nothing waits
         first = select(TaskRow).where(free).order_by(TaskRow.id).limit(1)
         query = first.with_for_update(skip_locked=True)
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             while (row := session.scalar(query)) is not None:
                 if row.begun < MOST_BEGUN:
-                    token = secrets.token_hex(16)
-                    row.state, row.token, row.owner, row.until = (
-                        "running",
-                        token,
-                        owner,
-                        now + lease,
-                    )
+                    row.state, row.owner, row.until = "running", owner, now + lease
                     row.begun, row.share, row.stage = row.begun + 1, 0.0, ""
+                    row.token = token = secrets.token_hex(16)
                     session.flush()
-                    return WorkClaim(_task(row), token)
+                    return WorkClaim(of_row(WorkItem, row), token)
                 row.state, row.ended_at = "failed", now
                 row.said = f"begun {row.begun} times, and no worker has come to its end"
                 session.flush()
@@ -177,19 +154,18 @@ class Bench:
     def finish(self, claim: WorkClaim, state: EndState, said: str, *, now: datetime) -> None:
         """The task is over; raises LostClaim where it is cancelled or another's by now."""
         share = {"share": 1.0} if state == "done" else {}
-        self._write(claim, state=state, said=storable_text(said), ended_at=now, **share)
+        self._write(claim, state=state, said=said, ended_at=now, **share)
 
     def give_back(self, claim: WorkClaim) -> None:
         """The task waits again: its worker was asked to end. Nothing where it is another's."""
-        with self._database.writing() as session:
-            values = {"state": "waiting", "token": None, "until": None, "begun": TaskRow.begun - 1}
-            session.execute(update(TaskRow).where(_own(claim)).values(values))
+        begun = TaskRow.begun - 1
+        with self.database.writing() as session:
+            changed(session, TaskRow, _own(claim), state="waiting", token=None, until=None,
+                    begun=begun)  # fmt: skip
 
     def _write(self, claim: WorkClaim, **values: Any) -> None:
-        with self._database.writing() as session:
-            done: Any = session.execute(update(TaskRow).where(_own(claim)).values(**values))
-            result: CursorResult[Any] = done
-            if result.rowcount != 1:
+        with self.database.writing() as session:
+            if changed(session, TaskRow, _own(claim), **values) != 1:
                 raise LostClaim(f"task {claim.task.id}: cancelled, or in another worker's hands")
 
 
@@ -199,14 +175,9 @@ def _own(claim: WorkClaim) -> ColumnElement[bool]:
     )
 
 
-def _upload(row: UploadRow) -> Upload:
-    return Upload(row.id, row.file, row.size, row.sha256, row.made_by, row.at)
-
-
-def _task(row: TaskRow) -> WorkItem:
-    kind: Any = row.kind
-    state: Any = row.state
-    return WorkItem(
-        row.id, row.upload_id, kind, state, row.stage, row.share, row.said, row.made_by, row.at,
-        row.ended_at,
-    )  # fmt: skip
+def _there(session: Session, table: type[Row], key: str | int, *, lock: bool = False) -> Row:
+    """The row of an upload or a task; raises BadRegistry where there is none."""
+    row = session.get(table, key, with_for_update=lock)
+    if row is None:
+        raise BadRegistry(f"no {table.__tablename__} {key!r}")
+    return row

@@ -4,13 +4,27 @@ import os
 import re
 import secrets
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event, func, make_url, select
+from sqlalchemy import (
+    URL,
+    ColumnElement,
+    Connection,
+    Engine,
+    Row,
+    Select,
+    create_engine,
+    event,
+    func,
+    make_url,
+    select,
+    update,
+)
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -23,7 +37,7 @@ from sqlalchemy.exc import (
     ProgrammingError,
     TimeoutError,
 )
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import DeclarativeBase, Session
 
 from workbench.files import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
@@ -73,8 +87,13 @@ class Database:
         if self._engine.dialect.name == "postgresql":
             options["isolation_level"] = "REPEATABLE READ"
         engine = self._engine.execution_options(**options)
-        with self._guarded(), Session(engine) as session, session.begin():
+        with self._guarded(), Session(engine, expire_on_commit=False) as session, session.begin():
             yield session
+
+    def rows(self, query: Select[*tuple[Any, ...]]) -> Sequence[Row[*tuple[Any, ...]]]:
+        """All rows of one query, in a session of its own."""
+        with self.reading() as session:
+            return session.execute(query).all()
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
@@ -96,6 +115,22 @@ class Database:
 
     def _guarded(self) -> AbstractContextManager[None]:
         return _guarded(str(self.where))
+
+
+def changed(
+    session: Session, table: type[DeclarativeBase], where: ColumnElement[bool], **values: Any
+) -> int:
+    """Change these rows; how many there were."""
+    done: Any = session.execute(update(table).where(where).values(**values))
+    count: int = done.rowcount
+    return count
+
+
+def insert_missing(session: Session, table: type[DeclarativeBase]) -> Any:
+    """A statement that inserts into the table what is not there yet."""
+    of_postgres = session.get_bind().dialect.name == "postgresql"
+    insert = postgresql.insert if of_postgres else sqlite.insert
+    return insert(table).on_conflict_do_nothing()
 
 
 @contextmanager

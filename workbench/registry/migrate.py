@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Connection, Table, UniqueConstraint, inspect, text
 
 from workbench.registry.errors import BadRegistry
-from workbench.registry.page_tables import PAGE_APPEND_ONLY
-from workbench.registry.tables import APPEND_ONLY, Base
+from workbench.registry.tables import APPEND_ONLY, PAGE_APPEND_ONLY, Base
 
 if TYPE_CHECKING:
     from alembic.config import Config

@@ -1,25 +1,13 @@
 """Alarms on their way to a webhook: each is kept until it is taken, and delayed by itself alone."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import (
-    ColumnElement,
-    CursorResult,
-    Select,
-    and_,
-    case,
-    delete,
-    func,
-    literal,
-    select,
-    update,
-)
-from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Select, and_, case, delete, func, literal, select
 
-from workbench.registry.database import Database
+from workbench.registry.database import Database, changed, insert_missing
 from workbench.registry.rows import lock_machine
 from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
 from workbench.registry.values import Alarm, LogVerdict
@@ -28,11 +16,11 @@ FIRST_DELAY = timedelta(minutes=1)  # after an alarm's first refusal; each furth
 LONGEST_DELAY = timedelta(hours=4)
 
 
+@dataclass(frozen=True)
 class Outbox:
     """The alarms that no webhook has taken yet."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    database: Database
 
     def fill(self, verdicts: Sequence[LogVerdict], *, since: datetime, now: datetime) -> None:
         """Put the results of these verdicts from `since` on into it that never were in it."""
@@ -50,16 +38,14 @@ class Outbox:
                 OutboxRow.log_id.is_(None),
             )
         )
-        insert = postgresql.insert if self._database.dialect == "postgresql" else sqlite.insert
         columns = ["log_id", "turn", "refusals", "next_at"]
-        with self._database.writing() as session:
-            session.execute(insert(OutboxRow).from_select(columns, new).on_conflict_do_nothing())
+        with self.database.writing() as session:
+            session.execute(insert_missing(session, OutboxRow).from_select(columns, new))
 
     def due(self, now: datetime) -> tuple[Alarm, ...]:
         """The alarms to be tried now: those never tried first, then the oldest."""
         query = _alarms().where(OutboxRow.next_at <= now, OutboxRow.given_up_at.is_(None))
-        with self._database.reading() as session:
-            return tuple(_alarm(row) for row in session.execute(query))
+        return tuple(Alarm(*row) for row in self.database.rows(query))
 
     def take(self, alarm: Alarm, *, until: datetime, now: datetime) -> bool:
         """Whether the alarm is this worker's to send until then; False where another was first."""
@@ -72,7 +58,7 @@ class Outbox:
 
     def sent(self, alarm: Alarm, *, now: datetime) -> None:
         """Note that the webhook has taken the alarm; nothing where it is noted already."""
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             lock_machine(session, alarm.machine, now)
             if session.get(NoticeRow, (alarm.log_id, alarm.turn)) is None:
                 session.add(NoticeRow(log_id=alarm.log_id, turn=alarm.turn, at=now))
@@ -80,9 +66,8 @@ class Outbox:
 
     def refused(self, alarm: Alarm, *, now: datetime) -> datetime:
         """When the alarm is tried again, now that it has been refused once more."""
-        with self._database.writing() as session:
-            query = select(OutboxRow).where(_place(alarm)).with_for_update()
-            row = session.scalar(query)
+        with self.database.writing() as session:
+            row = session.scalar(select(OutboxRow).where(_place(alarm)).with_for_update())
             if row is None:  # another worker has brought it there meanwhile
                 return now
             row.next_at = now + wait(row.refusals)
@@ -92,11 +77,12 @@ class Outbox:
     def give_up(self, *, before: datetime, now: datetime) -> tuple[Alarm, ...]:
         """The alarms of results before that moment, which are not tried from now on."""
         late = _alarms().where(OutcomeRow.at < before, OutboxRow.given_up_at.is_(None))
-        with self._database.writing() as session:
-            found = [_alarm(row) for row in session.execute(late.with_for_update(of=OutboxRow))]
+        with self.database.writing() as session:
+            rows = session.execute(late.with_for_update(of=OutboxRow)).all()
+            found = tuple(Alarm(*row) for row in rows)
             for alarm in found:
-                session.execute(update(OutboxRow).where(_place(alarm)).values(given_up_at=now))
-            return tuple(found)
+                changed(session, OutboxRow, _place(alarm), given_up_at=now)
+            return found
 
     def counts(self, now: datetime) -> dict[str, tuple[int, int]]:
         """How many alarms of each machine wait, and how many have been given up.
@@ -111,14 +97,13 @@ class Outbox:
             .where(kind.is_not(None))
             .group_by(LogRow.machine)
         )
-        with self._database.reading() as session:
-            rows = session.execute(query)
-            return {machine: (int(waiting), int(lost)) for machine, waiting, lost in rows}
+        rows = self.database.rows(query)
+        return {machine: (int(waiting), int(lost)) for machine, waiting, lost in rows}
 
     def _change(self, where: ColumnElement[bool], **values: datetime) -> int:
         """How many rows were there to be changed."""
-        with self._database.writing() as session:
-            return _changed(session, where, values)
+        with self.database.writing() as session:
+            return changed(session, OutboxRow, where, **values)
 
 
 def wait(refusals: int) -> timedelta:
@@ -127,18 +112,12 @@ def wait(refusals: int) -> timedelta:
     return min(doubled, LONGEST_DELAY)
 
 
-def _changed(session: Session, where: ColumnElement[bool], values: dict[str, datetime]) -> int:
-    done: Any = session.execute(update(OutboxRow).where(where).values(**values))
-    result: CursorResult[Any] = done
-    return result.rowcount
-
-
 def _place(alarm: Alarm) -> ColumnElement[bool]:
     return and_(OutboxRow.log_id == alarm.log_id, OutboxRow.turn == alarm.turn)
 
 
 def _alarms() -> Select[Any]:
-    """What `_alarm` is made of."""
+    """Alarms, each as the fields of an `Alarm`."""
     number = (
         select(VersionRow.number)
         .where(VersionRow.id == OutcomeRow.version_id)
@@ -155,7 +134,3 @@ def _alarms() -> Select[Any]:
         .join(LogRow, LogRow.id == OutboxRow.log_id)
         .order_by(OutboxRow.tried_at.nulls_first(), OutcomeRow.at, LogRow.id)
     )  # fmt: skip
-
-
-def _alarm(row: Any) -> Alarm:
-    return Alarm(*row)

@@ -4,24 +4,24 @@ says of each machine: a state, and the parameter that moved most.
 That is kept beside the results, within the transaction that writes them.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, get_args
 
-from sqlalchemy import ColumnElement, SQLColumnExpression, and_, case, func, select, update
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import ColumnElement, SQLColumnExpression, and_, case, func, select
 from sqlalchemy.orm import Session
 
-from workbench.output import dumps
-from workbench.registry.database import Database
-from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
-from workbench.registry.tables import ActiveVersionRow, DecisionRow, VersionRow
+from workbench.registry.database import Database, changed, insert_missing
+from workbench.registry.tables import (
+    ActiveVersionRow,
+    DecisionRow,
+    MachineNowRow,
+    MachineTrendRow,
+    VersionRow,
+)
+from workbench.registry.values import MachineCondition, of_row
 
-MachineCondition = Literal[
-    "in_tune", "drifting", "structure", "log_bad", "not_judged", "no_log", "silent"
-]
 Trend = dict[str, list[float]]
 TREND_LOGS = 32  # logs that a trend goes back
 INTERVAL_DEVIATIONS = 1.96  # to each side, of 95 %
@@ -90,17 +90,15 @@ def _parameters(evidence: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 def begin_summary(session: Session, machine: str) -> None:
     """A machine of which nothing is known yet; one that is there stays as it is."""
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    first = {"machine": machine, "state": "no_log", "logs": 0}
-    session.execute(insert(MachineNowRow).values(first).on_conflict_do_nothing())
-    empty = {"machine": machine, "trend": "{}"}
-    session.execute(insert(MachineTrendRow).values(empty).on_conflict_do_nothing())
+    now, trend = (insert_missing(session, table) for table in (MachineNowRow, MachineTrendRow))
+    session.execute(now.values(machine=machine, state="no_log", logs=0))
+    session.execute(trend.values(machine=machine, trend={}))
 
 
 def summary_heard(session: Session, machine: str, logs: int, now: datetime) -> None:
     """So many new logs of the machine have come."""
-    more = {"heard_at": now, "logs": MachineNowRow.logs + logs}
-    session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(more))
+    own = MachineNowRow.machine == machine
+    changed(session, MachineNowRow, own, heard_at=now, logs=MachineNowRow.logs + logs)
 
 
 def summary_tested(
@@ -111,21 +109,16 @@ def summary_tested(
     row.state = state_of(verdict, evidence)
     name, change = most_moved(evidence)
     if name is not None:
-        trend_row = session.get_one(MachineTrendRow, machine)
-        trend = with_log(json.loads(trend_row.trend), evidence)
-        trend_row.trend = dumps(trend)
-        row.moved, row.moved_by, row.moved_trend = (
-            name,
-            change,
-            dumps(trend.get(name, [])),
-        )
+        trend = session.get_one(MachineTrendRow, machine)
+        values = trend.trend = with_log(trend.trend, evidence)
+        row.moved, row.moved_by, row.moved_trend = name, change, values.get(name, [])
 
 
 def summary_moved(session: Session, machine: str) -> None:
     """Somebody has activated another version: the next log shows how that fits."""
-    nothing = dict.fromkeys(("moved", "moved_by", "moved_trend"))
-    values = {"state": "not_judged", **nothing}
-    session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(values))
+    own = MachineNowRow.machine == machine
+    changed(session, MachineNowRow, own, state="not_judged", moved=None, moved_by=None,
+            moved_trend=None)  # fmt: skip
 
 
 FleetOrder = Literal["machine", "state", "heard", "moved"]
@@ -177,66 +170,52 @@ class FleetPage:
 
 def fleet_page(database: Database, asked: FleetAsked) -> FleetPage:
     """The page that was asked for."""
-    state = _state(asked.silent_since)
-    where = _where(asked, state)
+    now = MachineNowRow
+    silent = and_(now.state.in_(MAY_FALL_SILENT), now.heard_at < asked.silent_since)
+    state = case((silent, "silent"), else_=now.state)
+    where = [now.machine.icontains(asked.text, autoescape=True)] if asked.text else []
+    if asked.state is not None:
+        where.append(state == asked.state)
     with database.reading() as session:
         counted = session.execute(select(state, func.count()).group_by(state))
         counts: dict[str, int] = {one: count for one, count in counted}
         found: int | None
         if asked.text:
-            found = session.scalar(select(func.count()).select_from(MachineNowRow).where(*where))
+            found = session.scalar(select(func.count()).select_from(now).where(*where))
         else:
             found = counts.get(asked.state, 0) if asked.state else sum(counts.values())
         rows = session.execute(_lines(asked, state, where)).all()
-        forces = _beside(session, [row.machine for row in rows])
-        lines = [_line(row, forces.get(row.machine)) for row in rows]
+        active = _active(session, [row.machine for row in rows])
+    lines = [
+        of_row(FleetLine, row, trend=row.trend or [], version=version, since=since)
+        for row in rows
+        for version, since in [active.get(row.machine, (None, None))]
+    ]
     return FleetPage(lines, found or 0, counts)
-
-
-def _state(silent_since: datetime) -> ColumnElement[str]:
-    silent = and_(MachineNowRow.state.in_(MAY_FALL_SILENT), MachineNowRow.heard_at < silent_since)
-    return case((silent, "silent"), else_=MachineNowRow.state)
-
-
-def _where(asked: FleetAsked, state: ColumnElement[str]) -> list[ColumnElement[bool]]:
-    out: list[ColumnElement[bool]] = []
-    if asked.text:
-        out.append(MachineNowRow.machine.icontains(asked.text, autoescape=True))
-    if asked.state is not None:
-        out.append(state == asked.state)
-    return out
 
 
 def _lines(
     asked: FleetAsked, state: ColumnElement[str], where: Sequence[ColumnElement[bool]]
 ) -> Any:
     """The page's machines with their states."""
+    now = MachineNowRow
     keys: Mapping[FleetOrder, SQLColumnExpression[Any]] = {
-        "machine": MachineNowRow.machine,
+        "machine": now.machine,
         "state": case({name: k for k, name in enumerate(WORST_FIRST)}, value=state, else_=9),
-        "heard": MachineNowRow.heard_at,
-        "moved": func.abs(MachineNowRow.moved_by),
+        "heard": now.heard_at,
+        "moved": func.abs(now.moved_by),
     }
     key = keys[asked.order]
-    order = key.desc().nulls_last() if asked.down else key.asc().nulls_last()
+    order = (key.desc() if asked.down else key.asc()).nulls_last(), now.machine
     return (
-        select(
-            MachineNowRow.machine,
-            MachineNowRow.heard_at,
-            MachineNowRow.logs,
-            MachineNowRow.moved,
-            MachineNowRow.moved_by,
-            MachineNowRow.moved_trend,
-            state,
-        )
-        .where(*where)
-        .order_by(order, MachineNowRow.machine)
-        .limit(asked.per_page)
-        .offset((asked.page - 1) * asked.per_page)
-    )
+        select(now.machine, now.heard_at, now.logs, now.moved, now.moved_by,
+               now.moved_trend.label("trend"), state.label("state"))
+        .where(*where).order_by(*order)
+        .limit(asked.per_page).offset((asked.page - 1) * asked.per_page)
+    )  # fmt: skip
 
 
-def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int, datetime]]:
+def _active(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int, datetime]]:
     """Active versions and since when, looked up for the page's machines alone."""
     query = (
         select(ActiveVersionRow.machine, VersionRow.number, DecisionRow.at)
@@ -245,14 +224,6 @@ def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int
         .where(ActiveVersionRow.machine.in_(machines))
     )
     return {machine: (number, at) for machine, number, at in session.execute(query)}
-
-
-def _line(row: Any, force: tuple[int, datetime] | None) -> FleetLine:
-    machine, heard_at, logs, moved, moved_by, trend, state = row
-    values = json.loads(trend) if trend else []
-    return FleetLine(
-        machine, state, heard_at, logs, moved, moved_by, values, *(force or (None, None))
-    )
 
 
 def any_machine(database: Database) -> bool:

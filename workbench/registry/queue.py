@@ -6,17 +6,14 @@ transaction that holds only while the claim does: a worker that has been taken f
 back finds another's token, and its result is dropped.
 """
 
-import json
 import secrets
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Any
 
-from sqlalchemy import and_, delete, func, select
+from sqlalchemy import ColumnElement, and_, delete, func, select
 from sqlalchemy.orm import Session
 
-from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.overview import summary_heard, summary_tested
@@ -29,7 +26,6 @@ from workbench.registry.rows import (
     logs_behind,
     need_machine,
     seen,
-    storable_text,
     turn,
 )
 from workbench.registry.tables import (
@@ -44,46 +40,46 @@ from workbench.registry.values import (
     Candidate,
     Claim,
     DecisionKind,
+    Document,
     Judgement,
     LogOutcome,
     Order,
     SeenLog,
     Version,
     newest_of_later,
+    of_row,
 )
 
 OFTEN = 5
 OLDER = "older_than"  # key of the evidence that names the newer log behind the active model
 CLOCKS_APART = timedelta(minutes=1)  # by which the clocks of workers may differ
+MILLISECOND = timedelta(milliseconds=1)
 SHORTEST = 4  # characters of a fingerprint by which a log may be named
 
 
+@dataclass(frozen=True)
 class Queue:
     """The logs of machines that wait for a result, and the claims on them."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    database: Database
 
     def known(self, machine: str) -> dict[tuple[str, int, int], str]:
         """Fingerprints of the logs seen, by file name, size and modification time."""
-        query = select(LogRow).where(LogRow.machine == machine)
-        with self._database.reading() as session:
-            rows = session.scalars(query)
-            return {(row.file, row.size, row.mtime_ns): row.sha256 for row in rows}
+        query = select(LogRow.file, LogRow.size, LogRow.mtime_ns, LogRow.sha256)
+        rows = self.database.rows(query.where(LogRow.machine == machine))
+        return {(file, size, mtime_ns): sha256 for file, size, mtime_ns, sha256 in rows}
 
     def announce(self, machine: str, logs: Sequence[SeenLog], *, now: datetime) -> int:
         """How many of the logs are new; they wait from now on."""
         if not logs:
             return 0
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             lock_machine(session, machine, now)
             query = select(LogRow.sha256).where(LogRow.machine == machine)
             have = set(session.scalars(query))
-            new: dict[str, SeenLog] = {}
-            for log in logs:
-                if log.sha256 not in have:
-                    new.setdefault(log.sha256, log)
-            session.add_all(_log_row(machine, log, now) for log in new.values())
+            first = {log.sha256: log for log in reversed(logs)}  # of files of one content
+            new = [log for log in first.values() if log.sha256 not in have]
+            session.add_all(LogRow(machine=machine, seen_at=now, **vars(log)) for log in new)
             if new:
                 summary_heard(session, machine, len(new), now)
             return len(new)
@@ -94,7 +90,7 @@ class Queue:
         A lease that ends later than any clock about as fast as this one could have set it is
         not waited for: should its worker live on, its result is dropped and made again.
         """
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             lock_machine(session, machine, now)
             row = session.get(ClaimRow, machine)
             if row is not None and row.until > now and not _too_late(row, now):
@@ -104,29 +100,25 @@ class Queue:
                 row = ClaimRow(machine=machine)
                 session.add(row)
             row.token, row.owner, row.until = found.token, owner, found.until
-            row.lease_ms = _milliseconds(lease)
+            row.lease_ms = round(lease / MILLISECOND)
             return found
 
     def renew(self, claim: Claim, *, lease: timedelta, now: datetime) -> None:
         """Lengthen the lease; raises LostClaim where another has taken over."""
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             row = _hold(session, claim, now)
-            row.until, row.lease_ms = now + lease, _milliseconds(lease)
+            row.until, row.lease_ms = now + lease, round(lease / MILLISECOND)
 
     def release(self, claim: Claim) -> None:
         """Give the machine back; nothing where another has taken over."""
-        with self._database.writing() as session:
-            session.execute(
-                delete(ClaimRow).where(
-                    ClaimRow.machine == claim.machine, ClaimRow.token == claim.token
-                )
-            )
+        with self.database.writing() as session:
+            session.execute(delete(ClaimRow).where(_own(claim)))
 
     def newer_behind(
         self, machine: str, log: SeenLog, order: Order = "time-or-name"
     ) -> SeenLog | None:
         """Of the logs behind the machine's models, the newest that `log` is older than; or None."""
-        with self._database.reading() as session:
+        with self.database.reading() as session:
             return _newer(session, machine, log, order)
 
     def waiting(self, machine: str) -> tuple[tuple[SeenLog, int], ...]:
@@ -145,24 +137,16 @@ class Queue:
             .group_by(LogRow.id)
             .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
         )
-        with self._database.reading() as session:
-            found = [(seen(row), int(count)) for row, count in session.execute(query)]
+        found = [(seen(row), int(count)) for row, count in self.database.rows(query)]
         return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
 
     def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
         """Note that the worker begins with a log; raises LostClaim."""
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             _hold(session, claim, now)
-            row = _log(session, claim.machine, log)
-            session.add(
-                AttemptRow(
-                    log_id=row.id,
-                    turn=_turn(session, row),
-                    token=claim.token,
-                    owner=claim.owner,
-                    at=now,
-                )
-            )
+            row, now_turn = _log(session, claim.machine, log)
+            session.add(AttemptRow(log_id=row.id, turn=now_turn, token=claim.token,
+                                   owner=claim.owner, at=now))  # fmt: skip
 
     def finish(
         self,
@@ -180,13 +164,12 @@ class Queue:
         activated. A second call with the same claim gives the first's: a commit may have been kept
         although its answer was lost. Raises LostClaim where another has taken over.
         """
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             lock_machine(session, claim.machine, now)
-            row = _log(session, claim.machine, log)
-            now_turn = _turn(session, row)
+            row, now_turn = _log(session, claim.machine, log)
             done = session.get(OutcomeRow, (row.id, now_turn))
             if done is not None and done.token == claim.token:
-                return _outcome(session, row, done)
+                return _recorded(session, done)
             _hold(session, claim, now)
             current = active_version(session, claim.machine)
             newer = _newer(session, claim.machine, log, order)
@@ -194,23 +177,15 @@ class Queue:
                 judgement = _of_older(judgement, log, newer)
             for kind, candidate, reason in _decided(judgement):
                 version, _ = add_version(session, claim.machine, candidate, now)
-                decide(
-                    session,
-                    kind,
-                    version,
-                    reason=reason,
-                    by=by,
-                    now=now,
-                    evidence=judgement.evidence,
-                    log_id=row.id,
-                )
+                decide(session, kind, version, reason=reason, by=by, now=now,
+                       evidence=judgement.evidence, log_id=row.id)  # fmt: skip
             done = OutcomeRow(
                 log_id=row.id,
                 turn=now_turn,
                 version_id=None if current is None else current.id,
                 verdict=judgement.verdict,
-                reason=storable_text(judgement.reason),
-                evidence=dumps(judgement.evidence),
+                reason=judgement.reason,
+                evidence=judgement.evidence,
                 token=claim.token,
                 at=now,
             )
@@ -218,7 +193,8 @@ class Queue:
             if newer is None:
                 summary_tested(session, claim.machine, judgement.verdict, judgement.evidence)
             session.flush()
-            return _outcome(session, row, done)
+            session.expire(done)  # so that it is told as the database keeps it
+            return _recorded(session, done)
 
     def reopen(
         self, machine: str, logs: Sequence[str], *, reason: str, by: str, now: datetime
@@ -228,11 +204,11 @@ class Queue:
         logs: names or beginnings of fingerprints of logs with a result, none: all that were
         excluded. Raises BadRegistry where one is not there or waits anyhow.
         """
-        with self._database.writing() as session:
+        with self.database.writing() as session:
             need_machine(session, machine, lock=True)
-            query = select(LogRow, OutcomeRow).join(OutcomeRow, judged_now())
+            query = select(LogRow, OutcomeRow.verdict).join(OutcomeRow, judged_now())
             found = session.execute(query.where(LogRow.machine == machine).order_by(LogRow.id))
-            judged = [(row, done.verdict) for row, done in found]
+            judged = [(row, verdict) for row, verdict in found]
             chosen = [row for row, verdict in judged if not logs and verdict == "set_aside"]
             for name in dict.fromkeys(logs):
                 own = _named(machine, name, [row for row, _ in judged])
@@ -241,7 +217,7 @@ class Queue:
                 session.add(ReopeningRow(log_id=row.id, reason=reason, made_by=by, at=now))
             return tuple(row.file for row in chosen)
 
-    def last_evidence(self, version: Version) -> dict[str, Any] | None:
+    def last_evidence(self, version: Version) -> Document | None:
         """Evidence of the latest result against this version; None where there is none yet.
 
         That of a log older than the version's own is left out: it is of the machine before.
@@ -256,23 +232,14 @@ class Queue:
             )
             .order_by(OutcomeRow.at.desc(), OutcomeRow.log_id.desc())
         )
-        with self._database.reading() as session:
-            for text in session.scalars(query):
-                found: dict[str, Any] = json.loads(text)
-                if OLDER not in found:
-                    return found
-        return None
+        with self.database.reading() as session:
+            return next((found for found in session.scalars(query) if OLDER not in found), None)
 
     def outcomes(self, machine: str) -> tuple[LogOutcome, ...]:
         """Results of a machine's logs, in the order of their files."""
-        query = (
-            select(LogRow, OutcomeRow)
-            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
-            .where(LogRow.machine == machine)
-            .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id, OutcomeRow.turn)
-        )
-        with self._database.reading() as session:
-            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
+        order = (LogRow.mtime_ns, LogRow.file, LogRow.id, OutcomeRow.turn)
+        rows = self.database.rows(_OUTCOMES.where(LogRow.machine == machine).order_by(*order))
+        return tuple(_outcome(*row) for row in rows)
 
     def verdicts(self) -> dict[tuple[str, str], int]:
         """How many logs have each verdict, by machine and verdict."""
@@ -281,8 +248,7 @@ class Queue:
             .join(OutcomeRow, judged_now())
             .group_by(LogRow.machine, OutcomeRow.verdict)
         )
-        with self._database.reading() as session:
-            return {(name, verdict): count for name, verdict, count in session.execute(query)}
+        return {(name, verdict): count for name, verdict, count in self.database.rows(query)}
 
 
 def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLog | None:
@@ -339,23 +305,13 @@ def _decided(judgement: Judgement) -> Iterator[tuple[DecisionKind, Candidate, st
 
 def _too_late(row: ClaimRow, now: datetime) -> bool:
     """Whether the claim was made by a clock that is ahead of this one by more than they may be."""
-    if row.lease_ms is None:
-        return False
-    return row.until > now + timedelta(milliseconds=row.lease_ms) + CLOCKS_APART
-
-
-def _milliseconds(lease: timedelta) -> int:
-    return round(lease.total_seconds() * 1e3)
+    return row.lease_ms is not None and row.until > now + row.lease_ms * MILLISECOND + CLOCKS_APART
 
 
 def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
     """The claim's row, locked; raises LostClaim where it is another's by now."""
     lock_machine(session, claim.machine, now)
-    row = session.scalar(
-        select(ClaimRow).where(
-            and_(ClaimRow.machine == claim.machine, ClaimRow.token == claim.token)
-        )
-    )
+    row = session.scalar(select(ClaimRow).where(_own(claim)))
     if row is None:
         raise LostClaim(
             f"{claim.machine}: the lease has ended and another worker has taken over; its result"
@@ -364,37 +320,28 @@ def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
     return row
 
 
-def _turn(session: Session, row: LogRow) -> int:
-    query = select(func.count(ReopeningRow.id)).where(ReopeningRow.log_id == row.id)
-    return session.scalar(query) or 0
+def _own(claim: Claim) -> ColumnElement[bool]:
+    return and_(ClaimRow.machine == claim.machine, ClaimRow.token == claim.token)
 
 
-def _log(session: Session, machine: str, log: SeenLog) -> LogRow:
-    query = select(LogRow).where(LogRow.machine == machine, LogRow.sha256 == log.sha256)
-    return session.scalars(query).one()
+def _log(session: Session, machine: str, log: SeenLog) -> tuple[LogRow, int]:
+    """The log's row, and how often it was reopened."""
+    query = select(LogRow, turn()).where(LogRow.machine == machine, LogRow.sha256 == log.sha256)
+    row, reopened = session.execute(query).one()
+    return row, reopened
 
 
-def _log_row(machine: str, log: SeenLog, now: datetime) -> LogRow:
-    return LogRow(
-        machine=machine,
-        sha256=log.sha256,
-        file=log.file,
-        size=log.size,
-        mtime_ns=log.mtime_ns,
-        seen_at=now,
-    )
+_OUTCOMES = (
+    select(OutcomeRow, LogRow, VersionRow.number)
+    .join(LogRow, LogRow.id == OutcomeRow.log_id)
+    .outerjoin(VersionRow, VersionRow.id == OutcomeRow.version_id)
+)
 
 
-def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> LogOutcome:
-    number = select(VersionRow.number).where(VersionRow.id == row.version_id)
-    verdict: Any = row.verdict
-    return LogOutcome(
-        machine=log.machine,
-        log=seen(log),
-        verdict=verdict,
-        reason=row.reason,
-        number=None if row.version_id is None else session.scalar(number),
-        evidence=json.loads(row.evidence),
-        at=row.at,
-        turn=row.turn,
-    )
+def _recorded(session: Session, done: OutcomeRow) -> LogOutcome:
+    own = (OutcomeRow.log_id == done.log_id, OutcomeRow.turn == done.turn)
+    return _outcome(*session.execute(_OUTCOMES.where(*own)).one())
+
+
+def _outcome(row: OutcomeRow, log: LogRow, number: int | None) -> LogOutcome:
+    return of_row(LogOutcome, row, machine=log.machine, log=seen(log), number=number)

@@ -1,7 +1,6 @@
 """A machine's results as its page shows them: the last ones, their way to the webhook, and the axis
 test of the newest against those before it."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -10,9 +9,15 @@ from typing import Any, Literal, NamedTuple
 from sqlalchemy import and_, func, select
 
 from workbench.registry.database import Database
-from workbench.registry.page_tables import MachineNowRow
 from workbench.registry.rows import judged_now
-from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
+from workbench.registry.tables import (
+    LogRow,
+    MachineNowRow,
+    NoticeRow,
+    OutboxRow,
+    OutcomeRow,
+    VersionRow,
+)
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 
 Delivered = Literal["", "sent", "waiting", "given up"]
@@ -51,8 +56,7 @@ def last_logs(database: Database, machine: str, last: int) -> Sequence[TestedLog
         .order_by(LogRow.mtime_ns.desc(), LogRow.file.desc(), LogRow.id.desc())
         .limit(last)
     )
-    with database.reading() as session:
-        return [_judged(*row) for row in session.execute(query)]
+    return [_judged(*row) for row in database.rows(query)]
 
 
 def condition(database: Database, machine: str) -> str:
@@ -76,7 +80,7 @@ def _judged(
     recorded = log.mtime_ns / 1e9
     if done is None:
         return TestedLog(log.file, log.sha256, recorded, None, "", None, None, (), "")
-    drift = json.loads(done.evidence).get("drift") or {}
+    drift = done.evidence.get("drift") or {}
     delivered: Delivered = "sent" if sent else ""
     if queued is not None:
         delivered = "waiting" if queued.given_up_at is None else "given up"

@@ -1,16 +1,16 @@
 """Statements on the registry's rows, within a transaction of the caller."""
 
 import hashlib
-import json
+from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
+from typing import get_args
 
 from sqlalchemy import ColumnElement, and_, func, or_, select
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session, aliased
 
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
+from workbench.registry.database import insert_missing
 from workbench.registry.errors import BadRegistry
 from workbench.registry.overview import begin_summary, summary_moved
 from workbench.registry.tables import (
@@ -31,6 +31,7 @@ from workbench.registry.values import (
     Kind,
     SeenLog,
     Version,
+    of_row,
 )
 
 
@@ -39,9 +40,7 @@ def lock_machine(session: Session, name: str, now: datetime) -> None:
     query = select(MachineRow.name).where(MachineRow.name == name).with_for_update()
     if session.scalar(query) is not None:
         return
-    values = {"name": name, "added_at": now}
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    session.execute(insert(MachineRow).values(values).on_conflict_do_nothing())
+    session.execute(insert_missing(session, MachineRow).values(name=name, added_at=now))
     session.scalar(query)
     begin_summary(session, name)
 
@@ -56,53 +55,37 @@ def need_machine(session: Session, name: str, *, lock: bool = False) -> None:
 
 
 def add_record(
-    session: Session, machine: str, kind: Kind, document: Document, now: datetime
-) -> RecordRow:
-    """The row of the document, the one there is where its content is known."""
-    text = dumps(document)
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    found = session.scalar(
-        select(RecordRow).where(
-            RecordRow.machine == machine, RecordRow.kind == kind, RecordRow.sha256 == digest
-        )
-    )
+    session: Session, machine: str, kind: Kind, document: Document | None, now: datetime
+) -> int | None:
+    """The id of a document's row, the one there is where its content is known; None of none."""
+    if document is None:
+        return None
+    digest = hashlib.sha256(dumps(document).encode()).hexdigest()
+    own = {"machine": machine, "kind": kind, "sha256": digest}
+    found = session.scalar(select(RecordRow.id).filter_by(**own))
     if found is not None:
         return found
-    row = RecordRow(machine=machine, kind=kind, sha256=digest, document=text, made_at=now)
+    row = RecordRow(**own, document=document, made_at=now)
     session.add(row)
     session.flush()
-    return row
+    return row.id
 
 
 def add_version(
     session: Session, machine: str, candidate: Candidate, now: datetime
 ) -> tuple[VersionRow, bool]:
     """The row of the version, and whether it is new; the same documents are the same version."""
-    model = add_record(session, machine, "model", candidate.model, now).id
-
-    def of(kind: Kind, document: Document | None) -> int | None:
-        return None if document is None else add_record(session, machine, kind, document, now).id
-
-    design, validation = of("design", candidate.design), of("validation", candidate.validation)
-    found = session.scalar(
-        select(VersionRow).where(
-            VersionRow.machine == machine,
-            VersionRow.model_id == model,
-            VersionRow.design_id.is_not_distinct_from(design),
-            VersionRow.validation_id.is_not_distinct_from(validation),
-        )
-    )
+    records = {
+        f"{kind}_id": add_record(session, machine, kind, getattr(candidate, kind), now)
+        for kind in get_args(Kind)
+    }
+    same = [getattr(VersionRow, key).is_not_distinct_from(id_) for key, id_ in records.items()]
+    own = VersionRow.machine == machine
+    found = session.scalar(select(VersionRow).where(own, *same))
     if found is not None:
         return found, False
-    last = session.scalar(select(func.max(VersionRow.number)).where(VersionRow.machine == machine))
-    row = VersionRow(
-        machine=machine,
-        number=(last or 0) + 1,
-        model_id=model,
-        design_id=design,
-        validation_id=validation,
-        made_at=now,
-    )
+    last = session.scalar(select(func.max(VersionRow.number)).where(own)) or 0
+    row = VersionRow(machine=machine, number=last + 1, made_at=now, **records)
     session.add(row)
     session.flush()
     return row, True
@@ -125,21 +108,19 @@ def decide(
         kind=kind,
         version_id=version.id,
         log_id=log_id,
-        reason=storable_text(reason),
-        evidence=dumps(evidence or {}),
+        reason=reason,
+        evidence=evidence or {},
         made_by=by,
         at=now,
     )
     session.add(row)
     session.flush()
+    session.expire(row)  # so that it is told as the database keeps it
     if kind in ("promoted", "rolled_back"):
         pointer = session.get(ActiveVersionRow, version.machine)
-        if pointer is None:
-            session.add(
-                ActiveVersionRow(machine=version.machine, version_id=version.id, decision_id=row.id)
-            )
-        else:
-            pointer.version_id, pointer.decision_id = version.id, row.id
+        pointer = pointer or ActiveVersionRow(machine=version.machine)
+        pointer.version_id, pointer.decision_id = version.id, row.id
+        session.add(pointer)
         session.flush()
         if log_id is None:
             summary_moved(session, version.machine)
@@ -195,7 +176,7 @@ def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
     fitted: list[str] = []
     current = active_version(session, machine)
     if current is not None:
-        model = json.loads(session.get_one(RecordRow, current.model_id).document)
+        model = session.get_one(RecordRow, current.model_id).document
         fitted = [str(entry.get("sha256")) for entry in model.get("log", ())]
     rows = session.scalars(
         select(LogRow).where(
@@ -207,16 +188,11 @@ def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
 
 def seen(row: LogRow) -> SeenLog:
     """The log file as it was found."""
-    return SeenLog(row.sha256, row.file, row.size, row.mtime_ns)
+    return of_row(SeenLog, row)
 
 
-def storable_text(text: str) -> str:
-    """The text as every database takes it: no lone surrogates of odd file names, and no NUL."""
-    return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def version_values(session: Session, *where: ColumnElement[bool]) -> dict[int, Version]:
-    """Versions by the ids of their rows, in the order of machines and numbers."""
+def versions(session: Session, *where: ColumnElement[bool]) -> Sequence[Version]:
+    """Versions in the order of machines and numbers."""
     model, design, validation = (aliased(RecordRow) for _ in range(3))
     query = (
         select(VersionRow, model.sha256, design.sha256, validation.sha256)
@@ -226,18 +202,18 @@ def version_values(session: Session, *where: ColumnElement[bool]) -> dict[int, V
         .where(*where)
         .order_by(VersionRow.machine, VersionRow.number)
     )
-    return {
-        row.id: Version(row.machine, row.number, of_model, of_design, of_validation, row.made_at)
+    return [
+        of_row(Version, row, model=of_model, design=of_design, validation=of_validation)
         for row, of_model, of_design, of_validation in session.execute(query)
-    }
+    ]
 
 
 def version_value(session: Session, row: VersionRow) -> Version:
     """The version as a value."""
-    return version_values(session, VersionRow.id == row.id)[row.id]
+    return versions(session, VersionRow.id == row.id)[0]
 
 
-def decision_values(session: Session, *where: ColumnElement[bool]) -> tuple[Decision, ...]:
+def decisions(session: Session, *where: ColumnElement[bool]) -> Sequence[Decision]:
     """Decisions in the order in which they were made."""
     query = (
         select(DecisionRow, VersionRow.number, LogRow.sha256)
@@ -246,24 +222,5 @@ def decision_values(session: Session, *where: ColumnElement[bool]) -> tuple[Deci
         .where(*where)
         .order_by(DecisionRow.id)
     )
-    return tuple(_decision(row, number, log) for row, number, log in session.execute(query))
-
-
-def _decision(row: DecisionRow, number: int, log: str | None) -> Decision:
-    kind: Any = row.kind
-    return Decision(
-        id=row.id,
-        machine=row.machine,
-        kind=kind,
-        number=number,
-        log=log,
-        reason=row.reason,
-        evidence=json.loads(row.evidence),
-        made_by=row.made_by,
-        at=row.at,
-    )
-
-
-def decision_value(session: Session, row: DecisionRow) -> Decision:
-    """The decision as a value."""
-    return decision_values(session, DecisionRow.id == row.id)[0]
+    rows = session.execute(query)
+    return [of_row(Decision, row, number=number, log=log) for row, number, log in rows]

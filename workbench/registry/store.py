@@ -1,13 +1,12 @@
 """The registry of machines: the active version, the earlier ones, and why it changed."""
 
-import json
 import re
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Self, get_args
 
-from sqlalchemy import ColumnElement, Select, func, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy import Select, func, select
+from sqlalchemy.orm import Session
 
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
@@ -15,14 +14,13 @@ from workbench.registry.rows import (
     active_version,
     add_version,
     decide,
-    decision_value,
-    decision_values,
+    decisions,
     judged_now,
     lock_machine,
     need_machine,
     numbered,
     version_value,
-    version_values,
+    versions,
 )
 from workbench.registry.tables import (
     ActiveVersionRow,
@@ -88,7 +86,7 @@ class Registry:
             if current is not None and current.id == row.id:
                 raise BadRegistry(f"{machine}: version {number} is active already")
             made = decide(session, "promoted", row, reason=reason, by=by, now=now)
-            return decision_value(session, made)
+            return decisions(session, DecisionRow.id == made.id)[0]
 
     def rollback(self, machine: str, *, reason: str, by: str, now: datetime) -> Decision:
         """Activate the version before the present one; a second call goes further."""
@@ -102,7 +100,7 @@ class Registry:
                 )
             row = session.get_one(VersionRow, earlier[-2])
             made = decide(session, "rolled_back", row, reason=reason, by=by, now=now)
-            return decision_value(session, made)
+            return decisions(session, DecisionRow.id == made.id)[0]
 
     def machines(self) -> tuple[MachineState, ...]:
         """Every machine by name."""
@@ -131,7 +129,7 @@ class Registry:
         """Every version of a machine, in the order of their numbers."""
         with self.database.reading() as session:
             need_machine(session, machine)
-            return tuple(version_values(session, VersionRow.machine == machine).values())
+            return tuple(versions(session, VersionRow.machine == machine))
 
     def decisions(self, machine: str | None = None) -> tuple[Decision, ...]:
         """Decisions of one machine or of all, in the order in which they were made."""
@@ -139,23 +137,16 @@ class Registry:
         with self.database.reading() as session:
             if machine is not None:
                 need_machine(session, machine)
-            return decision_values(session, *where)
+            return tuple(decisions(session, *where))
 
     def document(self, version: Version, kind: Kind) -> dict[str, Any]:
         """A version's document as model.json and the others hold it; raises BadRegistry if none."""
-        digest = getattr(version, kind)
-        with self.database.reading() as session:
-            text = session.scalar(
-                select(RecordRow.document).where(
-                    RecordRow.machine == version.machine,
-                    RecordRow.kind == kind,
-                    RecordRow.sha256 == digest,
-                )
-            )
-        if text is None:
-            raise BadRegistry(f"{version.machine}, version {version.number}: has no {kind}")
-        found: dict[str, Any] = json.loads(text)
-        return found
+        query = select(RecordRow.document).filter_by(
+            machine=version.machine, kind=kind, sha256=getattr(version, kind)
+        )
+        for (found,) in self.database.rows(query):
+            return dict(found)
+        raise BadRegistry(f"{version.machine}, version {version.number}: has no {kind}")
 
     def documents(self, version: Version) -> dict[str, dict[str, Any] | None]:
         """A version's documents by kind, None where it has none of that kind."""
@@ -182,43 +173,32 @@ class Registry:
 
 def _states(session: Session, name: str | None = None) -> tuple[MachineState, ...]:
     """The machines by name, or the one of that name, in a few queries for all of them."""
-
-    def only(column: InstrumentedAttribute[str]) -> tuple[ColumnElement[bool], ...]:
-        return () if name is None else (column == name,)
-
-    pointers = session.scalars(
-        select(ActiveVersionRow).where(*only(ActiveVersionRow.machine))
-    ).all()
-    forces = {row.machine: row for row in pointers}
-    current = select(ActiveVersionRow.version_id).where(*only(ActiveVersionRow.machine))
-    versions = version_values(session, VersionRow.id.in_(current))
-    behind = select(ActiveVersionRow.decision_id).where(*only(ActiveVersionRow.machine))
-    decisions = {d.id: d for d in decision_values(session, DecisionRow.id.in_(behind))}
-    made = _counts(session, select(VersionRow.machine, func.count()), only(VersionRow.machine))
-    logs = _counts(session, select(LogRow.machine, func.count()), only(LogRow.machine))
-    judged = select(LogRow.machine, func.count()).join(OutcomeRow, judged_now())
-    done = _counts(session, judged, only(LogRow.machine))
-    bad = (*only(LogRow.machine), OutcomeRow.verdict == "set_aside")
-    excluded = _counts(session, judged, bad)
-    query = select(MachineRow.name).where(*only(MachineRow.name)).order_by(MachineRow.name)
+    machines = select(MachineRow.name)
+    if name is not None:
+        machines = machines.where(MachineRow.name == name)
+    pointers = select(ActiveVersionRow).where(ActiveVersionRow.machine.in_(machines)).subquery()
+    active = {
+        one.machine: one
+        for one in versions(session, VersionRow.id.in_(select(pointers.c.version_id)))
+    }
+    since = {
+        one.machine: one
+        for one in decisions(session, DecisionRow.id.in_(select(pointers.c.decision_id)))
+    }
+    judged = _of_machine(LogRow).join(OutcomeRow, judged_now())
+    counted = machines.add_columns(
+        _of_machine(VersionRow).scalar_subquery(),
+        _of_machine(LogRow).scalar_subquery(),
+        judged.scalar_subquery(),
+        judged.where(OutcomeRow.verdict == "set_aside").scalar_subquery(),
+    )
     return tuple(
-        MachineState(
-            name=one,
-            in_force=versions[forces[one].version_id] if one in forces else None,
-            since=decisions[forces[one].decision_id] if one in forces else None,
-            versions=made.get(one, 0),
-            logs=logs.get(one, 0),
-            waiting=logs.get(one, 0) - done.get(one, 0),
-            set_aside=excluded.get(one, 0),
-        )
-        for one in session.scalars(query)
+        MachineState(one, active.get(one), since.get(one), made, logs, logs - done, excluded)
+        for one, made, logs, done, excluded in session.execute(counted.order_by(MachineRow.name))
     )
 
 
-def _counts(
-    session: Session, query: Select[str, int], where: tuple[ColumnElement[bool], ...]
-) -> dict[str, int]:
-    """Numbers by machine of a query whose first column is the machine."""
-    machine = query.selected_columns[0]
-    rows = session.execute(query.where(*where).group_by(machine))
-    return {name: count for name, count in rows}
+def _of_machine(table: type[VersionRow | LogRow]) -> Select[int]:
+    """How many rows of the table are of a query's `MachineRow`."""
+    of = table.machine == MachineRow.name
+    return select(func.count()).select_from(table).where(of).correlate(MachineRow)

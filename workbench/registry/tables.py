@@ -1,9 +1,13 @@
 """Tables of the registry. All but `in_force`, `claim` and `outbox` are append-only, by triggers.
 
-Those of the page are in `page_tables`.
+Of those of the page, tokens, uploads and the audit are. `task` is the page's background work;
+`machine_now` and `machine_trend` repeat what the results say, so that a list of many machines is
+one query.
 """
 
+import json
 from datetime import UTC, datetime
+from typing import Any, get_args
 
 from sqlalchemy import (
     BigInteger,
@@ -20,6 +24,18 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
+from workbench.output import dumps
+from workbench.registry.values import (
+    DecisionKind,
+    Document,
+    Kind,
+    LogVerdict,
+    MachineCondition,
+    Role,
+    TaskKind,
+    TaskState,
+)
+
 APPEND_ONLY = (
     "machine",
     "log",
@@ -31,6 +47,7 @@ APPEND_ONLY = (
     "notice",
     "reopening",
 )
+PAGE_APPEND_ONLY = ("access_token", "access_token_end", "upload", "audit")
 NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -38,6 +55,19 @@ NAMING = {
     "fk": "fk_%(table_name)s_%(column_0_N_name)s",
     "pk": "pk_%(table_name)s",
 }
+
+
+class StorableText(TypeDecorator[str]):
+    """A text as every database takes it: no lone surrogates of odd file names, and no NUL."""
+
+    impl = Text()
+    cache_ok = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """The text as the database keeps it."""
+        if value is None:
+            return None
+        return value.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 class UtcTime(TypeDecorator[datetime]):
@@ -62,11 +92,42 @@ class UtcTime(TypeDecorator[datetime]):
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
+class JsonText(TypeDecorator[Any]):
+    """A document as strict JSON in a text."""
+
+    impl = Text()
+    cache_ok = True
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
+        """The document as the database keeps it."""
+        return None if value is None else dumps(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
+        """The document; None where there is none, as beside a row without a partner."""
+        return None if value is None else json.loads(value)
+
+
+WORDS: tuple[Any, ...] = (
+    DecisionKind, Kind, LogVerdict, MachineCondition, Role, TaskKind, TaskState,
+)  # fmt: skip
+TYPES: dict[Any, Any] = {
+    str: StorableText(),
+    datetime: UtcTime(),
+    Document: JsonText(),
+    **dict.fromkeys(WORDS, Text()),
+}
+
+
 class Base(DeclarativeBase):
     """All tables of the registry."""
 
     metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = {str: Text(), datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's form
+    type_annotation_map = TYPES
+
+
+def one_of(column: str, kind: Any) -> CheckConstraint:
+    """That a column holds one of these words."""
+    return CheckConstraint(f"{column} IN {get_args(kind)}", name=column)
 
 
 class MachineRow(Base):
@@ -98,13 +159,13 @@ class RecordRow(Base):
     __tablename__ = "record"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
-    kind: Mapped[str]
+    kind: Mapped[Kind]
     sha256: Mapped[str]
-    document: Mapped[str]
+    document: Mapped[Document]
     made_at: Mapped[datetime]
     __table_args__ = (
         UniqueConstraint("machine", "kind", "sha256"),
-        CheckConstraint("kind IN ('model', 'design', 'validation')", name="kind"),
+        one_of("kind", Kind),
     )
 
 
@@ -128,15 +189,15 @@ class DecisionRow(Base):
     __tablename__ = "decision"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
-    kind: Mapped[str]
+    kind: Mapped[DecisionKind]
     version_id: Mapped[int] = mapped_column(ForeignKey("version.id"))
     log_id: Mapped[int | None] = mapped_column(ForeignKey("log.id"))
     reason: Mapped[str]
-    evidence: Mapped[str]
+    evidence: Mapped[Document]
     made_by: Mapped[str]
     at: Mapped[datetime]
     __table_args__ = (
-        CheckConstraint("kind IN ('added', 'promoted', 'rolled_back', 'refused')", name="kind"),
+        one_of("kind", DecisionKind),
         UniqueConstraint("id", "machine", "version_id"),
         Index(None, "machine", "id"),
     )
@@ -199,17 +260,12 @@ class OutcomeRow(Base):
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     version_id: Mapped[int | None] = mapped_column(ForeignKey("version.id"))
-    verdict: Mapped[str]
+    verdict: Mapped[LogVerdict]
     reason: Mapped[str]
-    evidence: Mapped[str]
+    evidence: Mapped[Document]
     token: Mapped[str]
     at: Mapped[datetime]
-    __table_args__ = (
-        CheckConstraint(
-            "verdict IN ('none', 'not_judged', 'structure', 'promoted', 'refused', 'set_aside')",
-            name="verdict",
-        ),
-    )
+    __table_args__ = (one_of("verdict", LogVerdict),)
 
 
 class NoticeRow(Base):
@@ -236,3 +292,113 @@ class OutboxRow(Base):
     tried_at: Mapped[datetime | None]
     given_up_at: Mapped[datetime | None]
     __table_args__ = (ForeignKeyConstraint(["log_id", "turn"], ["outcome.log_id", "outcome.turn"]),)
+
+
+class AccessTokenRow(Base):
+    """A token by its hash, what it allows, and who made it; the token itself is kept nowhere."""
+
+    __tablename__ = "access_token"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    role: Mapped[Role]
+    sha256: Mapped[str]
+    made_by: Mapped[str]
+    at: Mapped[datetime]
+    __table_args__ = (
+        one_of("role", Role),
+        Index(None, "name", unique=True),
+        Index(None, "sha256", unique=True),
+    )
+
+
+class AccessTokenEndRow(Base):
+    """A token that is not taken any more."""
+
+    __tablename__ = "access_token_end"
+    token_id: Mapped[int] = mapped_column(ForeignKey("access_token.id"), primary_key=True)
+    made_by: Mapped[str]
+    at: Mapped[datetime]
+
+
+class UploadRow(Base):
+    """A log that was dropped on the page: its name there, and what identifies its content."""
+
+    __tablename__ = "upload"
+    id: Mapped[str] = mapped_column(primary_key=True)
+    file: Mapped[str]
+    size: Mapped[int] = mapped_column(BigInteger)
+    sha256: Mapped[str]
+    made_by: Mapped[str]
+    at: Mapped[datetime]
+    __table_args__ = (Index(None, "at"),)
+
+
+class TaskRow(Base):
+    """Work on an upload: its place in the queue, how far it is, and who has it in hand until when.
+
+    token: of the worker's claim; share: done, 0 to 1; said: why it failed, or what came of it.
+    """
+
+    __tablename__ = "task"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    upload: Mapped[str] = mapped_column("upload_id", ForeignKey("upload.id"), index=True)
+    kind: Mapped[TaskKind]
+    state: Mapped[TaskState]
+    stage: Mapped[str]
+    share: Mapped[float]
+    said: Mapped[str]
+    begun: Mapped[int]
+    token: Mapped[str | None]
+    owner: Mapped[str | None]
+    until: Mapped[datetime | None]
+    made_by: Mapped[str]
+    at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    __table_args__ = (
+        one_of("kind", TaskKind),
+        one_of("state", TaskState),
+        Index(None, "state", "id"),
+    )
+
+
+class AuditRow(Base):
+    """A change that somebody made through the page or of its tokens: who, what, to what."""
+
+    __tablename__ = "audit"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    at: Mapped[datetime]
+    made_by: Mapped[str]
+    kind: Mapped[str]
+    subject: Mapped[str]
+    detail: Mapped[str]
+    __table_args__ = (Index(None, "subject", "id"),)
+
+
+class MachineNowRow(Base):
+    """What is known of a machine now: state by its last log, when one came, what moved most.
+
+    moved_by: relative change of that parameter against the active version; moved_trend: its
+    values over the last logs.
+    """
+
+    __tablename__ = "machine_now"
+    machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
+    state: Mapped[MachineCondition]
+    heard_at: Mapped[datetime | None]
+    logs: Mapped[int]
+    moved: Mapped[str | None]
+    moved_by: Mapped[float | None]
+    moved_trend: Mapped[list[float] | None] = mapped_column(JsonText())
+    __table_args__ = (
+        Index(None, "state", "machine"),
+        Index(None, "heard_at", "machine"),
+        Index(None, "moved_by", "machine"),
+    )
+
+
+class MachineTrendRow(Base):
+    """A machine's parameters over its last logs: name, then a value a log."""
+
+    __tablename__ = "machine_trend"
+    machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
+    trend: Mapped[Document]

@@ -2,16 +2,30 @@
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import PurePath
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
+
+Value = TypeVar("Value")
 
 Document = Mapping[str, Any]
 Kind = Literal["model", "design", "validation"]
 DecisionKind = Literal["added", "promoted", "rolled_back", "refused"]
 LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
+Role = Literal["read", "change"]
+TaskKind = Literal["identify", "trace"]
+TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
+MachineCondition = Literal[
+    "in_tune", "drifting", "structure", "log_bad", "not_judged", "no_log", "silent"
+]
 ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
+
+
+def of_row(kind: type[Value], row: object, **more: Any) -> Value:
+    """A value whose fields the row has by the same names; more: those that it has not."""
+    names = (one.name for one in fields(kind))  # type: ignore[arg-type]  # a dataclass
+    return kind(**{name: getattr(row, name) for name in names if name not in more}, **more)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from workbench.page.pages import spark
 from workbench.page.visitors import CHANGES, TOKEN_COOKIE, WRONG_TRIES, Limiter, csrf_of
 from workbench.registry.access import Access, hashed
 from workbench.registry.errors import BadRegistry
-from workbench.registry.page_tables import AccessTokenRow
 from workbench.registry.store import Registry
+from workbench.registry.tables import AccessTokenRow
 from workbench.registry.values import Candidate
 
 NASTY = "<img src=x onerror=alert(1)>"

@@ -7,8 +7,7 @@ from alembic import op
 
 from workbench.registry.migrate import keep_append_only
 from workbench.registry.overview import Trend, most_moved, state_of, with_log
-from workbench.registry.page_tables import PAGE_APPEND_ONLY
-from workbench.registry.tables import Base, UtcTime
+from workbench.registry.tables import PAGE_APPEND_ONLY, Base, UtcTime
 
 revision = "0004"
 down_revision = "0003"
