@@ -14,12 +14,12 @@ from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
-from workbench.page import actions, drops, fleet, health, machine, sign_in, work
+from workbench.page import drops, fleet, health, machine, sign_in, work
+from workbench.page.asked import Asked, Server, Visitor
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
-from workbench.page.pages import show
 from workbench.page.settings import PageSettings, handed_over
-from workbench.page.visitors import Doorkeeper, Moment, Visitor
+from workbench.page.visitors import Doorkeeper, Moment
 from workbench.registry.access import Access
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.store import Registry
@@ -59,8 +59,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
 
     app = Starlette(
         routes=[
-            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *actions.ACTION_ROUTES,
-            *drops.DROP_ROUTES, *work.WORK_ROUTES,
+            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *drops.DROP_ROUTES, *work.WORK_ROUTES,
             *sign_in.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
             Mount("/static/assets", StaticFiles(directory=ASSETS)),
             Mount("/static", StaticFiles(directory=HERE / "static")),
@@ -73,11 +72,9 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
         },
         lifespan=life,
     )  # fmt: skip
-    app.state.settings, app.state.registry, app.state.helpers = settings, registry, helpers
-    app.state.moment = Moment()
-    access = Access(registry.database)
-    app.state.access = access
-    app.state.doorkeeper = Doorkeeper(access, open_reading=settings.open_reading)
+    app.state.server, app.state.moment = Server(settings, registry, helpers), Moment()
+    keeper = Doorkeeper(Access(registry.database), open_reading=settings.open_reading)
+    app.state.doorkeeper = keeper
     return Guard(health.Counted(app), settings)
 
 
@@ -109,7 +106,7 @@ async def _said(
         return HTMLResponse(str(escape(said)), status, headers)
     visitor = await run_in_threadpool(_known, request)
     title = TITLES.get(status, "Something is wrong")
-    page = show(request, visitor, "error", status=status, title=title, said=said)
+    page = Asked(request, visitor).show("error", status=status, title=title, said=said)
     page.headers.update(headers or {})
     return page
 

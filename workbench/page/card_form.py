@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import TypeAdapter
+
 from identification.errors import BadCard
 from workbench.cards.card_text import Line, card_text
 from workbench.output import write_whole
@@ -137,23 +139,16 @@ class CardForm:
 
     def store(self, folder: Path) -> None:
         """Write the form beside its log."""
-        content = {"fields": dict(self.fields), "columns": list(self.columns),
-                   "why": dict(self.why), "remarks": list(self.remarks),
-                   "layout": dict(self.layout), "others": dict(self.others)}  # fmt: skip
-        write_whole(folder / FORM_FILE, json.dumps(content), "form")
+        write_whole(folder / FORM_FILE, FORM.dump_json(self).decode(), "form")
+
+
+FORM = TypeAdapter(CardForm)
 
 
 def stored_form(folder: Path) -> CardForm | None:
     """The form that was kept beside a log; None where there is none."""
     path = folder / FORM_FILE
-    if not path.exists():
-        return None
-    found = json.loads(path.read_text(encoding="utf-8"))
-    columns = [(str(key), str(words)) for key, words in found["columns"]]
-    why = {name: (bool(sure), str(said)) for name, (sure, said) in found["why"].items()}
-    stored = found.get("others", {})  # which forms of older versions lack
-    others = {name: (str(words), dict(one)) for name, (words, one) in stored.items()}
-    return CardForm(found["fields"], columns, why, found["remarks"], found["layout"], others)
+    return FORM.validate_json(path.read_bytes()) if path.exists() else None
 
 
 def form_of(of: "Proposal", file: str) -> CardForm:

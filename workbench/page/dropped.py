@@ -8,6 +8,7 @@ import re
 import secrets
 import shutil
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -29,11 +30,56 @@ _ID = re.compile(r"[0-9a-f]{16}")
 _ODD = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
-def folder_of(root: Path, upload: str) -> Path:
-    """The folder of an upload; raises BadRegistry where the name is none."""
-    if not _ID.fullmatch(upload):
-        raise BadRegistry("no such upload")
-    return root / DROPS / upload
+@dataclass(frozen=True)
+class Drop:
+    """The files of an upload below the folder of machines."""
+
+    root: Path
+    upload: str
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the upload; raises BadRegistry where the name is none."""
+        if not _ID.fullmatch(self.upload):
+            raise BadRegistry("no such upload")
+        return self.root / DROPS / self.upload
+
+    @property
+    def log(self) -> Path:
+        """The log's file; raises BadRegistry where it is gone."""
+        for path in (self.folder / LOG_FOLDER).glob("*"):
+            return path
+        raise BadRegistry("this upload's file is gone")
+
+    @property
+    def card(self) -> Path:
+        """The card's file, whether it is there or not."""
+        return self.folder / CARD_FILE
+
+    def results(self, task: int) -> Path:
+        """The folder of a task's results, whether it is there or not."""
+        return self.folder / f"task-{task}"
+
+    def store(self, name: str, content: BinaryIO) -> tuple[int, str]:
+        """Write the log, whole or not at all: its size [bytes] and fingerprint.
+
+        Raises BadLog where it is empty.
+        """
+        part = self.folder.with_name(f"{self.upload}.part")
+        path = part / LOG_FOLDER / name
+        path.parent.mkdir(parents=True)
+        try:
+            with path.open("w+b") as file:
+                shutil.copyfileobj(content, file, COPIED_AT_ONCE)
+                size = file.tell()
+                file.seek(0)
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+            if size == 0:
+                raise BadLog(f"{name}: is empty")
+            part.rename(self.folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+        return size, digest
 
 
 def file_name(given: str) -> str:
@@ -50,51 +96,6 @@ def file_name(given: str) -> str:
             f"{plain[:LONGEST_FILE_NAME]}: no log by its ending; one of {' '.join(ENDINGS)}"
         )
     return (stem[: LONGEST_FILE_NAME - len(ending)].strip("._-") or "log") + ending.lower()
-
-
-def store(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
-    """Write the log, whole or not at all: its size [bytes] and fingerprint.
-
-    Raises BadLog where it is empty.
-    """
-    folder = folder_of(root, upload)
-    part = folder.with_name(f"{folder.name}.part")
-    (part / LOG_FOLDER).mkdir(parents=True)
-    try:
-        size, digest = _written(part / LOG_FOLDER / name, content)
-        if size == 0:
-            raise BadLog(f"{name}: is empty")
-        part.rename(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    return size, digest
-
-
-def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
-    digest, size = hashlib.sha256(), 0
-    with path.open("wb") as file:
-        while block := content.read(COPIED_AT_ONCE):
-            digest.update(block)
-            file.write(block)
-            size += len(block)
-    return size, digest.hexdigest()
-
-
-def log_of(root: Path, upload: str) -> Path:
-    """The log's file; raises BadRegistry where it is gone."""
-    for path in (folder_of(root, upload) / LOG_FOLDER).glob("*"):
-        return path
-    raise BadRegistry("this upload's file is gone")
-
-
-def card_of(root: Path, upload: str) -> Path:
-    """The card's file, whether it is there or not."""
-    return folder_of(root, upload) / CARD_FILE
-
-
-def results_of(root: Path, upload: str, task: int) -> Path:
-    """The folder of a task's results, whether it is there or not."""
-    return folder_of(root, upload) / f"task-{task}"
 
 
 def without_path(said: str, paths: Iterable[Path]) -> str:

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from workbench.page.pages import STATE_WORDS, show
-from workbench.page.visitors import Visitor, briefly, reading
+from workbench.page.asked import Asked
+from workbench.page.pages import STATE_WORDS
+from workbench.page.visitors import briefly, reading
 from workbench.registry.overview import FLEET_ORDERS, FleetAsked, fleet_page
 
 LONGEST_FILTER = 100
@@ -22,17 +22,17 @@ HEADS = {
 }
 
 
-def fleet(request: Request, visitor: Visitor) -> Response:
+def fleet(asked: Asked) -> Response:
     """The page, or the table alone where htmx asks for it."""
-    asked = asked_for(request.query_params, request.app.state.settings.silent_days)
-    found = fleet_page(request.app.state.registry.database, asked)
-    pages = max(1, -(-found.found // asked.per_page))
-    selection = {"text": asked.text, "state": asked.state, "order": asked.order,
-            "down": "1" if asked.down else ""}  # fmt: skip
-    part_only = request.headers.get("hx-target") == "fleet"
-    return show(
-        request, visitor, "fleet_table" if part_only else "fleet", title="Fleet",
-        asked=asked, found=found, pages=pages, selection=selection, heads=HEADS, states=STATE_WORDS,
+    wanted = asked_for(asked.request.query_params, asked.server.settings.silent_days)
+    found = fleet_page(asked.database, wanted)
+    pages = max(1, -(-found.found // wanted.per_page))
+    selection = {"text": wanted.text, "state": wanted.state, "order": wanted.order,
+                 "down": "1" if wanted.down else ""}  # fmt: skip
+    part_only = asked.request.headers.get("hx-target") == "fleet"
+    return asked.show(
+        "fleet_table" if part_only else "fleet", title="Fleet", asked=wanted, found=found,
+        pages=pages, selection=selection, heads=HEADS, states=STATE_WORDS,
         total=sum(found.counts.values()),
     )  # fmt: skip
 

@@ -14,7 +14,8 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from workbench.jobs.metrics import PREFIX, MachineFigures
-from workbench.page.visitors import Visitor, reading
+from workbench.page.asked import Asked, Server
+from workbench.page.visitors import reading
 from workbench.registry.bench import Bench
 from workbench.registry.errors import RegistryAway
 from workbench.registry.overview import any_machine
@@ -73,20 +74,19 @@ class TaskFigures(Collector):
 
 async def health(request: Request) -> Response:
     """200 where page and registry answer, 503 where the registry does not."""
-    registry: Registry = request.app.state.registry
+    server: Server = request.app.state.server
     try:
-        await run_in_threadpool(any_machine, registry.database)
+        await run_in_threadpool(any_machine, server.registry.database)
     except RegistryAway:
         return JSONResponse({"page": "ok", "registry": "away"}, 503)
     return JSONResponse({"page": "ok", "registry": "ok"})
 
 
-def metrics(request: Request, _visitor: Visitor) -> Response:
+def metrics(asked: Asked) -> Response:
     """All figures in Prometheus' text format."""
-    registry: Registry = request.app.state.registry
     own = CollectorRegistry(auto_describe=False)
-    own.register(MachineFigures(registry))
-    own.register(TaskFigures(registry))
+    own.register(MachineFigures(asked.registry))
+    own.register(TaskFigures(asked.registry))
     return Response(written(own) + written(REQUESTS), media_type=CONTENT_TYPE_LATEST)
 
 

@@ -1,57 +1,62 @@
 """A machine: parameters over time as charts, what was decided and why, alarms, logs, versions,
-reports."""
+reports; what changes it, and its controllers as code."""
 
+import io
 import json
+import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
 from identification.arrays import Array
 from identification.errors import UserError
+from workbench.jobs.options import clock
 from workbench.page import version_views
-from workbench.page.pages import registry_of, show
+from workbench.page.asked import Asked, download
+from workbench.page.pages import part
 from workbench.page.version_views import EXPORTS
-from workbench.page.visitors import Visitor, briefly, reading
+from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
+from workbench.registry.access import Access
 from workbench.registry.difference import difference
 from workbench.registry.results import TestedLog, condition, last_logs, log_count, newest_lights
-from workbench.registry.values import ALARMING, Kind
+from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import Area, Chart, Line, Panel, chart_html
 
 LAST_LOGS, MORE_LOGS = 60, 1000
 LAST_CHANGES = 200
 
 
-def machine(request: Request, visitor: Visitor) -> Response:
+def machine(asked: Asked) -> Response:
     """The page of a machine."""
-    registry, name = registry_of(request), request.path_params["machine"]
+    registry, name = asked.registry, asked["machine"]
     state = registry.machine(name)
     versions = registry.versions(name)
-    last = MORE_LOGS if request.query_params.get("logs") == "all" else LAST_LOGS
-    logs = last_logs(registry.database, name, last)
+    last = MORE_LOGS if asked.query("logs") == "all" else LAST_LOGS
+    logs = last_logs(asked.database, name, last)
     current = state.in_force.number if state.in_force else None
     tested, lights = newest_lights(logs[:LAST_LOGS])
     other = next((v.number for v in reversed(versions) if v.number != current), None)
-    return show(
-        request, visitor, "machine", title=name, state=state, versions=list(reversed(versions)),
+    drawn = parameter_charts(list(reversed(logs[:LAST_LOGS])))
+    return asked.show(
+        "machine", title=name, state=state, versions=list(reversed(versions)),
         decisions=list(reversed(registry.decisions(name))), logs=logs, other=other,
         alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
-        condition=condition(registry.database, name), total=log_count(registry.database, name),
-        reports=[path.name for path in _reports(request)], charts=_charts(logs),
-        tested=tested, lights=lights,
+        condition=condition(asked.database, name), total=log_count(asked.database, name),
+        reports=[path.name for path in _reports(asked)], tested=tested, lights=lights,
+        charts="".join(str(chart_html(one)) for one in drawn),
     )  # fmt: skip
 
 
-def compare(request: Request, visitor: Visitor) -> Response:
+def compare(asked: Asked) -> Response:
     """Two versions side by side: every number, the margins, the step responses."""
-    registry, name = registry_of(request), request.path_params["machine"]
-    numbers = [request.query_params.get(key, "") for key in ("a", "b")]
+    registry, name = asked.registry, asked["machine"]
+    numbers = [asked.query(key) for key in ("a", "b")]
     if not all(text.isascii() and text.isdigit() for text in numbers):
         raise HTTPException(400, "Choose two versions.")
     versions = [registry.version(name, int(text)) for text in numbers]
@@ -62,66 +67,95 @@ def compare(request: Request, visitor: Visitor) -> Response:
         if found["design"] is not None
     ]
     try:
-        loops = request.app.state.helpers(version_views.loops, designs[: len(set(numbers))])
+        loops = asked.server.helpers(version_views.loops, designs[: len(set(numbers))])
     except UserError as error:
-        return show(request, visitor, "said", said=str(error), bad=True)
-    lines = difference(before, after)
-    return show(request, visitor, "compare", lines=lines, numbers=numbers, loops=loops)
+        return asked.show("said", said=str(error), bad=True)
+    return asked.show("compare", lines=difference(before, after), numbers=numbers, loops=loops)
 
 
-def report(request: Request, _visitor: Visitor) -> Response:
+def report(asked: Asked) -> Response:
     """The report of a version's design."""
-    registry = registry_of(request)
-    version = registry.version(request.path_params["machine"], request.path_params["number"])
-    design = json.dumps(registry.document(version, "design"))
-    return report_response(request.app.state.helpers(version_views.design_page, design))
+    design = json.dumps(asked.registry.document(_version(asked), "design"))
+    return report_response(asked.server.helpers(version_views.design_page, design))
 
 
-def stored_page(request: Request, _visitor: Visitor) -> Response:
+def stored_page(asked: Asked) -> Response:
     """A report in the machine's folder."""
-    registry_of(request).machine(request.path_params["machine"])
-    for path in _reports(request):
-        if path.name == request.path_params["file"]:
+    asked.registry.machine(asked["machine"])
+    for path in _reports(asked):
+        if path.name == asked["file"]:
             return report_response(path.read_text("utf-8"))
     raise HTTPException(404, "No such report.")
 
 
-def document(request: Request, _visitor: Visitor) -> Response:
+def document(asked: Asked) -> Response:
     """A version's document as it is."""
-    registry, kind = registry_of(request), request.path_params["kind"]
+    kind = asked["kind"]
     if kind not in get_args(Kind):
         raise HTTPException(404, "No such document.")
-    number = request.path_params["number"]
-    version = registry.version(request.path_params["machine"], number)
-    found = json.dumps(registry.document(version, kind), indent=2)
-    headers = {"Content-Disposition": f'attachment; filename="{kind}-{number}.json"'}
-    return Response(found, headers=headers, media_type="application/json")
+    found = json.dumps(asked.registry.document(_version(asked), kind), indent=2)
+    return download(found, f"{kind}-{asked['number']}.json", "application/json")
 
 
-def changes(request: Request, visitor: Visitor) -> Response:
+def export(asked: Asked) -> Response:
+    """A version's controller as code for its machine, packed."""
+    target = asked.query("to")
+    if target not in EXPORTS:
+        raise HTTPException(404, f"The target is one of {', '.join(EXPORTS)}.")
+    design = json.dumps(asked.registry.document(_version(asked), "design"))
+    files = asked.server.helpers(version_views.export_files, design, target)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    name = f"version-{asked['number']}-{target}.zip"
+    return download(packed.getvalue(), name, "application/zip")
+
+
+def promote(asked: Asked) -> Response:
+    """Activate a version."""
+    number = asked.text("number")
+    if not number.isascii() or not number.isdigit():
+        raise HTTPException(400, "Which version? Choose one.")
+    name, reason, by = asked["machine"], asked.text("reason"), asked.visitor.name
+    asked.registry.promote(name, int(number), reason=reason, by=by, now=clock())
+    asked.audit("promoted", name, f"version {number}: {reason}")
+    return asked.go(f"/machine/{part(name)}")
+
+
+def rollback(asked: Asked) -> Response:
+    """Activate the version before."""
+    name, reason, by = asked["machine"], asked.text("reason"), asked.visitor.name
+    decision = asked.registry.rollback(name, reason=reason, by=by, now=clock())
+    asked.audit("rolled_back", name, f"version {decision.number}: {reason}")
+    return asked.go(f"/machine/{part(name)}")
+
+
+def changes(asked: Asked) -> Response:
     """The last changes that somebody made through the page, or of its tokens."""
-    found = request.app.state.access.audited(last=LAST_CHANGES)
-    return show(request, visitor, "changes", title="Changes", changes=found)
+    found = Access(asked.database).audited(last=LAST_CHANGES)
+    return asked.show("changes", title="Changes", changes=found)
 
 
-def _charts(logs: Sequence[TestedLog]) -> str:
-    shown = list(reversed(logs[:LAST_LOGS]))
-    return "".join(str(chart_html(one)) for one in parameter_charts(shown))
+def _version(asked: Asked) -> Version:
+    return asked.registry.version(asked["machine"], asked["number"])
 
 
-def _reports(request: Request) -> list[Path]:
-    root: Path = request.app.state.settings.root
-    name = request.path_params["machine"]
+def _reports(asked: Asked) -> list[Path]:
+    name = asked["machine"]
     if name in (".", "..") or "/" in name or "\0" in name:
         return []
-    return sorted((root / name / "reports").glob("*.html"))
+    return sorted((asked.root / name / "reports").glob("*.html"))
 
 
 MACHINE_ROUTES = [
     Route("/audit", reading(changes)),
     Route("/machine/{machine}", reading(briefly(machine))),
     Route("/machine/{machine}/compare", reading(compare)),
+    Route("/machine/{machine}/promote", changing(promote), methods=["POST"]),
     Route("/machine/{machine}/report/{file}", reading(stored_page)),
+    Route("/machine/{machine}/rollback", changing(rollback), methods=["POST"]),
+    Route("/machine/{machine}/version/{number:int}/export", reading(export)),
     Route("/machine/{machine}/version/{number:int}/report", reading(report)),
     Route("/machine/{machine}/version/{number:int}/{kind}.json", reading(document)),
 ]

@@ -1,19 +1,12 @@
-"""Templates into answers: every text of a log, a card or a file is escaped on its way."""
+"""The templates and their filters: every text of a log, a card or a file is escaped on its way."""
 
 import math
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
-from typing import Any
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
-from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
-
-from workbench.page.visitors import Visitor
-from workbench.registry.store import Registry
 
 STATE_WORDS = {
     "in_tune": "in tune",
@@ -25,38 +18,6 @@ STATE_WORDS = {
     "silent": "not heard from",
 }
 SPARK_WIDTH, SPARK_HEIGHT, SPARK_EDGE = 96.0, 22.0, 2.0
-
-
-def show(
-    request: Request, visitor: Visitor, template: str, *, status: int = 200, **values: Any
-) -> Response:
-    """The template `<template>.html.j2` as an answer; `url` in it knows the prefix."""
-    filled = environment().get_template(f"{template}.html.j2")
-    prefix = request.app.state.settings.prefix
-    text = filled.render(
-        visitor=visitor, url=lambda path, **query: address_of(prefix, path, query), **values,
-    )  # fmt: skip
-    return HTMLResponse(text, status)
-
-
-def registry_of(request: Request) -> Registry:
-    """The registry that the page is of."""
-    found: Registry = request.app.state.registry
-    return found
-
-
-def go(request: Request, path: str, **query: Any) -> Response:
-    """Send the browser to another page, by htmx too."""
-    to = address_of(request.app.state.settings.prefix, path, query)
-    if request.headers.get("hx-request"):
-        return Response(status_code=204, headers={"HX-Redirect": to})
-    return RedirectResponse(to, 303)
-
-
-def address_of(prefix: str, path: str, query: Mapping[str, Any]) -> str:
-    """The address of a page, its path given in parts that need no quoting but for names."""
-    asked = {key: value for key, value in query.items() if value not in (None, "", False)}
-    return prefix + path + (f"?{urlencode(asked)}" if asked else "")
 
 
 def part(name: str) -> str:

@@ -5,8 +5,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from workbench.page.pages import go, show
-from workbench.page.visitors import TOKEN_COOKIE, Visitor, address, check_site, cookie_path
+from workbench.page.asked import Asked, Visitor
+from workbench.page.visitors import TOKEN_COOKIE, address, check_site, cookie_path
 
 STAYS = 12 * 3600  # s that a browser keeps the token
 
@@ -16,22 +16,22 @@ async def page(request: Request) -> Response:
     visitor = await run_in_threadpool(
         request.app.state.doorkeeper.visitor, request, to_change=False
     )
-    return show(request, visitor, "sign_in", wrong="", title="Sign in")
+    return Asked(request, visitor).show("sign_in", wrong="", title="Sign in")
 
 
 async def enter(request: Request) -> Response:
     """Take a token and leave it with the browser, out of reach of scripts and other sites."""
     check_site(request)
-    form = await request.form(max_files=0, max_fields=5)
+    form, asked = await request.form(max_files=0, max_fields=5), Asked(request, Visitor())
     secret = str(form.get("token", "")).strip()
     found = await run_in_threadpool(request.app.state.doorkeeper.known, secret, address(request))
     if found is None:
         wrong = "This token is none, or was revoked."
-        return show(request, Visitor(), "sign_in", status=401, wrong=wrong, title="Sign in")
-    response = go(request, "/")
+        return asked.show("sign_in", status=401, wrong=wrong, title="Sign in")
+    response = asked.go("/")
     response.set_cookie(
         TOKEN_COOKIE, secret, max_age=STAYS, path=cookie_path(request), httponly=True,
-        samesite="strict", secure=request.app.state.settings.secure,
+        samesite="strict", secure=asked.server.settings.secure,
     )  # fmt: skip
     return response
 
@@ -39,7 +39,7 @@ async def enter(request: Request) -> Response:
 async def leave(request: Request) -> Response:
     """Forget the token."""
     check_site(request)
-    response = go(request, "/sign-in")
+    response = Asked(request, Visitor()).go("/sign-in")
     response.delete_cookie(TOKEN_COOKIE, path=cookie_path(request))
     return response
 

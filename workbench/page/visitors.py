@@ -7,19 +7,18 @@ import hashlib
 import hmac
 import time
 from collections import OrderedDict, deque
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import wraps
 from threading import Lock
-from typing import Any
 
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
+from workbench.page.asked import Asked, Visitor
 from workbench.registry.access import Access
-from workbench.registry.values import Role
 
 TOKEN_COOKIE = "workbench_token"
 CSRF_FIELD, CSRF_HEADER = "csrf", "x-csrf"
@@ -28,24 +27,9 @@ CHANGES, CHANGES_SPAN = 120, 60.0  # changes by one token
 MOST_KEYS = 10_000  # addresses that are remembered
 SEEN_FOR = 2.0  # s that a token is taken without asking the registry again, to read only
 LONGEST_TOKEN = 200
-ANYBODY = ""
 
 Handler = Callable[[Request], Awaitable[Response]]
-Endpoint = Callable[[Request, "Visitor"], Response]
-
-
-@dataclass(frozen=True)
-class Visitor:
-    """Who asks, by the name of the token, and what that allows; csrf: belongs into forms."""
-
-    name: str = ANYBODY
-    role: Role | None = None
-    csrf: str = ""
-
-    @property
-    def changes(self) -> bool:
-        """Whether the visitor may change things."""
-        return self.role == "change"
+Endpoint = Callable[[Asked], Response]
 
 
 @dataclass
@@ -99,19 +83,18 @@ class Doorkeeper:
 
     def _visitor(self, request: Request, to_change: bool) -> Visitor:
         secret = bearer(request) or request.cookies.get(TOKEN_COOKIE, "")
+        nobody = Visitor(role="read" if self._open else None)
         if not secret:
-            return Visitor(role="read" if self._open else None)
+            return nobody
         if not to_change:
-            at, found = self._known.get(secret, (0.0, None))
-            if found is not None and time.monotonic() - at < SEEN_FOR:
+            at, found = self._known.get(secret, (0.0, nobody))
+            if time.monotonic() - at < SEEN_FOR:
                 return found
-        found = self.known(secret, address(request))
-        if found is None:
-            if bearer(request):
-                raise HTTPException(401, "This token is none, or was revoked.")
-            request.state.stale = True
-            return Visitor(role="read" if self._open else None)
-        return found
+        now_known = self.known(secret, address(request))
+        if now_known is None and bearer(request):
+            raise HTTPException(401, "This token is none, or was revoked.")
+        request.state.stale = now_known is None
+        return now_known or nobody
 
     def known(self, secret: str, where: str) -> Visitor | None:
         """The visitor of that token; None where it is none. Raises HTTPException after too many."""
@@ -140,7 +123,7 @@ def reading(endpoint: Endpoint) -> Handler:
             visitor = request.app.state.doorkeeper.visitor(request, to_change=False)
             if visitor.role is None:
                 raise HTTPException(401, "Reading needs a token.")
-            return endpoint(request, visitor)
+            return endpoint(Asked(request, visitor))
 
         response = await run_in_threadpool(answer)
         if getattr(request.state, "stale", False):  # a revoked token is not sent again and again
@@ -160,13 +143,9 @@ def changing(endpoint: Endpoint) -> Handler:
     async def guarded(request: Request) -> Response:
         visitor = await run_in_threadpool(changer, request)
         check_site(request)
-        form = await request.form(max_files=1, max_fields=500)
-        request.state.form = form
-        try:
+        async with request.form(max_files=1, max_fields=500) as form:
             check_csrf(request, visitor, str(form.get(CSRF_FIELD, "")))
-            return await run_in_threadpool(endpoint, request, visitor)
-        finally:
-            await form.close()
+            return await run_in_threadpool(endpoint, Asked(request, visitor, form))
 
     return guarded
 
@@ -219,54 +198,46 @@ def address(request: Request) -> str:
 
 def cookie_path(request: Request) -> str:
     """Below which the browser sends the cookie."""
-    return f"{request.app.state.settings.prefix}/"
-
-
-def form_of(request: Request) -> Any:
-    """The form that `changing` has read."""
-    return request.state.form
+    return f"{request.app.state.server.settings.prefix}/"
 
 
 ANSWER_LIFETIME = 1.0  # s
 MOST_ANSWERS = 200
-Key = tuple[str, str, str, str]
 
 
 class Moment:
     """The answers of a server in the last second, by address and by who asks."""
 
     def __init__(self) -> None:
-        self._answers: dict[Key, tuple[float, int, bytes, Mapping[str, str]]] = {}
+        self._answers: dict[tuple[str, ...], tuple[float, Response]] = {}
         self._lock = Lock()
 
-    def answer(self, endpoint: Endpoint, request: Request, visitor: Visitor) -> Response:
+    def answer(self, endpoint: Endpoint, asked: Asked) -> Response:
         """The endpoint's answer, or the one it has just given to the same question.
 
         One at a time, so that many who come together wait for the first of them.
         """
-        asked = request.url.path, request.url.query
-        key = (*asked, request.headers.get("hx-target", ""), visitor.name)
+        url, part = asked.request.url, asked.request.headers.get("hx-target", "")
+        key = (url.path, url.query, part, asked.visitor.name)
         with self._lock:
-            found = self._answers.get(key)
-            if found is None or time.monotonic() - found[0] > ANSWER_LIFETIME:
+            at, found = self._answers.get(key, (0.0, None))
+            if found is None or time.monotonic() - at > ANSWER_LIFETIME:
                 if len(self._answers) >= MOST_ANSWERS:
                     self._answers.clear()
-                made = endpoint(request, visitor)
-                made_headers = {"content-type": made.headers["content-type"]}
-                found = time.monotonic(), made.status_code, bytes(made.body), made_headers
-                self._answers[key] = found
-        _, status, body, headers = found
-        return Response(body, status, headers)
+                found = endpoint(asked)
+                self._answers[key] = time.monotonic(), found
+        kept = {"content-type": found.headers["content-type"]}  # others are added for each visitor
+        return Response(found.body, found.status_code, kept)
 
 
 def briefly(endpoint: Endpoint) -> Endpoint:
     """The endpoint, its answers to those who only read kept for a moment."""
 
     @wraps(endpoint)
-    def answered(request: Request, visitor: Visitor) -> Response:
-        if visitor.changes:
-            return endpoint(request, visitor)
-        moment: Moment = request.app.state.moment
-        return moment.answer(endpoint, request, visitor)
+    def answered(asked: Asked) -> Response:
+        if asked.visitor.changes:
+            return endpoint(asked)
+        moment: Moment = asked.request.app.state.moment
+        return moment.answer(endpoint, asked)
 
     return answered

@@ -1,4 +1,4 @@
-"""Work on a dropped log: asked for, watched, cancelled, and what came of it."""
+"""Work on a dropped log: asked for, watched, cancelled, what came of it, and kept as a machine."""
 
 import base64
 import hashlib
@@ -6,28 +6,22 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
-from workbench.page.dropped import (
-    CHARTS_FILE,
-    RESULT_FILE,
-    card_of,
-    results_of,
-)
-from workbench.page.pages import go, show
-from workbench.page.visitors import Visitor, changing, form_of, reading
-from workbench.registry.bench import Bench, WorkItem
-from workbench.registry.values import TaskKind
+from workbench.jobs.options import clock
+from workbench.page.asked import Asked
+from workbench.page.dropped import CHARTS_FILE, RESULT_FILE, refuse_machine, store_files
+from workbench.page.pages import part
+from workbench.page.visitors import changing, reading
+from workbench.registry.bench import WorkItem
+from workbench.registry.values import Candidate, TaskKind
 
-KINDS_OF_WORK: dict[str, TaskKind] = {"identify": "identify", "trace": "trace"}
 GIVEN_OUT = ("model.json", "trace.json", "design.json", "validation.json")
 NO_SOURCE = "'none'"
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
@@ -42,46 +36,41 @@ class Shown:
     files: Sequence[str] = ()
 
 
-def task(request: Request, visitor: Visitor) -> Response:
+def task(asked: Asked) -> Response:
     """One task, which is asked for again while it is under way."""
-    found = Bench(request.app.state.registry.database).task(request.path_params["task"])
-    return _task(request, visitor, found)
+    return asked.show("task", one=_shown(asked, asked.bench.task(asked["task"])))
 
 
-def ask(request: Request, visitor: Visitor) -> Response:
+def ask(asked: Asked) -> Response:
     """A new task; nothing where the same is under way."""
-    upload = request.path_params["upload"]
-    kind = KINDS_OF_WORK.get(str(form_of(request).get("kind", "")))
-    if kind is None:
+    upload, kind = asked["upload"], asked.given("kind")
+    if kind not in get_args(TaskKind):
         raise HTTPException(400, "The work is identify or trace.")
-    if not card_of(request.app.state.settings.root, upload).exists():
+    if not asked.drop.card.exists():
         raise HTTPException(400, "The card does not read the log yet; correct it first.")
-    Bench(request.app.state.registry.database).ask(
-        upload, kind, by=visitor.name, now=datetime.now(UTC)
-    )
-    if request.headers.get("hx-request"):
-        return _tasks(request, visitor, upload)
-    return go(request, f"/drop/{upload}")
+    asked.bench.ask(upload, kind, by=asked.visitor.name, now=clock())
+    if asked.by_htmx:
+        return asked.show("tasks", tasks=shown_tasks(asked, upload), upload_id=upload)
+    return asked.go(f"/drop/{upload}")
 
 
-def cancel(request: Request, visitor: Visitor) -> Response:
+def cancel(asked: Asked) -> Response:
     """Cancel a task; its worker stops at its next look."""
-    bench = Bench(request.app.state.registry.database)
-    found = bench.cancel(request.path_params["task"], by=visitor.name, now=datetime.now(UTC))
-    if request.headers.get("hx-request"):
-        return _task(request, visitor, found)
-    return go(request, f"/drop/{found.upload}")
+    found = asked.bench.cancel(asked["task"], by=asked.visitor.name, now=clock())
+    if asked.by_htmx:
+        return asked.show("task", one=_shown(asked, found))
+    return asked.go(f"/drop/{found.upload}")
 
 
-def charts(request: Request, visitor: Visitor) -> Response:
+def charts(asked: Asked) -> Response:
     """The charts of a task that is done."""
-    path = result_file(request, CHARTS_FILE)
-    return show(request, visitor, "chart", html=path.read_text("utf-8"), said="")
+    html = _result(asked, CHARTS_FILE).read_text("utf-8")
+    return asked.show("chart", html=html, said="")
 
 
-def report(request: Request, _visitor: Visitor) -> Response:
+def report(asked: Asked) -> Response:
     """The report of the command, in a sandbox: its scripts may run, and reach nothing of ours."""
-    return report_response(result_file(request, REPORT_FILE).read_text("utf-8"))
+    return report_response(_result(asked, REPORT_FILE).read_text("utf-8"))
 
 
 def report_response(html: str) -> Response:
@@ -97,31 +86,44 @@ def report_response(html: str) -> Response:
     return Response(html, headers={"Content-Security-Policy": policy}, media_type="text/html")
 
 
-def document(request: Request, _visitor: Visitor) -> Response:
+def document(asked: Asked) -> Response:
     """A document of a task that is done."""
-    name = request.path_params["name"]
+    name = asked["name"]
     if name not in GIVEN_OUT:
         raise HTTPException(404, "No such file.")
-    return FileResponse(result_file(request, name), filename=name, media_type="application/json")
+    return FileResponse(_result(asked, name), filename=name, media_type="application/json")
 
 
-def _tasks(request: Request, visitor: Visitor, upload: str) -> Response:
-    found = shown_tasks(request, upload)
-    return show(request, visitor, "tasks", tasks=found, upload_id=upload)
+def keep(asked: Asked) -> Response:
+    """Keep what came of a dropped log as a machine with an active version."""
+    registry, task = asked.registry, asked.bench.task(asked["task"])
+    machine, reason = asked.text("machine"), asked.text("reason")
+    files, by = asked.drop_of(task.upload), asked.visitor.name
+    log, card = files.log, files.card
+    refuse_machine(asked.root, machine, card)
+    model = json.loads(_result(asked, "model.json").read_text("utf-8"))
+    design, validation = (
+        json.loads(path.read_text("utf-8")) if path.exists() else None
+        for path in (files.results(task.id) / f"{kind}.json" for kind in ("design", "validation"))
+    )
+    candidate, now = Candidate(model, design, validation), clock()
+    version = registry.add(machine, candidate, reason=reason, by=by, now=now)
+    stored = f"version-{version.number}-{task.kind}.html", _result(asked, REPORT_FILE)
+    store_files(asked.root, machine, log, card, stored)
+    current = registry.active_version(machine)
+    if current is None or current.number != version.number:
+        registry.promote(machine, version.number, reason=reason, by=by, now=now)
+    asked.audit("machine_kept", machine, f"version {version.number}, from {log.name}: {reason}")
+    return asked.go(f"/machine/{part(machine)}")
 
 
-def _task(request: Request, visitor: Visitor, found: WorkItem) -> Response:
-    return show(request, visitor, "task", one=_shown(request, found))
-
-
-def shown_tasks(request: Request, upload: str) -> list[Shown]:
+def shown_tasks(asked: Asked, upload: str) -> list[Shown]:
     """The tasks of an upload, the newest first, with what came of them."""
-    found = Bench(request.app.state.registry.database).tasks(upload)
-    return [_shown(request, one) for one in reversed(found)]
+    return [_shown(asked, one) for one in reversed(asked.bench.tasks(upload))]
 
 
-def _shown(request: Request, one: WorkItem) -> Shown:
-    folder = results_of(request.app.state.settings.root, one.upload, one.id)
+def _shown(asked: Asked, one: WorkItem) -> Shown:
+    folder = asked.drop_of(one.upload).results(one.id)
     place = folder / RESULT_FILE
     if one.state != "done" or not place.exists():
         return Shown(one)
@@ -129,10 +131,10 @@ def _shown(request: Request, one: WorkItem) -> Shown:
     return Shown(one, json.loads(place.read_text("utf-8")), files)
 
 
-def result_file(request: Request, name: str) -> Path:
+def _result(asked: Asked, name: str) -> Path:
     """A file of what came of the task that the address names."""
-    found = Bench(request.app.state.registry.database).task(request.path_params["task"])
-    path = results_of(request.app.state.settings.root, found.upload, found.id) / name
+    found = asked.bench.task(asked["task"])
+    path = asked.drop_of(found.upload).results(found.id) / name
     if found.state != "done" or not path.exists():
         raise HTTPException(404, f"Task {found.id} has no {name}.")
     return path
@@ -145,4 +147,5 @@ WORK_ROUTES = [
     Route("/work/{task:int}/charts", reading(charts)),
     Route("/work/{task:int}/report", reading(report)),
     Route("/work/{task:int}/file/{name}", reading(document)),
+    Route("/work/{task:int}/keep", changing(keep), methods=["POST"]),
 ]

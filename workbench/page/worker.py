@@ -18,7 +18,7 @@ from identification.errors import UserError
 from workbench.jobs.lease import Patience, renewed
 from workbench.jobs.options import clock, worker_name
 from workbench.jobs.passes import Report
-from workbench.page.dropped import card_of, log_of, results_of, without_path
+from workbench.page.dropped import LOG_FOLDER, Drop, without_path
 from workbench.page.settings import PageSettings
 from workbench.page.task_work import Work, course_of, done
 from workbench.registry.bench import Bench, EndState, WorkClaim
@@ -88,16 +88,13 @@ def _made(
     bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report
 ) -> tuple[EndState, str]:
     """What came of the task: its last state, and a line."""
-    task, root = claim.task, settings.root
+    task, files = claim.task, Drop(settings.root, claim.task.upload)
     try:
-        log, card = log_of(root, task.upload), card_of(root, task.upload)
-        out = results_of(root, task.upload, task.id)
+        work = Work(task.kind, files.log, files.card, files.results(task.id))
         with _beating(bench, claim) as (advance, describe):
-            return "done", done(
-                Work(task.kind, log, card, out), course_of(task.kind, advance, describe)
-            )
+            return "done", done(work, course_of(task.kind, advance, describe))
     except UserError as error:
-        return "failed", without_path(str(error), [log, card])
+        return "failed", without_path(str(error), [files.folder / LOG_FOLDER / "log", files.card])
     except (OSError, MemoryError) as error:
         return "failed", f"{type(error).__name__}: {getattr(error, 'strerror', None) or error}"
     except Exception as error:  # a fault of ours in one task must not stop the others

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.workbench.page.conftest import NOW, Page
-from workbench.page.dropped import ENDINGS, file_name, folder_of
+from workbench.page.dropped import ENDINGS, Drop, file_name
 from workbench.page.guard import FORM_BYTES
 from workbench.page.pages import spark
 from workbench.page.visitors import CHANGES, TOKEN_COOKIE, WRONG_TRIES, Limiter, csrf_of
@@ -209,7 +209,7 @@ def test_a_file_is_kept_under_a_plain_name(given: str, kept: str | None) -> None
 def test_no_path_leaves_the_folder(page: Page) -> None:
     for name in ("..", "../..", "0123456789abcde", "0123456789ABCDEF", "0123456789abcdef/.."):
         with pytest.raises(BadRegistry):
-            folder_of(page.root, name)
+            _ = Drop(page.root, name).folder
     (page.root.parent / "secret.html").write_text("secret")
     for path in (
         "/drop/..%2f..%2fsecret/card.toml",
