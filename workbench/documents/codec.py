@@ -8,7 +8,7 @@ Pydantic does both. What is written in another unit is converted; what is refuse
 place. What hangs on more than the value itself, an `Around` holds.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -19,10 +19,12 @@ from pydantic import BeforeValidator, Field, PlainSerializer, SerializationInfo,
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
+from identification.effects._library import Library
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import Shown, in_unit, shown
+from workbench.cards.parameter_units import Shown, converted, in_unit, shown
+from workbench.cards.units import Motion
 from workbench.documents.reading import OF_OURS, PLACEHOLDER, UNKNOWN_KEY, as_number
 
 Output = Literal["command", "force"]
@@ -33,13 +35,20 @@ class Around(NamedTuple):
     """What the written form of a value hangs on: the machine's units, its command, None where that
     is not known, and what its laws give.
 
-    in_full: a parameter is written with all keys, also those that say nothing.
+    in_full: a parameter is written with all keys, also those that say nothing. library: the effects
+    that a file may name.
     """
 
     units: Shown
     command: "Command | None" = None
     output: Output = "command"
     in_full: bool = False
+    library: Library | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """How the machine moves."""
+        return "rotary" if self.units.position == "rad" else "linear"
 
     @property
     def limit(self) -> float | None:
@@ -158,6 +167,36 @@ class Through:
         return _schema(handler, self.form | None if optional else self.form, read, write)
 
 
+def each(form: Any, read: Callable[[Any, Any], Any]) -> Through:
+    """Parameters by name are written as they are and read each in its own unit."""
+    return Through(form, lambda value, _around: value, read)
+
+
+def in_units(found: Mapping[str, Estimate], units: Mapping[str, str]) -> dict[str, Estimate]:
+    """Parameters in their units; those of other names are left to who knows them."""
+    return {
+        name: in_unit(one, units.get(name, one.unit), f"[{PLACEHOLDER}.{name}]")
+        for name, one in found.items()
+    }
+
+
+def pairs(raw: object, ours: object, where: str = "") -> Iterator[tuple[str, Estimate, Estimate]]:
+    """Every parameter of a file as it is written and in our units, with its place."""
+    if not (isinstance(raw, Mapping) and isinstance(ours, Mapping)):
+        return
+    if "value" in ours and "unit" in ours:
+        yield where, Estimate(**raw), Estimate(**ours)
+        return
+    for key, one in raw.items():
+        yield from pairs(one, ours.get(key), f"{where}.{key}" if where else key)
+
+
+def said_of(found: Iterable[tuple[str, Estimate, Estimate]]) -> tuple[str, ...]:
+    """A line for each parameter that is written in another unit than ours."""
+    lines = (converted(one, ours, f"[{where}]") for where, one, ours in found)
+    return tuple(line for line in lines if line)
+
+
 def _schema(handler: Any, form: Any, read: Any, write: Any) -> core_schema.CoreSchema:
     own = handler.generate_schema(form)
     out = core_schema.plain_serializer_function_ser_schema(write, info_arg=True, return_schema=own)
@@ -213,16 +252,17 @@ def at_its_place() -> Iterator[None]:
         raise PydanticCustomError(OF_OURS, "{said}", {"said": str(error)}) from None
 
 
-def _no_key(_value: object) -> object:
+def no_key(_value: object) -> object:
+    """Refuses a key that is no part of the file."""
     raise PydanticCustomError(UNKNOWN_KEY, "no key of a file")
 
 
 # Of a field that is no part of the file.
-NOT_WRITTEN: tuple[Any, ...] = (
-    BeforeValidator(_no_key),
+UNWRITTEN: tuple[Any, ...] = (
     Field(exclude=True),
     SkipJsonSchema(),  # type: ignore[type-arg]  # generic for type checkers alone
 )
+NOT_WRITTEN: tuple[Any, ...] = (BeforeValidator(no_key), *UNWRITTEN)
 
 
 def number(found: Estimate, unit: str, where: str) -> float:

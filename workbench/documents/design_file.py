@@ -3,7 +3,7 @@ refused where it contradicts itself."""
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,8 @@ import numpy as np
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import Shown, converted, shown
-from workbench.documents.codec import Around, around_in, written
+from workbench.cards.parameter_units import Shown, shown
+from workbench.documents.codec import Around, around_in, pairs, said_of, written
 from workbench.documents.design import Design
 from workbench.documents.model import used
 from workbench.documents.plausible import refuse_apart, refuse_unequal
@@ -48,30 +48,18 @@ def read_design(path: Path | Stored) -> Design:
     try:
         ours = design_document(found)
         _refuse_other_laws(raw, ours, found)
-        pairs = tuple(_pairs(raw, ours, ""))
-        _refuse_changed_units(pairs, found)
+        both = tuple(pairs(raw, ours))
+        _refuse_changed_units(both, found)
     except BadModel as error:
         raise BadModel(f"{path}: {error}") from None
     if not found.controllers:
         raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
-    said = (converted(one, ours, f"[{where}]") for where, one, ours in pairs)
-    return replace(found, read=tuple(line for line in said if line))
+    return replace(found, read=said_of(both))
 
 
-def _pairs(raw: object, ours: object, where: str) -> Iterator[tuple[str, Estimate, Estimate]]:
-    """Every parameter of a file as it is written and in our units, with its place."""
-    if not (isinstance(raw, Mapping) and isinstance(ours, Mapping)):
-        return
-    if "value" in ours and "unit" in ours:
-        yield where, Estimate(**raw), Estimate(**ours)
-        return
-    for key, one in raw.items():
-        yield from _pairs(one, ours.get(key), f"{where}.{key}" if where else key)
-
-
-def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], found: Design) -> None:
+def _refuse_changed_units(both: tuple[tuple[str, Estimate, Estimate], ...], found: Design) -> None:
     """Raises BadModel where a value in another unit is not what the file says in other places."""
-    at = {where: (one, ours) for where, one, ours in pairs}
+    at = {where: (one, ours) for where, one, ours in both}
     start = "compensator.friction."
     nine = {w.removeprefix(start): both for w, both in at.items() if w.startswith(start)}
     refuse_apart(

@@ -1,8 +1,10 @@
 """The model of one machine: what identification found; `model_file` writes and reads it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, SkipValidation
 
 from identification.drift.reference_model import OwnLogs
 from identification.effects._base import Acting
@@ -11,12 +13,14 @@ from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Actuator, Motor, Plant, actuator_units
 from identification.signals.bad_samples import BadSamples
-from workbench.cards.effect_values import known_effect
+from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.parameter_units import Shown, in_unit, shown
+from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, each, in_units, no_key
 from workbench.documents.drive import Present, PresentFile, present_of
+from workbench.documents.reading import PLACEHOLDER, as_number
 
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 
@@ -157,30 +161,102 @@ class Identifiable:
     only_if: str = ""
 
 
+def _nine(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
+    return in_units(found, info.context.units.friction)
+
+
+def _actuator(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
+    around = info.context
+    return in_units(found, actuator_units(around.motion, around.units.command))
+
+
+def _effects(found: Mapping[str, Mapping[str, Estimate]], info: Any) -> Any:
+    """Effects in SI; raises BadModel where one is not in the library, or a unit of another kind."""
+    around = info.context
+    try:
+        return {
+            key: estimates_in_si(key, own, around.library, around.motion, around.units.command)
+            for key, own in found.items()
+        }
+    except BadModel as error:
+        said = str(error)
+        raise BadModel(said if said.startswith("[") else f"[{PLACEHOLDER}] {said}") from None
+
+
+def _posterior(found: Mapping[str, Any], info: Any) -> Mapping[str, Any]:
+    """The posterior with its parameters in SI; raises BadModel where one is no value with its unit,
+    or of another kind."""
+    around, where = info.context, f"{PLACEHOLDER}.parameters"
+    units = {**around.units.friction, **actuator_units(around.motion, around.units.command)}
+    for key, own in (info.data.get("effects") or {}).items():
+        units |= {f"{key}.{name}": one.unit for name, one in own.items()}
+    try:
+        own = {name: Estimate(**one) for name, one in found.get("parameters", {}).items()}
+    except (TypeError, AttributeError):
+        raise BadModel(
+            f"[{where}] a table of value, unit, sd, low, high each needed; run"
+            " 'workbench identify --posterior' again"
+        ) from None
+    for name in own:
+        if name not in units:
+            raise BadModel(f"[{where}] unknown parameter {name!r}")
+    return {**found, "parameters": {
+        name: as_number(in_unit(one, units[name], f"[{where}.{name}]")) for name, one in own.items()
+    }}  # fmt: skip
+
+
+def _library(found: Any, info: Any) -> Any:
+    """The effects that the file may name, which it does not hold itself."""
+    return info.context.library if found is built_in() else no_key(found)
+
+
+Parameters = Mapping[str, Parameter]
+Nine = Annotated[Mapping[str, Estimate], each(Parameters, _nine)]
+
+
 @dataclass(frozen=True)
-class ModelFile:
-    """A model as model.json has it, in the units that are written there; see `Model`."""
+class Model:
+    """Everything that is needed to simulate a machine and to say how well it is known; in SI.
+
+    friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
+    effects: parameters by key and name. plant is None with the reason in `plant_reason`.
+    posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
+    the logs lie from the model, each alone; bad_samples: samples excluded from them; controller:
+    the one that the machine has now; identifiability: what the logs could identify before a fit,
+    empty where not asked; lag: of the motion behind the force's column [s], None where none shows;
+    resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`);
+    falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed: of a motion
+    that is predicted, never of one that is simulated.
+    library: where the effects' equations are. read: what to say of its file, a
+    line for each value in another unit than ours.
+    """
 
     card: str
     rig: Rig
-    friction: Mapping[str, Estimate]
-    actuator: Mapping[str, Estimate] | None
+    friction: Nine
+    actuator: Annotated[Mapping[str, Estimate] | None, each(Parameters, _actuator)]
     plant: ArxPlant | None
     plant_reason: str | None
     fit: FitSummary
     log: tuple[LogEntry, ...]
     versions: Mapping[str, str]
-    effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
-    posterior: Mapping[str, Any] | None = None
+    effects: Annotated[
+        Mapping[str, Mapping[str, Estimate]], each(Mapping[str, Parameters], _effects)
+    ] = field(default_factory=dict)
+    posterior: Annotated[Mapping[str, Any] | None, each(Mapping[str, Any], _posterior)] = None
     correlation: ParameterCorrelation | None = None
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
     controller: PresentFile | None = None
     identifiability: tuple[Identifiable, ...] = ()
-    lag: Estimate | None = None
-    resonance: Mapping[str, Estimate] | None = None
-    falling: Mapping[str, Estimate] = field(default_factory=dict)
+    lag: Parameter | None = None
+    resonance: Mapping[str, Parameter] | None = None
+    falling: Nine = field(default_factory=dict)
     schema: Literal["model/1"] = "model/1"
+    library: Annotated[
+        Library, SkipValidation, BeforeValidator(_library), Field(validate_default=True), *UNWRITTEN
+    ] = field(default_factory=built_in, compare=False, repr=False)
+    read: Annotated[tuple[str, ...], *NOT_WRITTEN] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.log:
@@ -200,31 +276,6 @@ class ModelFile:
         for table, found in tables.items():
             for name, estimate in found.items():
                 _check_estimate(f"[{table}.{name}]", estimate)
-        _ = _drive_of(self.actuator)
-
-
-@dataclass(frozen=True)
-class Model(ModelFile):
-    """Everything that is needed to simulate a machine and to say how well it is known; in SI.
-
-    friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
-    effects: parameters by key and name. plant is None with the reason in `plant_reason`.
-    posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
-    the logs lie from the model, each alone; bad_samples: samples excluded from them; controller:
-    the one that the machine has now; identifiability: what the logs could identify before a fit,
-    empty where not asked; lag: of the motion behind the force's column [s], None where none shows;
-    resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`);
-    falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed: of a motion
-    that is predicted, never of one that is simulated.
-    library: where the effects' equations are. read: what to say of its file, a
-    line for each value in another unit than ours.
-    """
-
-    library: Library = field(default_factory=built_in, compare=False, repr=False)
-    read: tuple[str, ...] = field(default=(), compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
         _ = self.simulated, self.present
 
     @property
@@ -324,8 +375,3 @@ def _drive_of(actuator: Mapping[str, Estimate] | None) -> Actuator | Motor | Non
     if set(actuator) == {"k1", "k2"}:
         return Actuator(used(actuator["k1"]), used(actuator["k2"]))
     raise BadModel(f"[actuator] holds {sorted(actuator)}; 'k1' and 'k2', or 'k_a' needed")
-
-
-def fields_of(model: ModelFile) -> dict[str, Any]:
-    """What the file holds of a model, by name."""
-    return {each.name: getattr(model, each.name) for each in fields(ModelFile)}

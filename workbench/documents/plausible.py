@@ -12,7 +12,6 @@ commands write are looked at: a command writes no such file, a hand or another p
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +20,6 @@ from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from workbench.cards.card_tables import SignalSpec
 from workbench.documents.model import LogEntry, Model
-
-if TYPE_CHECKING:
-    from workbench.documents.model import ModelFile
 
 Slips = tuple[tuple[float, str], ...]
 _TIME: Slips = ((1e-3, "ms"), (1e-6, "us"), (60.0, "min"))
@@ -194,20 +190,21 @@ _SHARPER = 20.0
 _SAME = 0.01  # relative difference of two numbers that are one
 
 
-def refuse_changed_units(written: "ModelFile", found: "ModelFile") -> None:
-    """Raises BadModel where `found`, `written` in SI units, contradicts its own logs by a value
-    that was written in another unit."""
-    other = {n for n, e in found.friction.items() if differs(written.friction[n], e)}
-    refuse_apart(written.friction, found.friction, "[friction.")
-    for name in sorted(other):
-        why = _impossible(name, found)
+def refuse_changed_units(written: Mapping[str, Estimate], found: Model) -> None:
+    """Raises BadModel where a model contradicts its own logs by a value in another unit.
+
+    written: its parameters by their places, as the file has them.
+    """
+    nine = {name: written[f"friction.{name}"] for name in found.friction}
+    refuse_apart(nine, found.friction, "[friction.")
+    for name, one in sorted(found.friction.items()):
+        why = _impossible(name, found) if differs(nine[name], one) else None
         if why:
-            unit = found.friction[name].unit
-            raise BadModel(_only_unit(f"[friction.{name}]", written.friction[name], unit, why))
+            raise BadModel(_only_unit(f"[friction.{name}]", nine[name], one.unit, why))
     given, k_a = found.rig.force_per_command, (found.actuator or {}).get("k_a")
-    if k_a and given and written.actuator:
+    if k_a and given:
         where = "force_per_command under [rig]"
-        refuse_unequal("[actuator.k_a]", written.actuator["k_a"], k_a, given, where)
+        refuse_unequal("[actuator.k_a]", written["actuator.k_a"], k_a, given, where)
 
 
 def refuse_apart(
@@ -254,7 +251,7 @@ def _ratio(of: Mapping[str, Estimate], pair: tuple[str, str]) -> float:
     return high / low if low > 0 else 1.0
 
 
-def _impossible(name: str, found: "ModelFile") -> str | None:
+def _impossible(name: str, found: Model) -> str | None:
     """Why the logs rule the value out; None where they do not."""
     value = abs(_number(found.friction[name]))
     peak = max(entry.force_peak for entry in found.log)
@@ -270,7 +267,7 @@ def _impossible(name: str, found: "ModelFile") -> str | None:
     return _impossible_mass(found, peak, speed, most) if name == "m" else None
 
 
-def _impossible_mass(found: "ModelFile", peak: float, speed: float, most: str) -> str | None:
+def _impossible_mass(found: Model, peak: float, speed: float, most: str) -> str | None:
     """Too heavy to reach the logs' speed, or known better than the logs' noise allows.
 
     A mass that is off by dm shifts the position by at most speed/F_v dm, so that n positions with

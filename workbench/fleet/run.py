@@ -3,12 +3,12 @@
 In the registry each log counts once, by its fingerprint, whoever else writes.
 """
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import PurePosixPath
-from typing import Any, Protocol
+from typing import Any
 
 from workbench.addresses import shown
 from workbench.fleet.cluster import Cluster, Work
@@ -23,18 +23,6 @@ from workbench.registry.store import Registry
 from workbench.registry.values import SeenLog
 
 LEASE = timedelta(minutes=2)
-
-
-class Recorder(Protocol):
-    """Where results are recorded beside Parquet, and the active version on a machine."""
-
-    def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
-        """The log as a worker takes it."""
-        ...
-
-    def record(self, result: Result) -> bool:
-        """Whether the result is recorded, by this call or before; False: a later run has to."""
-        ...
 
 
 class NoRegistry:
@@ -62,17 +50,20 @@ class InRegistry:
     clock: Clock
     patience: Patience = field(default_factory=Patience)
 
+    @property
+    def queue(self) -> Queue:
+        """The logs that wait for a result."""
+        return Queue(self.registry.database)
+
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
         """The log as a worker takes it, with the active model and design of its machine."""
-        retry, registry = self.patience, self.registry
-        version = retry(registry.active_version, log.machine)
+        retry = self.patience
+        version = retry(self.registry.active_version, log.machine)
         if version is None:
             return Item(url, log, card, seed)
-        documents = retry(registry.documents, version)
-        previous = retry(Queue(registry.database).last_evidence, version)
-        return Item(
-            url, log, card, seed, version, documents["model"], documents["design"], previous
-        )
+        own = retry(self.registry.documents, version)
+        previous = retry(self.queue.last_evidence, version)
+        return Item(url, log, card, seed, version, own["model"], own["design"], previous)
 
     def record(self, result: Result) -> bool:
         """Whether the registry holds a result of this log; the first one counts.
@@ -82,17 +73,17 @@ class InRegistry:
         """
         if not result.sha256:
             return True  # nothing was read, so there is no fingerprint to record it under
-        retry, queue, machine = self.patience, Queue(self.registry.database), result.log.machine
-        log = result.log
+        retry, queue, log = self.patience, self.queue, result.log
+        machine = log.machine
         seen = SeenLog(result.sha256, PurePosixPath(log.name).name, log.size, log.mtime_ns)
         retry(queue.announce, machine, [seen], now=self.clock())
-        if not self._waits(queue, machine, seen):
+        if not self._waits(machine, seen):
             return True
         claim = retry(queue.claim, machine, owner=self.owner, lease=LEASE, now=self.clock())
         if claim is None:
             return False
         try:
-            if not self._waits(queue, machine, seen):
+            if not self._waits(machine, seen):
                 return True
             version = retry(self.registry.active_version, machine)
             if (None if version is None else version.number) != result.against:
@@ -104,11 +95,12 @@ class InRegistry:
             retry(queue.release, claim)
         return True
 
-    def _waits(self, queue: Queue, machine: str, log: SeenLog) -> bool:
-        waiting = self.patience(queue.waiting, machine)
+    def _waits(self, machine: str, log: SeenLog) -> bool:
+        waiting = self.patience(self.queue.waiting, machine)
         return any(one.sha256 == log.sha256 for one, _ in waiting)
 
 
+Recorder = NoRegistry | InRegistry
 FLEET_POLL = 1.0  # s between looks at the cluster
 CARDS_CHECKED = 20  # logs whose card is searched before a run begins
 
@@ -126,9 +118,9 @@ class FleetSettings:
     alone: timedelta = timedelta(minutes=2)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Report:
-    """What a run did: logs found, done by an earlier run, and results by verdict.
+    """What a run has done so far: logs found, done by an earlier run, and results by verdict.
 
     bad: machine, log and reason of the results that somebody has to look at, the first of them;
     later: logs left to a later run, since the machine was in another's hands. seconds: wall time;
@@ -137,89 +129,65 @@ class Report:
 
     logs: int
     before: int
-    verdicts: dict[str, int]
-    bad: tuple[Result, ...]
-    later: int
-    seconds: float
-    busy: float
-    memory: int
+    verdicts: dict[str, int] = field(default_factory=dict)
+    bad: tuple[Result, ...] = ()
+    later: int = 0
+    seconds: float = 0.0
+    busy: float = 0.0
+    memory: int = 0
 
 
+@dataclass(frozen=True)
 class FleetRun:
-    """One run over the logs of a fleet."""
+    """A run over the logs of a fleet."""
 
-    def __init__(
-        self,
-        cluster: Cluster,
-        store: ResultStore,
-        recorder: Recorder,
-        settings: FleetSettings,
-        clock: Clock,
-        *,
-        advance: Callable[[float], None] = lambda _step: None,
-        work: Work = default_work,
-        listed: int = 1000,
-    ) -> None:
-        self._cluster = cluster
-        self._store = store
-        self._recorder = recorder
-        self._settings = settings
-        self._clock = clock
-        self._advance = advance
-        self._work = work
-        self._listed = listed
-        self._verdicts: Counter[str] = Counter()
-        self._bad: list[Result] = []
-        self._later = 0
-        self._busy = 0.0
-        self._memory = 0
+    cluster: Cluster
+    store: ResultStore
+    recorder: Recorder
+    settings: FleetSettings
+    clock: Clock
+    advance: Callable[[float], None] = lambda _step: None
+    work: Work = default_work
+    listed: int = 1000
 
     def __call__(self, logs: Sequence[LogFile]) -> Report:
         """What the run did; raises BadLogs, BadCluster, RegistryAway, with all results kept."""
-        begin = self._clock()
-        for result in self._store.journalled():
+        begin = self.clock()
+        for result in self.store.journalled():
             self._record(result)
-        todo = [log for log in logs if log.key not in self._store.done]
-        before = len(logs) - len(todo)
-        self._advance(before)
-        if self._settings.card is None:
+        todo = [log for log in logs if log.key not in self.store.done]
+        done = Report(len(logs), len(logs) - len(todo))
+        self.advance(done.before)
+        if self.settings.card is None:
             self._refuse_cardless(todo)
         try:
             for result in self._results(todo):
-                self._take(result)
-                self._store.tick(now=self._clock())
+                self._take(result, done)
+                self.store.tick(now=self.clock())
         finally:
-            self._store.flush()
-        return Report(
-            logs=len(logs),
-            before=before,
-            verdicts=dict(self._verdicts),
-            bad=tuple(self._bad),
-            later=self._later,
-            seconds=(self._clock() - begin).total_seconds(),
-            busy=self._busy,
-            memory=self._memory,
-        )
+            self.store.flush()
+        done.seconds = (self.clock() - begin).total_seconds()
+        return done
 
-    def _take(self, result: Result) -> None:
+    def _take(self, result: Result, done: Report) -> None:
         """Record a new result, and count it."""
-        self._advance(1.0)
-        self._busy += result.seconds
-        self._memory = max(self._memory, result.memory)
+        self.advance(1.0)
+        done.busy += result.seconds
+        done.memory = max(done.memory, result.memory)
         if result.verdict != "waits":
-            self._store.note(result)
+            self.store.note(result)
             if not self._record(result):
-                self._later += 1
+                done.later += 1
                 return
-        self._verdicts[result.verdict] += 1
-        if result.verdict not in GOOD and len(self._bad) < self._listed:
-            self._bad.append(replace(result, model=None, made=None, rival=None, evidence={}))
+        done.verdicts[result.verdict] = done.verdicts.get(result.verdict, 0) + 1
+        if result.verdict not in GOOD and len(done.bad) < self.listed:
+            done.bad += (replace(result, model=None, made=None, rival=None, evidence={}),)
 
     def _record(self, result: Result) -> bool:
         """The result into the registry and then into Parquet; False: left to a later run."""
-        if not self._recorder.record(result):
+        if not self.recorder.record(result):
             return False
-        self._store.add(result, now=self._clock())
+        self.store.add(result, now=self.clock())
         return True
 
     def _results(self, logs: Sequence[LogFile]) -> Iterator[Result]:
@@ -230,23 +198,21 @@ class FleetRun:
             machines.setdefault(log.machine, deque()).append(log)
         ready = deque(machines)
         hands: dict[Any, LogFile] = {}
-        seen = self._clock()
+        seen = self.clock()
         while ready or hands:
-            now = self._clock()
-            limit = self._cluster.limit()
-            if limit:
-                seen = now
+            now, limit = self.clock(), self.cluster.limit()
+            seen = now if limit else seen
             self._refuse_empty(now - seen)
             while ready and len(hands) < limit:
                 log = machines[ready.popleft()].popleft()
                 given = self._given(log)
                 if isinstance(given, Result):
                     yield given
-                    self._next(log, machines, ready)
+                    ready.extend([log.machine] if machines[log.machine] else [])
                 else:
                     hands[given] = log
-            for future in self._cluster.wait(list(hands), FLEET_POLL) if hands else ():
-                found = self._cluster.result(future)
+            for future in self.cluster.wait(list(hands), FLEET_POLL) if hands else ():
+                found = self.cluster.result(future)
                 if found is None:
                     continue
                 log = hands.pop(future)
@@ -254,27 +220,22 @@ class FleetRun:
                 if isinstance(found, str):
                     found = Result(log, "failed", f"{log.name}: {found}")
                 yield found
-                self._next(log, machines, ready)
-
-    def _next(self, log: LogFile, machines: dict[str, deque[LogFile]], ready: deque[str]) -> None:
-        """The next log of the machine has its turn once this one's result is recorded."""
-        if machines[log.machine]:
-            ready.append(log.machine)
+                ready.extend([log.machine] if machines[log.machine] else [])
 
     def _given(self, log: LogFile) -> Any:
         """The future of a log handed over; a result where it cannot be."""
-        settings = self._settings
+        settings = self.settings
         try:
             card = settings.card or card_text(settings.url, log)
         except BadLogs as error:
             return Result(log, "waits", str(error))
         if card is None:
             return Result(log, "waits", f"{log.name}: no card.toml beside or above it")
-        item = self._recorder.item(settings.url, log, card, settings.seed)
-        return self._cluster.submit(self._work, item)
+        item = self.recorder.item(settings.url, log, card, settings.seed)
+        return self.cluster.submit(self.work, item)
 
     def _refuse_cardless(self, logs: Sequence[LogFile]) -> None:
-        url = self._settings.url
+        url = self.settings.url
         looked = logs[:CARDS_CHECKED]
         if looked and not any(card_text(url, log) for log in looked):
             raise BadLogs(
@@ -283,7 +244,7 @@ class FleetRun:
             )
 
     def _refuse_empty(self, time: timedelta) -> None:
-        if time > self._settings.alone:
+        if time > self.settings.alone:
             raise BadCluster(
                 f"the cluster has had no worker for {time.total_seconds():.0f} s; results so far"
                 " are kept, start workers and run again"

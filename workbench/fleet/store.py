@@ -175,8 +175,7 @@ def _keys(path: Path) -> list[tuple[str, int, int]]:
     except (pa.ArrowException, OSError, KeyError) as error:
         text = " ".join(str(error).split())[:120]
         raise BadOutput(f"{path}: is no part of a fleet's results ({text}); move it away") from None
-    columns = (table.column(name).to_pylist() for name in ("log", "size", "mtime_ns"))
-    return list(zip(*columns, strict=True))
+    return [(row["log"], row["size"], row["mtime_ns"]) for row in table.to_pylist()]
 
 
 def _write_whole(path: Path, rows: list[dict[str, Any]]) -> None:

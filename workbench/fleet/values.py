@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, Literal
 
 from identification.errors import UserError
@@ -15,23 +14,11 @@ FleetVerdict = Literal[
     "not_judged", "set_aside", "failed",
     "waits",  # not recorded: the machine has to be looked after, and the next run tries again
 ]  # fmt: skip
-JUDGED: Mapping[FleetVerdict, Judged] = MappingProxyType(
-    {
-        "identified": "promoted",
-        "inadequate": "refused",
-        "none": "none",
-        "structure": "structure",
-        "promoted": "promoted",
-        "refused": "refused",
-        "not_judged": "not_judged",
-        "set_aside": "set_aside",
-        "failed": "set_aside",
-        "waits": "set_aside",
-    }
-)
+# As the registry has them where it has another word.
+JUDGED: Mapping[FleetVerdict, Judged] = {
+    "identified": "promoted", "inadequate": "refused", "failed": "set_aside", "waits": "set_aside",
+}  # fmt: skip
 GOOD: tuple[FleetVerdict, ...] = ("identified", "none")
-
-
 NEEDED = "workbench fleet needs Dask, which is not installed; install 'servo-workbench[fleet]'"
 
 
@@ -105,5 +92,5 @@ class Result:
 
     def judgement(self) -> Judgement:
         """The result as the registry takes it."""
-        verdict = JUDGED[self.verdict]
+        verdict: Any = JUDGED.get(self.verdict, self.verdict)
         return Judgement(verdict, self.reason, self.made, self.evidence, self.rival)

@@ -60,9 +60,9 @@ def _result(item: Item, path: Path, card: Path) -> Result:
         return made(item, path, card, blank)
     except NotIdentifiable as error:
         return replace(blank, verdict="not_judged", reason=_named(error, path, card, item))
+    except (BadCard, BadModel) as error:
+        return replace(blank, verdict="waits", reason=_named(error, path, card, item))
     except (UserError, OSError) as error:
-        if isinstance(error, BadCard | BadModel):
-            return replace(blank, verdict="waits", reason=_named(error, path, card, item))
         return replace(blank, reason=_named(error, path, card, item))
     except MemoryError:
         reason = f"{log.name}: the worker's memory does not hold it; give workers with more"
@@ -92,15 +92,9 @@ def _judged(item: Item, path: Path, card: Path, blank: Result) -> Result:
     seen = SeenLog(blank.sha256, path.name, log.size, log.mtime_ns)
     task = Task(log.machine, card, path, seen, item.version, item.model, item.design, item.previous)
     found = Chain(seed=item.seed)(task)
-    return replace(
-        blank,
-        verdict=found.verdict,
-        reason=found.reason,
-        model=None if found.candidate is None else found.candidate.model,
-        made=found.candidate,
-        rival=found.rival,
-        evidence=found.evidence,
-    )
+    model = None if found.candidate is None else found.candidate.model
+    return replace(blank, verdict=found.verdict, reason=found.reason, model=model,
+                   made=found.candidate, rival=found.rival, evidence=found.evidence)  # fmt: skip
 
 
 def _named(error: BaseException, path: Path, card: Path, item: Item) -> str:

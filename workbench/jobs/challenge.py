@@ -7,7 +7,7 @@ keeps every limit, the model alone is replaced. The rule is ours; the paper re-t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -123,13 +123,7 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
 
 def contest_document(found: Contest) -> dict[str, Any]:
     """The contest as the registry keeps it."""
-    return {
-        "won": found.won,
-        "model_won": found.model_won,
-        "reason": found.reason,
-        "held_out": {name: vars(one) for name, one in found.held_out.items()},
-        "loop": {name: one and vars(one) for name, one in found.loop.items()},
-    }
+    return asdict(found)
 
 
 def _drive(both: Sequence[Contender], logs: Sequence[Log]) -> Drive:

@@ -8,7 +8,7 @@ next pass.
 import errno
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -67,25 +67,26 @@ class PassSettings:
     patience: Patience = field(default_factory=Patience)
 
 
-@dataclass(frozen=True)
+@dataclass
 class PassReport:
-    """What a pass did.
+    """What a pass has done so far.
 
     busy: machines in another worker's hands; failed: machine and why it could not be handled;
     growing: files that are still being written; without_model: machines whose logs wait for one.
     """
 
     machines: int
-    outcomes: tuple[LogOutcome, ...]
-    busy: tuple[str, ...]
-    failed: Mapping[str, str]
-    growing: int
-    without_model: tuple[str, ...]
+    outcomes: tuple[LogOutcome, ...] = ()
+    busy: tuple[str, ...] = ()
+    failed: dict[str, str] = field(default_factory=dict)
+    growing: int = 0
+    without_model: tuple[str, ...] = ()
 
 
 Report = Callable[..., None]  # event, then what belongs to it by name
 
 
+@dataclass(frozen=True)
 class Pass:
     """One worker's way through the machines of a folder.
 
@@ -93,146 +94,133 @@ class Pass:
     of files are known, by default the same.
     """
 
-    def __init__(
-        self,
-        registry: Registry,
-        judge: Judge,
-        settings: PassSettings,
-        clock: Clock,
-        report: Report,
-        stop: Callable[[], bool] = lambda: False,
-        files: Clock | None = None,
-    ) -> None:
-        self._registry = registry
-        self._queue = Queue(registry.database)
-        self._judge = judge
-        self._settings = settings
-        self._clock = clock
-        self._files = files or clock
-        self._report = report
-        self._stop = stop
+    registry: Registry
+    judge: Judge
+    settings: PassSettings
+    clock: Clock
+    report: Report
+    stop: Callable[[], bool] = lambda: False
+    files: Clock | None = None
+
+    @property
+    def queue(self) -> Queue:
+        """The logs that wait."""
+        return Queue(self.registry.database)
 
     def run(self, root: Path) -> PassReport:
         """What the pass did; raises BadRoot, and RegistryAway once its patience has ended."""
         folders = machine_folders(root)
-        done = PassReport(len(folders), (), (), {}, 0, ())
-        outcomes: list[LogOutcome] = []  # kept also of a machine that fails half-way
+        done = PassReport(len(folders))
         for folder in folders:
-            if self._stop():
+            if self.stop():
                 break
             try:
-                done = self._machine(folder, done, outcomes)
+                self._machine(folder, done)
             except RegistryAway:
                 raise
             except (UserError, OSError, MemoryError) as error:
                 line = " ".join(str(error).split()) or type(error).__name__
-                self._report("machine_failed", machine=folder.name, reason=line)
-                done = replace(done, failed={**done.failed, folder.name: line})
+                self.report("machine_failed", machine=folder.name, reason=line)
+                done.failed[folder.name] = line
             except Exception as error:  # a fault of ours on one machine must not stop the others
                 shown = traceback.format_exc()
-                self._report("fault_of_ours", machine=folder.name, traceback=shown)
+                self.report("fault_of_ours", machine=folder.name, traceback=shown)
                 line = f"fault of ours: {type(error).__name__}: {' '.join(str(error).split())}"
-                done = replace(done, failed={**done.failed, folder.name: line})
-        return replace(done, outcomes=tuple(outcomes))
+                done.failed[folder.name] = line
+        return done
 
-    def _machine(
-        self, folder: MachineFolder, done: PassReport, outcomes: list[LogOutcome]
-    ) -> PassReport:
-        name, settings, retry = folder.name, self._settings, self._settings.patience
+    def _machine(self, folder: MachineFolder, done: PassReport) -> None:
+        name, settings, retry = folder.name, self.settings, self.settings.patience
         refuse_name(folder)
-        known = retry(self._queue.known, name)
+        known = retry(self.queue.known, name)
         found = scan(
-            folder, known, settle=settings.settle, now=self._files(), marker=settings.marker
-        )
-        done = replace(done, growing=done.growing + found.growing)
+            folder, known, settle=settings.settle, now=(self.files or self.clock)(),
+            marker=settings.marker,
+        )  # fmt: skip
+        done.growing += found.growing
         for file in found.later:
-            self._report("log_from_the_future", machine=name, file=file)
+            self.report("log_from_the_future", machine=name, file=file)
         seen = set(known.values())
         logs = [log for _, log in found.complete.values() if log.sha256 not in seen]
-        new = retry(self._queue.announce, name, logs, now=self._clock())
+        new = retry(self.queue.announce, name, logs, now=self.clock())
         if new:
-            self._report("logs_found", machine=name, count=new)
-        if not any(self._ready(log, found) for log, _ in retry(self._queue.waiting, name)):
-            return done
-        if retry(self._registry.active_version, name) is None and not settings.first:
-            self._report("no_model_in_force", machine=name)
-            return replace(done, without_model=(*done.without_model, name))
+            self.report("logs_found", machine=name, count=new)
+        if not any(self._ready(log, found) for log, _ in retry(self.queue.waiting, name)):
+            return
+        if retry(self.registry.active_version, name) is None and not settings.first:
+            self.report("no_model_in_force", machine=name)
+            done.without_model += (name,)
+            return
         claim = retry(
-            self._queue.claim, name, owner=settings.owner, lease=settings.lease, now=self._clock()
+            self.queue.claim, name, owner=settings.owner, lease=settings.lease, now=self.clock()
         )
         if claim is None:
-            return replace(done, busy=(*done.busy, name))
+            done.busy += (name,)
+            return
 
         def renew() -> None:
-            self._queue.renew(claim, lease=settings.lease, now=self._clock())
+            self.queue.renew(claim, lease=settings.lease, now=self.clock())
 
         try:
             with renewed(renew, settings.lease.total_seconds() / SHARE):
-                self._logs(folder, found, claim, outcomes)
+                self._logs(folder, found, claim, done)
         except LostClaim as error:
-            self._report("claim_lost", machine=name, reason=str(error))
-            return replace(done, busy=(*done.busy, name))
+            self.report("claim_lost", machine=name, reason=str(error))
+            done.busy += (name,)
         except RegistryAway:
             raise  # no use to ask it to release: the lease ends by itself
         except BaseException:
-            self._queue.release(claim)
+            self.queue.release(claim)
             raise
-        retry(self._queue.release, claim)
-        return done
+        else:
+            retry(self.queue.release, claim)
 
     def _ready(self, log: SeenLog, found: Scan) -> bool:
         """Whether a waiting log can be tested now: it is there, or something else in its place."""
         return log.sha256 in found.complete or _replaced(log, found)
 
-    def _logs(
-        self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[LogOutcome]
-    ) -> None:
+    def _logs(self, folder: MachineFolder, found: Scan, claim: Claim, done: PassReport) -> None:
         """Test the machine's logs; what is waiting is asked again, now that it is ours."""
-        for log, begun in self._settings.patience(self._queue.waiting, folder.name):
-            if self._stop():
+        for log, begun in self.settings.patience(self.queue.waiting, folder.name):
+            if self.stop():
                 break
-            if not self._ready(log, found):
-                continue
-            outcome = self._log(folder, found, claim, log, begun)
-            if outcome is not None:
-                outcomes.append(outcome)
+            if self._ready(log, found):
+                done.outcomes += self._log(folder, found, claim, log, begun)
 
     def _log(
         self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
-    ) -> LogOutcome | None:
-        """The log's result; None where its file has changed in the meantime."""
-        retry, settings = self._settings.patience, self._settings
+    ) -> tuple[LogOutcome, ...]:
+        """The log's result; none where its file has changed in the meantime."""
+        retry, settings = self.settings.patience, self.settings
         if _replaced(log, found):
-            judgement = Judgement(
-                "set_aside", f"{log.file}: changed before it was tested; its present content counts"
-            )
+            said = "changed before it was tested; its present content counts"
+            judgement = Judgement("set_aside", f"{log.file}: {said}")
         elif begun >= settings.attempts:
-            judgement = Judgement(
-                "set_aside", f"{log.file}: begun {begun} times, and no worker has come to its end"
-            )
+            said = f"begun {begun} times, and no worker has come to its end"
+            judgement = Judgement("set_aside", f"{log.file}: {said}")
         else:
             path, here = found.complete[log.sha256]
-            retry(self._queue.begin, claim, log, now=self._clock())
-            self._report("log_begun", machine=folder.name, file=log.file, sha256=log.sha256)
+            retry(self.queue.begin, claim, log, now=self.clock())
+            self.report("log_begun", machine=folder.name, file=log.file, sha256=log.sha256)
             judgement = self._judged(self._task(folder, path, here))
             if not unchanged(path, here):
-                return None
+                return ()
         outcome = retry(
-            self._queue.finish, claim, log, judgement,
-            by=settings.owner, now=self._clock(), order=settings.order,
+            self.queue.finish, claim, log, judgement,
+            by=settings.owner, now=self.clock(), order=settings.order,
         )  # fmt: skip
-        self._report(
+        self.report(
             "log_judged", machine=folder.name, file=log.file, sha256=log.sha256,
             verdict=outcome.verdict, reason=outcome.reason,
         )  # fmt: skip
-        return outcome
+        return (outcome,)
 
     def _judged(self, task: Task) -> Judgement:
         """The judgement; "set_aside" for a bad log, "not_judged" for one with too little
         information."""
         file = task.log.file
         try:
-            return self._judge(task)
+            return self.judge(task)
         except (BadCard, BadModel, RegistryAway, LostClaim, MemoryError):
             raise
         except BadLog as error:
@@ -245,27 +233,18 @@ class Pass:
             return Judgement("set_aside", f"{file}: {error.strerror or error}")
         except Exception as error:  # a fault of ours on one log must not stop the others
             shown = traceback.format_exc()
-            self._report("fault_of_ours", machine=task.machine, file=file, traceback=shown)
-            said = f"{type(error).__name__}: {error}"
-            return Judgement("set_aside", f"{file}: fault of ours: {said}")
+            self.report("fault_of_ours", machine=task.machine, file=file, traceback=shown)
+            return Judgement("set_aside", f"{file}: fault of ours: {type(error).__name__}: {error}")
 
     def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
-        retry, registry, queue = self._settings.patience, self._registry, self._queue
+        retry, registry, queue = self.settings.patience, self.registry, self.queue
         version = retry(registry.active_version, folder.name)
         documents = {} if version is None else retry(registry.documents, version)
         # What was found of the machine as it is now says nothing of a log from before.
-        newer = retry(queue.newer_behind, folder.name, log, self._settings.order)
+        newer = retry(queue.newer_behind, folder.name, log, self.settings.order)
         after = None if version is None or newer else retry(queue.last_evidence, version)
-        return Task(
-            machine=folder.name,
-            card=folder.card,
-            path=path,
-            log=log,
-            version=version,
-            model=documents.get("model"),
-            design=documents.get("design"),
-            previous=after,
-        )
+        model, design = documents.get("model"), documents.get("design")
+        return Task(folder.name, folder.card, path, log, version, model, design, after)
 
 
 def _replaced(log: SeenLog, found: Scan) -> bool:

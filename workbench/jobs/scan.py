@@ -6,7 +6,7 @@ where the writer leaves a marker beside each finished file ("run1.csv.done"), wh
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -114,38 +114,23 @@ def unchanged(path: Path, log: SeenLog) -> bool:
 
 
 def open_for_writing(path: Path) -> bool:
-    """Whether a process has the file open for writing; False where the system does not say."""
-    if not hasattr(os, "O_CLOEXEC") or not (lease := _lease()):
-        return False
+    """Whether a process has the file open for writing; False where the system does not say.
+
+    By a read lease, which Linux grants on files that nobody writes.
+    """
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        return False  # what cannot be opened is refused when it is read, with the reason
-    try:
-        return lease(handle)
-    finally:
-        os.close(handle)
+        import fcntl
 
-
-def _lease() -> Callable[[int], bool] | None:
-    """A test by a read lease, which Linux grants on files that nobody writes; None elsewhere."""
-    import fcntl
-
-    request = getattr(fcntl, "F_SETLEASE", None)
-    if request is None:
-        return None
-
-    def refused(handle: int) -> bool:
-        try:
-            fcntl.fcntl(handle, request, fcntl.F_RDLCK)
-        except BlockingIOError:
-            return True
-        except OSError:  # another's file, or a file system without leases
-            return False
-        fcntl.fcntl(handle, request, fcntl.F_UNLCK)
+        with path.open("rb") as file:
+            fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK)
+            fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_UNLCK)
+    except BlockingIOError:
+        return True
+    except (ImportError, AttributeError, OSError):
+        # Another system; a file of another user's, of a file system without leases, or one that
+        # cannot be opened, which is refused when it is read.
         return False
-
-    return refused
+    return False
 
 
 def _files(folder: Path) -> Iterator[Path]:

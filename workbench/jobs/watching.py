@@ -1,8 +1,10 @@
 """Pass after pass: by a cron expression, and soon after a log file has appeared or changed."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import timedelta
+from functools import partial
+from itertools import count
 from pathlib import Path
 
 from apscheduler.executors.pool import ThreadPoolExecutor
@@ -72,7 +74,7 @@ def watch_machines(
     scheduler.add_job(run, DateTrigger(clock()), id="first", misfire_grace_time=None)
     scheduler.start()
     try:
-        _follow_files(root, soon, stop, report, of_log if marker is None else of_log_or(marker))
+        _follow_files(root, soon, stop, report, partial(of_log, marker=marker or ""))
     finally:
         stop.set()
         scheduler.shutdown(wait=True)
@@ -86,7 +88,8 @@ def _follow_files(
     of_machine: Callable[[Change, str], bool],
 ) -> None:
     """Calls `soon` with each change of a log or card until `stop` is set."""
-    for wait in _longer(AGAIN, LONGEST_WAIT):
+    for again in count():
+        wait = min(AGAIN * 2 ** min(again, 16), LONGEST_WAIT)
         try:
             for _ in watch(root, watch_filter=of_machine, stop_event=stop, raise_interrupt=False):
                 soon()
@@ -99,24 +102,7 @@ def _follow_files(
             return
 
 
-def of_log_or(marker: str) -> Callable[[Change, str], bool]:
-    """As `of_log`, or whether a change is one of a marker beside a log."""
-
-    def changed(change: Change, path: str) -> bool:
-        return of_log(change, path.removesuffix(marker))
-
-    return changed
-
-
-def _longer(first: float, longest: float) -> Iterator[float]:
-    """Waits [s] that double from the first to the longest."""
-    wait = first
-    while True:
-        yield wait
-        wait = min(2.0 * wait, longest)
-
-
-def of_log(_change: Change, path: str) -> bool:
-    """Whether a change is one of a log file, or of a card."""
-    file = Path(path)
+def of_log(_change: Change, path: str, marker: str = "") -> bool:
+    """Whether a change is one of a log file, of a marker beside one, or of a card."""
+    file = Path(path.removesuffix(marker))
     return (file.parent.name == LOGS and file.suffix.lower() in SUFFIXES) or file.suffix == ".toml"
