@@ -22,6 +22,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from identification.effects._library import Library
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
+from identification.model.plant import actuator_units
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import Shown, converted, in_unit, shown
 from workbench.cards.units import Motion
@@ -49,6 +50,11 @@ class Around(NamedTuple):
     def motion(self) -> Motion:
         """How the machine moves."""
         return "rotary" if self.units.position == "rad" else "linear"
+
+    @property
+    def actuator(self) -> Mapping[str, str]:
+        """Units of k1, k2 and k_a."""
+        return actuator_units(self.motion, self.units.command)
 
     @property
     def limit(self) -> float | None:
@@ -147,13 +153,13 @@ class Command:
 class Through:
     """A value is written as one of the class `form`, or None as null, and made of it again.
 
-    write: of the value and what is around it; read: of the form and pydantic's information, which
-    has that as its context.
+    read: of the form and pydantic's information, which has what is around the value as its context;
+    write: of the value and what is around it, by default as it is.
     """
 
     form: Any
-    write: Callable[[Any, Around], Any]
     read: Callable[[Any, Any], Any]
+    write: Callable[[Any, Around], Any] = lambda value, _around: value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         def read(found: Any, info: Any) -> Any:
@@ -165,11 +171,6 @@ class Through:
 
         optional = type(None) in get_args(source)
         return _schema(handler, self.form | None if optional else self.form, read, write)
-
-
-def each(form: Any, read: Callable[[Any, Any], Any]) -> Through:
-    """Parameters by name are written as they are and read each in its own unit."""
-    return Through(form, lambda value, _around: value, read)
 
 
 def in_units(found: Mapping[str, Estimate], units: Mapping[str, str]) -> dict[str, Estimate]:
@@ -223,7 +224,7 @@ def numbers(
         wanted = info.context.units.by_name(units)
         return make(**numbers_of(own, wanted, PLACEHOLDER, positive if above_0 else number))
 
-    return Through(Mapping[str, Parameter | None], write, read)
+    return Through(Mapping[str, Parameter | None], read, write)
 
 
 def numbers_of(

@@ -193,14 +193,14 @@ class Controller:
     # Written by `_with_law`, as the whole law.
     W: Annotated[
         tuple[float, ...] | None,
-        Through(LawFile, lambda _value, _around: None, _anti_windup),
+        Through(LawFile, _anti_windup, lambda _value, _around: None),
         Field(alias="law"),
     ] = None
     cascade: Annotated[
         CascadeGains | None, numbers(CascadeGains, CASCADE_UNITS, derived=("k_p_command",))
     ] = None
     series: Annotated[
-        SeriesFilter | None, Through(SeriesFile, _series_file, _series), Field(alias="filter")
+        SeriesFilter | None, Through(SeriesFile, _series, _series_file), Field(alias="filter")
     ] = None
     feed_forward: Annotated[FeedForward | None, numbers(FeedForward, AHEAD_UNITS)] = None
     acceleration: Annotated[
@@ -420,7 +420,7 @@ class Design:
     refused: Mapping[str, str]
     recommended: Recommended
     compensator: Annotated[
-        CompensatorValues, Through(CompensatorFile, _compensator_file, _compensator)
+        CompensatorValues, Through(CompensatorFile, _compensator, _compensator_file)
     ]
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
@@ -428,7 +428,7 @@ class Design:
     present: Annotated[Present | None, PRESENT_LOOP] = None
     recommendation: Recommendation | None = None
     p_pi: Controller | None = None
-    schedule: Annotated[GainSchedule | None, Through(ScheduleFile, _schedule_file, _schedule)] = (
+    schedule: Annotated[GainSchedule | None, Through(ScheduleFile, _schedule, _schedule_file)] = (
         None
     )
     read: Annotated[tuple[str, ...], *NOT_WRITTEN] = field(default=(), compare=False)

@@ -43,7 +43,7 @@ def _force_file(one: ForceLoop, around: Around) -> ForceLoopFile:
 
 
 FORCE_LOOP_UNITS = Through(
-    ForceLoopFile, _force_file, lambda found, _: ForceLoop(found.k_i, found.T_i, found.h)
+    ForceLoopFile, lambda found, _info: ForceLoop(found.k_i, found.T_i, found.h), _force_file
 )
 
 
@@ -131,8 +131,8 @@ def present_of(found: PresentFile, units: Shown, where: str) -> Present:
 
 PRESENT_LOOP = Through(
     PresentFile,
-    lambda one, around: present_file(one, around.limit, around.units),
     lambda found, info: present_of(found, info.context.units, PLACEHOLDER),
+    lambda one, around: present_file(one, around.limit, around.units),
 )
 
 

@@ -13,12 +13,12 @@ from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
-from identification.model.plant import Actuator, Motor, Plant, actuator_units
+from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import Shown, in_unit, shown
-from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, each, in_units, no_key
+from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through, in_units, no_key
 from workbench.documents.drive import Present, PresentFile, present_of
 from workbench.documents.reading import PLACEHOLDER, as_number
 
@@ -166,8 +166,7 @@ def _nine(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
 
 
 def _actuator(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
-    around = info.context
-    return in_units(found, actuator_units(around.motion, around.units.command))
+    return in_units(found, info.context.actuator)
 
 
 def _effects(found: Mapping[str, Mapping[str, Estimate]], info: Any) -> Any:
@@ -187,7 +186,7 @@ def _posterior(found: Mapping[str, Any], info: Any) -> Mapping[str, Any]:
     """The posterior with its parameters in SI; raises BadModel where one is no value with its unit,
     or of another kind."""
     around, where = info.context, f"{PLACEHOLDER}.parameters"
-    units = {**around.units.friction, **actuator_units(around.motion, around.units.command)}
+    units = {**around.units.friction, **around.actuator}
     for key, own in (info.data.get("effects") or {}).items():
         units |= {f"{key}.{name}": one.unit for name, one in own.items()}
     try:
@@ -211,7 +210,7 @@ def _library(found: Any, info: Any) -> Any:
 
 
 Parameters = Mapping[str, Parameter]
-Nine = Annotated[Mapping[str, Estimate], each(Parameters, _nine)]
+Nine = Annotated[Mapping[str, Estimate], Through(Parameters, _nine)]
 
 
 @dataclass(frozen=True)
@@ -234,16 +233,16 @@ class Model:
     card: str
     rig: Rig
     friction: Nine
-    actuator: Annotated[Mapping[str, Estimate] | None, each(Parameters, _actuator)]
+    actuator: Annotated[Mapping[str, Estimate] | None, Through(Parameters, _actuator)]
     plant: ArxPlant | None
     plant_reason: str | None
     fit: FitSummary
     log: tuple[LogEntry, ...]
     versions: Mapping[str, str]
     effects: Annotated[
-        Mapping[str, Mapping[str, Estimate]], each(Mapping[str, Parameters], _effects)
+        Mapping[str, Mapping[str, Estimate]], Through(Mapping[str, Parameters], _effects)
     ] = field(default_factory=dict)
-    posterior: Annotated[Mapping[str, Any] | None, each(Mapping[str, Any], _posterior)] = None
+    posterior: Annotated[Mapping[str, Any] | None, Through(Mapping[str, Any], _posterior)] = None
     correlation: ParameterCorrelation | None = None
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
