@@ -37,8 +37,8 @@ def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
         hidden = any(part.startswith((".", "_")) for part in name.parts)
         if name.suffix.lower() != SUFFIX or hidden or _inside(system, path, leave_out):
             continue
-        size, time = int(info.get("size") or 0), _time(info)
-        logs.append(LogFile(_machine(name), str(name), path, size, time))
+        first = name.parts[0].removeprefix("machine=") if len(name.parts) > 1 else name.stem
+        logs.append(LogFile(first, str(name), path, int(info.get("size") or 0), _time(info)))
     if not logs:
         raise BadLogs(
             f"{shown(url)}: no logs (*{SUFFIX}) there; give a folder, a file or an fsspec URL with"
@@ -122,14 +122,9 @@ def _base(root: str, found: Mapping[str, Any]) -> str:
     return root
 
 
-def _machine(name: PurePosixPath) -> str:
-    return name.parts[0].removeprefix("machine=") if len(name.parts) > 1 else name.stem
-
-
 def _is_local(system: Any) -> bool:
     protocol = system.protocol
-    names = (protocol,) if isinstance(protocol, str) else tuple(protocol)
-    return "file" in names
+    return "file" in ([protocol] if isinstance(protocol, str) else protocol)
 
 
 def _inside(system: Any, path: str, folder: Path | None) -> bool:

@@ -104,7 +104,7 @@ class Webhook:
             raise kind(_phrase(status))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Delivery:
     """What became of the alarms: taken by the webhook, still waiting, given up in this pass.
 
@@ -160,70 +160,71 @@ def send_alarms(
                reason=f"not taken by {webhook.shown} within {GIVEN_UP_AFTER.days}"
                       " day(s)")  # fmt: skip
     logging.getLogger("httpx").setLevel(logging.WARNING)  # else it logs whole addresses
-    round_ = _Round(outbox, webhook, clock, report, stop)
-    round_.send(outbox.due(now))
-    waiting = sum(count for count, _ in outbox.counts(clock()).values())
-    if round_.unreached:
-        report("webhook_failed", webhook=webhook.shown, reason=round_.reason, waiting=waiting)
-    return Delivery(round_.sent, waiting, len(lost), round_.reason)
+    done = Delivery(given_up=len(lost))
+    unreached = _Sending(outbox, webhook, clock, report, stop, done).send(outbox.due(now))
+    done.waiting = sum(count for count, _ in outbox.counts(clock()).values())
+    if unreached:
+        report("webhook_failed", webhook=webhook.shown, reason=done.reason, waiting=done.waiting)
+    return done
 
 
-@dataclass
-class _Round:
-    """One pass' way through the alarms; missed: how many in a row did not get through."""
+@dataclass(frozen=True)
+class _Sending:
+    """One pass' way through the alarms; done: what has become of them so far."""
 
     outbox: Outbox
     webhook: Webhook
     clock: Clock
     report: Report
     stop: Callable[[], bool]
-    sent: int = 0
-    unreached: bool = False
-    missed: int = 0
-    reason: str | None = None
+    done: Delivery
 
-    def send(self, alarms: tuple[Alarm, ...]) -> None:
+    def send(self, alarms: tuple[Alarm, ...]) -> bool:
+        """Whether the webhook was not reached with one of them; the rest is then left."""
         if not alarms:
-            return
+            return False
         end = time.monotonic() + self.webhook.budget
         try:
             client = httpx.Client(timeout=self.webhook.timeout)
         except Exception as error:  # of a proxy or certificates that the environment names
-            self.unreached, self.reason = True, f"no connection: {type(error).__name__}"
-            return
+            self.done.reason = f"no connection: {type(error).__name__}"
+            return True
+        missed, unreached = 0, False
         with client:
             for alarm in alarms:
-                if self.stop() or self.missed >= IN_A_ROW:
-                    return
+                if self.stop() or missed >= IN_A_ROW:
+                    break
                 if time.monotonic() >= end:
-                    self.reason = self.reason or "too slow for all of them in one pass"
-                    return
+                    self.done.reason = self.done.reason or "too slow for all of them in one pass"
+                    break
                 if self.outbox.take(alarm, until=self.clock() + IN_HAND, now=self.clock()):
-                    self._one(alarm, client)
+                    missed = 0 if self._answered(alarm, client) else missed + 1
+                    unreached = unreached or missed > 0
+        return unreached
 
-    def _one(self, alarm: Alarm, client: httpx.Client) -> None:
+    def _answered(self, alarm: Alarm, client: httpx.Client) -> bool:
+        """Whether the webhook has answered, be it to refuse the alarm."""
         try:
             self.webhook.send(alarm, client)
         except Unreachable as error:
-            self.unreached, self.missed, self.reason = True, self.missed + 1, str(error)
+            self.done.reason = str(error)
             self.outbox.give_back(alarm, now=self.clock())
+            return False
         except Refused as error:
-            self._refused(alarm, str(error))
+            self.done.reason = str(error)
         except Exception as error:  # one alarm on which we fail must not stop the others
             # Where it happened, without the error's text, which may quote the address.
             shown = "".join(traceback.format_tb(error.__traceback__))
             self.report("fault_of_ours", machine=alarm.machine, file=alarm.log, traceback=shown)
-            self._refused(alarm, f"fault of ours: {type(error).__name__}")
+            self.done.reason = f"fault of ours: {type(error).__name__}"
         else:
-            self.missed = 0
-            self.sent += 1
+            self.done.sent += 1
             self.outbox.sent(alarm, now=self.clock())
-
-    def _refused(self, alarm: Alarm, reason: str) -> None:
-        self.missed, self.reason = 0, reason
+            return True
         next_at = self.outbox.refused(alarm, now=self.clock())
-        self.report("alarm_refused", machine=alarm.machine, file=alarm.log, reason=reason,
+        self.report("alarm_refused", machine=alarm.machine, file=alarm.log, reason=self.done.reason,
                     webhook=self.webhook.shown, next_at=next_at.isoformat())  # fmt: skip
+        return True
 
 
 def _phrase(status: int) -> str:

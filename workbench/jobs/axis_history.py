@@ -10,7 +10,8 @@ from workbench.documents.model_file import read_model
 from workbench.documents.reading import Stored
 from workbench.jobs.drift_by_chart import Reading, drift_by_chart
 from workbench.logs.sources import Sources
-from workbench.registry.results import LAST_ON_PAGE, NAMED, history, last_logs
+from workbench.registry import results
+from workbench.registry.results import LAST_ON_PAGE, history, last_logs
 from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
@@ -67,15 +68,11 @@ def unidentified(model: Model, why: str) -> dict[str, Estimate]:
 
 def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
     """This log's parameters as the drift test has them, by quantity."""
-    out = {}
-    for one in readings:
-        name = NAMED.get(one.name, one.name)
-        if name not in MEANING_OF:
-            continue
-        sign = -1.0 if name == "F_sn" else 1.0
-        low, high = sorted((sign * one.low, sign * one.high))
-        out[name] = Estimate(sign * one.after, one.unit, None, low, high)
-    return out
+    found = results.by_quantity(vars(one) for one in readings)
+    return {
+        name: Estimate(value, unit, None, low, high)
+        for name, (unit, value, low, high) in found.items()
+    }
 
 
 def _taken_out(key: str) -> bool:

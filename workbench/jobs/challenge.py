@@ -92,9 +92,12 @@ def challenge(
     terms = terms or Terms()
     if not any(log.duration >= LEAST_HELD_OUT for log in held_out):
         raise BadModel(f"no held-out log of at least {LEAST_HELD_OUT:g} s; give a longer one")
+    # One drive for both: the command where each model may be driven by it on each log.
+    ways = {default_drive(one.model, log) for one in (champion, challenger) for log in held_out}
+    drive: Drive = "command" if ways == {"command"} else "force"
     errors = {
-        name: held_out_errors(one.model, held_out, _drive((champion, challenger), held_out))
-        for name, one in (("champion", champion), ("challenger", challenger))
+        "champion": held_out_errors(champion.model, held_out, drive),
+        "challenger": held_out_errors(challenger.model, held_out, drive),
     }
     loop = _loops(champion, challenger, rng)
     old, new = loop["champion"], loop["challenger"]
@@ -109,27 +112,18 @@ def challenge(
 
 def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
     """Root mean squares over the logs, by their lengths; no free run with prescribed motion."""
-    found = []
+    positions, forces = [], []
     for log in logs:
         window = WINDOW if log.duration >= 2 * WINDOW else None
         one = predict(model, log, drive=drive, window=window)
-        position = None if model.by_equation else one.position_rms
-        found.append((len(log), position, one.force_predicted_rms))
-    return HeldOut(
-        _pooled([(n, position) for n, position, _ in found]),
-        _pooled([(n, force) for n, _, force in found]),
-    )
+        positions.append((len(log), None if model.by_equation else one.position_rms))
+        forces.append((len(log), one.force_predicted_rms))
+    return HeldOut(_pooled(positions), _pooled(forces))
 
 
 def contest_document(found: Contest) -> dict[str, Any]:
     """The contest as the registry keeps it."""
     return asdict(found)
-
-
-def _drive(both: Sequence[Contender], logs: Sequence[Log]) -> Drive:
-    """One drive for both: the command where each model may be driven by it on each log."""
-    ways = {default_drive(one.model, log) for one in both for log in logs}
-    return "command" if ways == {"command"} else "force"
 
 
 def _pooled(found: Sequence[tuple[int, float | None]]) -> float | None:
@@ -205,12 +199,11 @@ def _loops(
     """Both designs on the challenger's plant, along one reference, with the same noise."""
     designs = [one.design for one in (champion, challenger) if one.design is not None]
     seed = int(rng.integers(2**32))
-    out: dict[str, Tracking | None] = {}
-    for name, one in (("champion", champion), ("challenger", challenger)):
-        out[name] = None
-        if one.design is not None:
+    out: dict[str, Tracking | None] = {"champion": None, "challenger": None}
+    for name, made in (("champion", champion.design), ("challenger", challenger.design)):
+        if made is not None:
             noise = np.random.default_rng(seed)
-            out[name] = tracking(challenger.model, one.design, designs, noise)
+            out[name] = tracking(challenger.model, made, designs, noise)
     return out
 
 

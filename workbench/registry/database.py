@@ -5,7 +5,7 @@ import re
 import secrets
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ from sqlalchemy.exc import (
     ProgrammingError,
     TimeoutError,
 )
-from sqlalchemy.orm import DeclarativeBase, Session
+from sqlalchemy.orm import DeclarativeBase, Session, sessionmaker
 
 from workbench.files import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
@@ -61,16 +61,15 @@ class Database:
 
     def __init__(self, where: str, *, create: bool = True) -> None:
         url = _url(where)
-        self.where = url.database if url.drivername == "sqlite" else _shown(url)
+        self.where = str(url.database) if url.drivername == "sqlite" else _shown(url)
         if url.drivername == "sqlite":
-            path = Path(str(url.database))
-            _refuse_place(path, create)
-            if not path.exists():
-                _make_whole(path)
-        self._engine = _engine(url, str(self.where))
+            _refuse_place(Path(self.where), create)
+            if not Path(self.where).exists():
+                _make_whole(Path(self.where))
+        self._engine = _engine(url, self.where)
         try:
-            with self._guarded(), self._engine.begin() as connection:
-                upgrade(connection, str(self.where))
+            with _guarded(self.where), self._engine.begin() as connection:
+                upgrade(connection, self.where)
         except BaseException:
             self.close()
             raise
@@ -86,8 +85,8 @@ class Database:
         options: dict[str, Any] = {READING: True}
         if self._engine.dialect.name == "postgresql":
             options["isolation_level"] = "REPEATABLE READ"
-        engine = self._engine.execution_options(**options)
-        with self._guarded(), Session(engine, expire_on_commit=False) as session, session.begin():
+        made = sessionmaker(self._engine.execution_options(**options), expire_on_commit=False)
+        with _guarded(self.where), made.begin() as session:
             yield session
 
     def rows(self, query: Select[*tuple[Any, ...]]) -> Sequence[Row[*tuple[Any, ...]]]:
@@ -98,7 +97,7 @@ class Database:
     @contextmanager
     def writing(self) -> Iterator[Session]:
         """A session whose changes are all kept when the block ends, or none."""
-        with self._guarded(), Session(self._engine) as session, session.begin():
+        with _guarded(self.where), sessionmaker(self._engine).begin() as session:
             yield session
 
     def close(self) -> None:
@@ -112,9 +111,6 @@ class Database:
         with self.reading() as session:
             found: datetime = session.execute(select(func.clock_timestamp())).scalar_one()
         return found
-
-    def _guarded(self) -> AbstractContextManager[None]:
-        return _guarded(str(self.where))
 
 
 def changed(

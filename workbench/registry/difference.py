@@ -20,6 +20,9 @@ class Number:
     reason: str | None
 
 
+Entry = tuple[str, Number | str]  # with its unit
+
+
 @dataclass(frozen=True)
 class Line:
     """One parameter of two versions; change relative to the first, None where there is none.
@@ -51,7 +54,7 @@ def difference(
 
 def _entries(
     document: Mapping[str, Any] | None, keys: tuple[str, ...]
-) -> Iterator[tuple[str, tuple[str, Number | str]]]:
+) -> Iterator[tuple[str, Entry]]:
     for key in keys:
         found = (document or {}).get(key)
         if isinstance(found, str):
@@ -61,9 +64,7 @@ def _entries(
             yield from _numbers(found, prefix)
 
 
-def _numbers(
-    found: Mapping[str, Any], prefix: str
-) -> Iterator[tuple[str, tuple[str, Number | str]]]:
+def _numbers(found: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Entry]]:
     """Everything below that has a value and a unit, by its path."""
     for key, entry in found.items():
         name = f"{prefix}{key}"
@@ -76,25 +77,18 @@ def _numbers(
             yield from _numbers(entry, f"{name}.")
 
 
-def _line(
-    part: str,
-    name: str,
-    one: tuple[str, Number | str] | None,
-    other: tuple[str, Number | str] | None,
-) -> Line:
-    unit = next((found[0] for found in (other, one) if found is not None), "")
-    before, after = (None if found is None else found[1] for found in (one, other))
+def _line(part: str, name: str, one: Entry | None, other: Entry | None) -> Line:
+    unit, before, after = (other or one or ("",))[0], one and one[1], other and other[1]
     change = apart = None
     same_unit = one is not None and other is not None and one[0] == other[0]
     if same_unit and isinstance(before, Number) and isinstance(after, Number):
         if before.value and after.value is not None:
             change = (after.value - before.value) / abs(before.value)
-        if None not in (before.low, before.high, after.low, after.high):
-            apart = _apart(before, after)
+        apart = _apart(before, after)
     return Line(part, name, unit, before, after, change, apart)
 
 
-def _apart(one: Number, other: Number) -> bool:
-    assert one.low is not None and one.high is not None
-    assert other.low is not None and other.high is not None
+def _apart(one: Number, other: Number) -> bool | None:
+    if one.low is None or one.high is None or other.low is None or other.high is None:
+        return None
     return one.high < other.low or other.high < one.low

@@ -30,11 +30,13 @@ def upgrade(connection: Connection, where: str) -> None:
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LAYOUT_LOCK})
     found = revision(connection, where)
-    if found == HEAD:
-        return
-    if found is None:
-        _refuse_foreign(connection, where)
-    _run(connection, where, found)
+    taken = sorted(set(Base.metadata.tables) & set(inspect(connection).get_table_names()))
+    if found is None and taken:
+        raise BadRegistry(
+            f"registry {where}: holds a table {taken[0]!r} of something else; name another database"
+        )
+    if found != HEAD:
+        _run(connection, where, found)
 
 
 def revision(connection: Connection, where: str) -> str | None:
@@ -83,15 +85,6 @@ def config() -> "Config":
     return out
 
 
-def _refuse_foreign(connection: Connection, where: str) -> None:
-    ours = set(Base.metadata.tables)
-    taken = sorted(ours & set(inspect(connection).get_table_names()))
-    if taken:
-        raise BadRegistry(
-            f"registry {where}: holds a table {taken[0]!r} of something else; name another database"
-        )
-
-
 def _run(connection: Connection, where: str, found: str | None) -> None:
     """Lay a new registry out, or bring one of the layout `found` up to today's."""
     from alembic import command
@@ -128,6 +121,10 @@ POSTGRES_FUNCTIONS = (
     "CREATE TRIGGER in_force_forward BEFORE UPDATE ON in_force"
     " FOR EACH ROW EXECUTE FUNCTION registry_forward()",
 )
+POSTGRES_KEEPS = (
+    "CREATE TRIGGER {0}_append_only BEFORE UPDATE OR DELETE OR TRUNCATE ON {0}"
+    " FOR EACH STATEMENT EXECUTE FUNCTION registry_append_only()"
+)
 POINTER_MOVES = "BEGIN SELECT RAISE(ABORT, 'in_force moves by a new decision only'); END"
 SQLITE_POINTER = (
     "CREATE TRIGGER in_force_delete BEFORE DELETE ON in_force"
@@ -153,25 +150,18 @@ def keep_append_only(connection: Connection, names: Iterable[str]) -> None:
     """From now on rows of these tables are neither changed, replaced nor taken away."""
     postgres = connection.dialect.name == "postgresql"
     for name in names:
-        for statement in _postgres(name) if postgres else _sqlite(Base.metadata.tables[name]):
+        for statement in [POSTGRES_KEEPS.format(name)] if postgres else _sqlite(name):
             connection.execute(text(statement))
 
 
-def _postgres(name: str) -> Iterator[str]:
-    yield (
-        f"CREATE TRIGGER {name}_append_only BEFORE UPDATE OR DELETE OR TRUNCATE ON {name}"
-        " FOR EACH STATEMENT EXECUTE FUNCTION registry_append_only()"
-    )
-
-
-def _sqlite(table: Table) -> Iterator[str]:
+def _sqlite(name: str) -> Iterator[str]:
     """SQLite's REPLACE calls no DELETE trigger: what it would collide with is looked for."""
-    name, said = table.name, f"SELECT RAISE(ABORT, '{table.name} is append-only')"
+    said = f"SELECT RAISE(ABORT, '{name} is append-only')"
     for event in ("UPDATE", "DELETE"):
         yield f"CREATE TRIGGER {name}_{event.lower()} BEFORE {event} ON {name} BEGIN {said}; END"
-    taken = " OR ".join(
-        f"({' AND '.join(f'o.{column} = NEW.{column}' for column in key)})" for key in _keys(table)
-    )
+    same = (" AND ".join(f"o.{column} = NEW.{column}" for column in key)
+            for key in _keys(Base.metadata.tables[name]))  # fmt: skip
+    taken = " OR ".join(f"({one})" for one in same)
     yield (
         f"CREATE TRIGGER {name}_replace BEFORE INSERT ON {name}"
         f" WHEN EXISTS (SELECT 1 FROM {name} AS o WHERE {taken}) BEGIN {said}; END"

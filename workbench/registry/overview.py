@@ -30,14 +30,14 @@ _BY_VERDICT: Mapping[str, MachineCondition] = {
     "promoted": "in_tune",
     "structure": "structure",
     "set_aside": "log_bad",
+    "drift": "drifting",
 }
 
 
 def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
     """The machine's state after a log of that verdict ("refused": what was found stays so)."""
     if verdict == "refused":
-        found = _drift(evidence).get("verdict")
-        return {"drift": "drifting", "structure": "structure"}.get(found, "not_judged")  # type: ignore[return-value, arg-type]
+        verdict = str((evidence.get("drift") or {}).get("verdict"))
     return _BY_VERDICT.get(verdict, "not_judged")
 
 
@@ -70,18 +70,10 @@ def with_log(trend: Mapping[str, Sequence[float]], evidence: Mapping[str, Any]) 
     return out
 
 
-def _drift(evidence: Mapping[str, Any]) -> Mapping[str, Any]:
-    found = evidence.get("drift")
-    return found if isinstance(found, Mapping) else {}
-
-
-def _parameters(evidence: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _parameters(evidence: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     """What the drift test gave of each parameter; of older results only of those that moved."""
-    drift = _drift(evidence)
-    found = drift.get("parameters")
-    if found:
-        return list(found)
-    return [
+    drift = evidence.get("drift") or {}
+    return drift.get("parameters") or [
         {**one, "change": (one["after"] - one["before"]) / abs(one["before"])}
         for one in drift.get("moved", ())
         if one.get("before")

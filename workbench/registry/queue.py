@@ -14,20 +14,10 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, and_, delete, func, select
 from sqlalchemy.orm import Session
 
+from workbench.registry import rows
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.overview import summary_heard, summary_tested
-from workbench.registry.rows import (
-    active_version,
-    add_version,
-    decide,
-    judged_now,
-    lock_machine,
-    logs_behind,
-    need_machine,
-    seen,
-    turn,
-)
 from workbench.registry.tables import (
     AttemptRow,
     ClaimRow,
@@ -66,15 +56,15 @@ class Queue:
     def known(self, machine: str) -> dict[tuple[str, int, int], str]:
         """Fingerprints of the logs seen, by file name, size and modification time."""
         query = select(LogRow.file, LogRow.size, LogRow.mtime_ns, LogRow.sha256)
-        rows = self.database.rows(query.where(LogRow.machine == machine))
-        return {(file, size, mtime_ns): sha256 for file, size, mtime_ns, sha256 in rows}
+        found = self.database.rows(query.where(LogRow.machine == machine))
+        return {(file, size, mtime_ns): sha256 for file, size, mtime_ns, sha256 in found}
 
     def announce(self, machine: str, logs: Sequence[SeenLog], *, now: datetime) -> int:
         """How many of the logs are new; they wait from now on."""
         if not logs:
             return 0
         with self.database.writing() as session:
-            lock_machine(session, machine, now)
+            rows.lock_machine(session, machine, now)
             query = select(LogRow.sha256).where(LogRow.machine == machine)
             have = set(session.scalars(query))
             first = {log.sha256: log for log in reversed(logs)}  # of files of one content
@@ -91,16 +81,12 @@ class Queue:
         not waited for: should its worker live on, its result is dropped and made again.
         """
         with self.database.writing() as session:
-            lock_machine(session, machine, now)
+            rows.lock_machine(session, machine, now)
             row = session.get(ClaimRow, machine)
             if row is not None and row.until > now and not _too_late(row, now):
                 return None
             found = Claim(machine, secrets.token_hex(16), owner, now + lease)
-            if row is None:
-                row = ClaimRow(machine=machine)
-                session.add(row)
-            row.token, row.owner, row.until = found.token, owner, found.until
-            row.lease_ms = round(lease / MILLISECOND)
+            session.merge(ClaimRow(**vars(found), lease_ms=round(lease / MILLISECOND)))
             return found
 
     def renew(self, claim: Claim, *, lease: timedelta, now: datetime) -> None:
@@ -127,17 +113,17 @@ class Queue:
         One begun `OFTEN` times comes last: it may be what its workers die of.
         """
         begun = func.count(AttemptRow.id)
-        now = and_(AttemptRow.log_id == LogRow.id, AttemptRow.turn == turn())
+        now = and_(AttemptRow.log_id == LogRow.id, AttemptRow.turn == rows.turn())
         query = (
             select(LogRow, begun)
             .select_from(LogRow)
-            .outerjoin(OutcomeRow, judged_now())
+            .outerjoin(OutcomeRow, rows.judged_now())
             .outerjoin(AttemptRow, now)
             .where(LogRow.machine == machine, OutcomeRow.log_id.is_(None))
             .group_by(LogRow.id)
             .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
         )
-        found = [(seen(row), int(count)) for row, count in self.database.rows(query)]
+        found = [(rows.seen(row), int(count)) for row, count in self.database.rows(query)]
         return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
 
     def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
@@ -165,19 +151,19 @@ class Queue:
         although its answer was lost. Raises LostClaim where another has taken over.
         """
         with self.database.writing() as session:
-            lock_machine(session, claim.machine, now)
+            rows.lock_machine(session, claim.machine, now)
             row, now_turn = _log(session, claim.machine, log)
             done = session.get(OutcomeRow, (row.id, now_turn))
             if done is not None and done.token == claim.token:
                 return _recorded(session, done)
             _hold(session, claim, now)
-            current = active_version(session, claim.machine)
+            current = rows.active_version(session, claim.machine)
             newer = _newer(session, claim.machine, log, order)
             if newer is not None:
                 judgement = _of_older(judgement, log, newer)
             for kind, candidate, reason in _decided(judgement):
-                version, _ = add_version(session, claim.machine, candidate, now)
-                decide(session, kind, version, reason=reason, by=by, now=now,
+                version, _ = rows.add_version(session, claim.machine, candidate, now)
+                rows.decide(session, kind, version, reason=reason, by=by, now=now,
                        evidence=judgement.evidence, log_id=row.id)  # fmt: skip
             done = OutcomeRow(
                 log_id=row.id,
@@ -205,8 +191,8 @@ class Queue:
         excluded. Raises BadRegistry where one is not there or waits anyhow.
         """
         with self.database.writing() as session:
-            need_machine(session, machine, lock=True)
-            query = select(LogRow, OutcomeRow.verdict).join(OutcomeRow, judged_now())
+            rows.need_machine(session, machine, lock=True)
+            query = select(LogRow, OutcomeRow.verdict).join(OutcomeRow, rows.judged_now())
             found = session.execute(query.where(LogRow.machine == machine).order_by(LogRow.id))
             judged = [(row, verdict) for row, verdict in found]
             chosen = [row for row, verdict in judged if not logs and verdict == "set_aside"]
@@ -238,14 +224,14 @@ class Queue:
     def outcomes(self, machine: str) -> tuple[LogOutcome, ...]:
         """Results of a machine's logs, in the order of their files."""
         order = (LogRow.mtime_ns, LogRow.file, LogRow.id, OutcomeRow.turn)
-        rows = self.database.rows(_OUTCOMES.where(LogRow.machine == machine).order_by(*order))
-        return tuple(_outcome(*row) for row in rows)
+        found = self.database.rows(_OUTCOMES.where(LogRow.machine == machine).order_by(*order))
+        return tuple(_outcome(*row) for row in found)
 
     def verdicts(self) -> dict[tuple[str, str], int]:
         """How many logs have each verdict, by machine and verdict."""
         query = (
             select(LogRow.machine, OutcomeRow.verdict, func.count())
-            .join(OutcomeRow, judged_now())
+            .join(OutcomeRow, rows.judged_now())
             .group_by(LogRow.machine, OutcomeRow.verdict)
         )
         return {(name, verdict): count for name, verdict, count in self.database.rows(query)}
@@ -257,7 +243,7 @@ def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLo
         LogRow.machine == machine, LogRow.file == log.file, LogRow.sha256 != log.sha256
     )
     used_before = bool(session.scalar(query))
-    behind = logs_behind(session, machine)
+    behind = rows.logs_behind(session, machine)
     return newest_of_later(log, behind, "time" if used_before else order)
 
 
@@ -274,18 +260,17 @@ def _of_older(judgement: Judgement, log: SeenLog, newer: SeenLog) -> Judgement:
     )
 
 
-def _named(machine: str, name: str, rows: Sequence[LogRow]) -> list[LogRow]:
+def _named(machine: str, name: str, logs: Sequence[LogRow]) -> list[LogRow]:
     """The logs of that file name, or the one whose fingerprint begins so; raises BadRegistry."""
-    own = [row for row in rows if row.file == name]
-    if own or len(name) < SHORTEST:
-        found = own
-    else:
-        found = [row for row in rows if row.sha256.startswith(name)]
-        if len(found) > 1:
-            raise BadRegistry(
-                f"{machine}: {len(found)} logs have a fingerprint that begins with {name!r}; give"
-                " more of it, or the file's name"
-            )
+    found = [row for row in logs if row.file == name]
+    if found:
+        return found
+    found = [row for row in logs if len(name) >= SHORTEST and row.sha256.startswith(name)]
+    if len(found) > 1:
+        raise BadRegistry(
+            f"{machine}: {len(found)} logs have a fingerprint that begins with {name!r}; give"
+            " more of it, or the file's name"
+        )
     if not found:
         raise BadRegistry(
             f"{machine}: no log {name!r} with a result; give a file's name or at least {SHORTEST}"
@@ -310,7 +295,7 @@ def _too_late(row: ClaimRow, now: datetime) -> bool:
 
 def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
     """The claim's row, locked; raises LostClaim where it is another's by now."""
-    lock_machine(session, claim.machine, now)
+    rows.lock_machine(session, claim.machine, now)
     row = session.scalar(select(ClaimRow).where(_own(claim)))
     if row is None:
         raise LostClaim(
@@ -326,8 +311,8 @@ def _own(claim: Claim) -> ColumnElement[bool]:
 
 def _log(session: Session, machine: str, log: SeenLog) -> tuple[LogRow, int]:
     """The log's row, and how often it was reopened."""
-    query = select(LogRow, turn()).where(LogRow.machine == machine, LogRow.sha256 == log.sha256)
-    row, reopened = session.execute(query).one()
+    own = (LogRow.machine == machine, LogRow.sha256 == log.sha256)
+    row, reopened = session.execute(select(LogRow, rows.turn()).where(*own)).one()
     return row, reopened
 
 
@@ -344,4 +329,4 @@ def _recorded(session: Session, done: OutcomeRow) -> LogOutcome:
 
 
 def _outcome(row: OutcomeRow, log: LogRow, number: int | None) -> LogOutcome:
-    return of_row(LogOutcome, row, machine=log.machine, log=seen(log), number=number)
+    return of_row(LogOutcome, row, machine=log.machine, log=rows.seen(log), number=number)

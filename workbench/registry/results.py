@@ -1,7 +1,7 @@
 """A machine's results as its page shows them: the last ones, their way to the webhook, and the axis
 test of the newest against those before it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, NamedTuple
@@ -118,20 +118,25 @@ def newest_lights(logs: Sequence[TestedLog]) -> tuple[str, Sequence[AxisLine]]:
     past = history(list(reversed(older)))
     limits = limits_of({name: [value for _, value in every] for name, every in past.items()})
     found = {}
-    for each in newest.parameters:
-        name = NAMED.get(str(each["name"]), str(each["name"]))
-        if name not in MEANING_OF:
-            continue
-        sign = -1.0 if name == "F_sn" else 1.0
-        value, low, high = (sign * float(each.get(key) or each["after"])
-                            for key in ("after", "low", "high"))  # fmt: skip
-        low, high = min(low, high), max(low, high)
+    for name, (unit, value, low, high) in by_quantity(newest.parameters).items():
         allowed = limits.get(name)
         light = light_of(value, low, high, allowed) if allowed else ""
-        found[name] = AxisLine(
-            MEANING_OF[name], str(each.get("unit", "")), value, low, high, allowed, light
-        )
+        found[name] = AxisLine(MEANING_OF[name], unit, value, low, high, allowed, light)
     return newest.file, [found[name] for name in MEANING_OF if name in found]
+
+
+def by_quantity(
+    parameters: Iterable[Mapping[str, Any]],
+) -> dict[str, tuple[str, float, float, float]]:
+    """Unit, value and ends of the interval of what the axis test looks at, by quantity."""
+    out = {}
+    for each in parameters:
+        name = NAMED.get(str(each["name"]), str(each["name"]))
+        if name in MEANING_OF:
+            sign, value = -1.0 if name == "F_sn" else 1.0, float(each["after"])
+            ends = sorted(sign * float(each.get(key) or value) for key in ("low", "high"))
+            out[name] = (str(each.get("unit", "")), sign * value, ends[0], ends[1])
+    return out
 
 
 def history(logs: Sequence[TestedLog]) -> dict[str, list[tuple[float, float]]]:

@@ -8,20 +8,9 @@ from typing import Any, Self, get_args
 from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
+from workbench.registry import rows
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
-from workbench.registry.rows import (
-    active_version,
-    add_version,
-    decide,
-    decisions,
-    judged_now,
-    lock_machine,
-    need_machine,
-    numbered,
-    version_value,
-    versions,
-)
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
@@ -69,29 +58,29 @@ class Registry:
                 f"machine {machine!r}: a name needed that can be a folder's, as bench-a"
             )
         with self.database.writing() as session:
-            lock_machine(session, machine, now)
-            row, new = add_version(session, machine, candidate, now)
+            rows.lock_machine(session, machine, now)
+            row, new = rows.add_version(session, machine, candidate, now)
             if new:
-                decide(session, "added", row, reason=reason, by=by, now=now)
-            return version_value(session, row)
+                rows.decide(session, "added", row, reason=reason, by=by, now=now)
+            return rows.version_value(session, row)
 
     def promote(
         self, machine: str, number: int, *, reason: str, by: str, now: datetime
     ) -> Decision:
         """Activate a version; raises BadRegistry where it already is, or is not there."""
         with self.database.writing() as session:
-            need_machine(session, machine, lock=True)
-            row = numbered(session, machine, number)
-            current = active_version(session, machine)
+            rows.need_machine(session, machine, lock=True)
+            row = rows.numbered(session, machine, number)
+            current = rows.active_version(session, machine)
             if current is not None and current.id == row.id:
                 raise BadRegistry(f"{machine}: version {number} is active already")
-            made = decide(session, "promoted", row, reason=reason, by=by, now=now)
-            return decisions(session, DecisionRow.id == made.id)[0]
+            made = rows.decide(session, "promoted", row, reason=reason, by=by, now=now)
+            return rows.decisions(session, DecisionRow.id == made.id)[0]
 
     def rollback(self, machine: str, *, reason: str, by: str, now: datetime) -> Decision:
         """Activate the version before the present one; a second call goes further."""
         with self.database.writing() as session:
-            need_machine(session, machine, lock=True)
+            rows.need_machine(session, machine, lock=True)
             earlier = self._earlier(session, machine)
             if len(earlier) < 2:
                 have = "one version" if earlier else "no version"
@@ -99,8 +88,8 @@ class Registry:
                     f"{machine}: {have} has been active, so there is none to go back to"
                 )
             row = session.get_one(VersionRow, earlier[-2])
-            made = decide(session, "rolled_back", row, reason=reason, by=by, now=now)
-            return decisions(session, DecisionRow.id == made.id)[0]
+            made = rows.decide(session, "rolled_back", row, reason=reason, by=by, now=now)
+            return rows.decisions(session, DecisionRow.id == made.id)[0]
 
     def machines(self) -> tuple[MachineState, ...]:
         """Every machine by name."""
@@ -110,34 +99,34 @@ class Registry:
     def machine(self, name: str) -> MachineState:
         """One machine; raises BadRegistry where there is none of that name."""
         with self.database.reading() as session:
-            need_machine(session, name)
+            rows.need_machine(session, name)
             (found,) = _states(session, name)
             return found
 
     def active_version(self, machine: str) -> Version | None:
         """The active version; None where nothing has been promoted."""
         with self.database.reading() as session:
-            row = active_version(session, machine)
-            return None if row is None else version_value(session, row)
+            row = rows.active_version(session, machine)
+            return None if row is None else rows.version_value(session, row)
 
     def version(self, machine: str, number: int) -> Version:
         """The version of that number."""
         with self.database.reading() as session:
-            return version_value(session, numbered(session, machine, number))
+            return rows.version_value(session, rows.numbered(session, machine, number))
 
     def versions(self, machine: str) -> tuple[Version, ...]:
         """Every version of a machine, in the order of their numbers."""
         with self.database.reading() as session:
-            need_machine(session, machine)
-            return tuple(versions(session, VersionRow.machine == machine))
+            rows.need_machine(session, machine)
+            return tuple(rows.versions(session, VersionRow.machine == machine))
 
     def decisions(self, machine: str | None = None) -> tuple[Decision, ...]:
         """Decisions of one machine or of all, in the order in which they were made."""
         where = () if machine is None else (DecisionRow.machine == machine,)
         with self.database.reading() as session:
             if machine is not None:
-                need_machine(session, machine)
-            return tuple(decisions(session, *where))
+                rows.need_machine(session, machine)
+            return tuple(rows.decisions(session, *where))
 
     def document(self, version: Version, kind: Kind) -> dict[str, Any]:
         """A version's document as model.json and the others hold it; raises BadRegistry if none."""
@@ -158,12 +147,9 @@ class Registry:
     def _earlier(self, session: Session, machine: str) -> Sequence[int]:
         """Active versions one after the other, the present one last; a rollback takes one off."""
         stack: list[int] = []
-        rows = session.execute(
-            select(DecisionRow.kind, DecisionRow.version_id)
-            .where(DecisionRow.machine == machine, DecisionRow.kind.in_(MOVES))
-            .order_by(DecisionRow.id)
-        )
-        for kind, version in rows:
+        query = select(DecisionRow.kind, DecisionRow.version_id).order_by(DecisionRow.id)
+        own = (DecisionRow.machine == machine, DecisionRow.kind.in_(MOVES))
+        for kind, version in session.execute(query.where(*own)):
             if kind == "promoted":
                 stack.append(version)
             else:
@@ -179,13 +165,13 @@ def _states(session: Session, name: str | None = None) -> tuple[MachineState, ..
     pointers = select(ActiveVersionRow).where(ActiveVersionRow.machine.in_(machines)).subquery()
     active = {
         one.machine: one
-        for one in versions(session, VersionRow.id.in_(select(pointers.c.version_id)))
+        for one in rows.versions(session, VersionRow.id.in_(select(pointers.c.version_id)))
     }
     since = {
         one.machine: one
-        for one in decisions(session, DecisionRow.id.in_(select(pointers.c.decision_id)))
+        for one in rows.decisions(session, DecisionRow.id.in_(select(pointers.c.decision_id)))
     }
-    judged = _of_machine(LogRow).join(OutcomeRow, judged_now())
+    judged = _of_machine(LogRow).join(OutcomeRow, rows.judged_now())
     counted = machines.add_columns(
         _of_machine(VersionRow).scalar_subquery(),
         _of_machine(LogRow).scalar_subquery(),
