@@ -28,23 +28,16 @@ STORED_PARAMETERS = (*NAMES, "k1", "k2", "k_a")
 FIT = ("chi_square", "adequate", "force_rms")
 PART_SCHEMA = pa.schema(
     [
-        ("machine", pa.string()),
-        ("log", pa.string()),
-        ("sha256", pa.string()),
-        ("size", pa.int64()),
-        ("mtime_ns", pa.int64()),
-        ("verdict", pa.string()),
-        ("reason", pa.string()),
+        *((name, pa.string()) for name in ("machine", "log", "sha256")),
+        *((name, pa.int64()) for name in ("size", "mtime_ns")),
+        *((name, pa.string()) for name in ("verdict", "reason")),
         ("against_version", pa.int64()),
         *((name + end, pa.float64()) for name in STORED_PARAMETERS for end in ("", "_sd")),
         ("chi_square", pa.float64()),
         ("adequate", pa.bool_()),
-        ("force_rms", pa.float64()),
-        ("duration", pa.float64()),
-        ("seconds", pa.float64()),
+        *((name, pa.float64()) for name in ("force_rms", "duration", "seconds")),
         ("worker_memory", pa.int64()),
-        ("versions", pa.string()),
-        ("model", pa.string()),
+        *((name, pa.string()) for name in ("versions", "model")),
         ("at", pa.timestamp("us", tz="UTC")),
     ]
 )
@@ -131,13 +124,14 @@ class ResultStore:
         """Write the rows that wait as a part; the journal keeps what is no row yet."""
         if self._rows:
             last = max((int(p.stem[5:]) for p in self._parts.glob("part-*.parquet")), default=0)
-            _write_whole(self._parts / f"part-{last + 1:06d}.parquet", self._rows)
+            buffer = pa.BufferOutputStream()
+            pq.write_table(pa.Table.from_pylist(self._rows, PART_SCHEMA), buffer)
+            _write_whole(self._parts / f"part-{last + 1:06d}.parquet", buffer.getvalue())
             self._rows, self._oldest = [], None
         self._journal.close()
-        fresh = self.folder / f"{JOURNAL_FILE}.tmp"
-        _write(fresh, "".join(self._noted.values()).encode())
-        fresh.replace(self.folder / JOURNAL_FILE)
-        self._journal = (self.folder / JOURNAL_FILE).open("a+", encoding="utf-8")
+        journal = self.folder / JOURNAL_FILE
+        _write_whole(journal, "".join(self._noted.values()).encode())
+        self._journal = journal.open("a+", encoding="utf-8")
 
 
 def row_of(result: Result, now: datetime) -> dict[str, Any]:
@@ -146,22 +140,14 @@ def row_of(result: Result, now: datetime) -> dict[str, Any]:
     runs = model.get("log") or ()
     numbers = {**model.get("friction", {}), **(model.get("actuator") or {})}
     row: dict[str, Any] = {
-        "machine": log.machine,
-        "log": log.name,
-        "sha256": result.sha256,
-        "size": log.size,
-        "mtime_ns": log.mtime_ns,
-        "verdict": result.verdict,
-        "reason": result.reason,
-        "against_version": result.against,
+        "machine": log.machine, "log": log.name, "sha256": result.sha256, "size": log.size,
+        "mtime_ns": log.mtime_ns, "verdict": result.verdict, "reason": result.reason,
+        "against_version": result.against, "seconds": result.seconds,
+        "worker_memory": result.memory, "versions": json.dumps(dict(result.versions)),
         "duration": sum(run["duration"] for run in runs) if runs else None,
-        "seconds": result.seconds,
-        "worker_memory": result.memory,
-        "versions": json.dumps(dict(result.versions)),
-        "model": json.dumps(strict(model), allow_nan=False) if model else None,
-        "at": now,
-    }
-    row |= {key: (model.get("fit") or {}).get(key) for key in FIT}
+        "model": json.dumps(strict(model), allow_nan=False) if model else None, "at": now,
+        **{key: (model.get("fit") or {}).get(key) for key in FIT},
+    }  # fmt: skip
     for name in STORED_PARAMETERS:
         found: Mapping[str, Any] = numbers.get(name) or {}
         row[name], row[f"{name}_sd"] = found.get("value"), found.get("sd")
@@ -178,23 +164,16 @@ def _keys(path: Path) -> list[tuple[str, int, int]]:
     return [(row["log"], row["size"], row["mtime_ns"]) for row in table.to_pylist()]
 
 
-def _write_whole(path: Path, rows: list[dict[str, Any]]) -> None:
-    """The part under its name once all of it is on the disk."""
+def _write_whole(path: Path, content: Any) -> None:
+    """The bytes under the file's name once all of them are on the disk."""
     part = path.with_name(f".{path.name}.tmp")
-    buffer = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_pylist(rows, PART_SCHEMA), buffer)
-    _write(part, buffer.getvalue())
+    with part.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
     part.replace(path)
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)
     finally:
         os.close(folder)
-
-
-def _write(path: Path, content: Any) -> None:
-    """The bytes in the file, on the disk once this returns."""
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())

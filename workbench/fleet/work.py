@@ -1,6 +1,5 @@
 """What a worker does with one log: read it there, identify or test it, and return the result."""
 
-import hashlib
 import resource
 import sys
 import time
@@ -12,7 +11,7 @@ from tempfile import TemporaryDirectory
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
 from workbench.documents.model_file import model_document
 from workbench.documents.reading import versions
-from workbench.files import CARD_FILE
+from workbench.files import CARD_FILE, sha256_of
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result
 from workbench.jobs.judge import Chain
@@ -53,9 +52,7 @@ def _result(item: Item, path: Path, card: Path) -> Result:
     log = item.log
     blank = Result(log, "set_aside", "", against=item.version.number if item.version else None)
     try:
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        blank = replace(blank, sha256=digest)
+        blank = replace(blank, sha256=sha256_of(path))
         made = _identified if item.model is None else _judged
         return made(item, path, card, blank)
     except NotIdentifiable as error:

@@ -64,12 +64,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
             Mount("/static/assets", StaticFiles(directory=ASSETS)),
             Mount("/static", StaticFiles(directory=HERE / "static")),
         ],
-        exception_handlers={
-            HTTPException: _http_error,
-            BadRegistry: _not_there,
-            RegistryAway: _away,
-            UserError: _user_error,
-        },
+        exception_handlers={HTTPException: _said, UserError: _said},
         lifespan=life,
     )  # fmt: skip
     app.state.server, app.state.moment = Server(settings, registry, helpers), Moment()
@@ -78,28 +73,15 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
     return Guard(health.Counted(app), settings)
 
 
-async def _http_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    return await _said(request, error.status_code, error.detail, dict(error.headers or {}))
-
-
-async def _not_there(request: Request, error: Exception) -> Response:
-    reading = request.method in ("GET", "HEAD")
-    return await _said(request, 404 if reading else 400, str(error))
-
-
-async def _user_error(request: Request, error: Exception) -> Response:
-    return await _said(request, 400, str(error))
-
-
-async def _away(request: Request, error: Exception) -> Response:
-    return await _said(request, 503, str(error), {"Retry-After": "10"})
-
-
-async def _said(
-    request: Request, status: int, said: str, headers: dict[str, str] | None = None
-) -> Response:
+async def _said(request: Request, error: Exception) -> Response:
     """One line, as the one who asks takes it: a page, a part of one, or JSON."""
+    status, said, headers = 400, str(error), dict[str, str]()
+    if isinstance(error, HTTPException):
+        status, said, headers = error.status_code, error.detail, dict(error.headers or {})
+    elif isinstance(error, RegistryAway):
+        status, headers = 503, {"Retry-After": "10"}
+    elif isinstance(error, BadRegistry) and request.method in ("GET", "HEAD"):
+        status = 404
     if "application/json" in request.headers.get("accept", ""):
         return JSONResponse({"error": said}, status, headers)
     if request.headers.get("hx-request"):
@@ -107,7 +89,7 @@ async def _said(
     visitor = await run_in_threadpool(_known, request)
     title = TITLES.get(status, "Something is wrong")
     page = Asked(request, visitor).show("error", status=status, title=title, said=said)
-    page.headers.update(headers or {})
+    page.headers.update(headers)
     return page
 
 

@@ -3,7 +3,6 @@
 A file's name on the page is a text alone; on the disk it is made of letters that no path uses.
 """
 
-import hashlib
 import re
 import secrets
 import shutil
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from identification.errors import BadLog
-from workbench.files import CARD_FILE, LOGS
+from workbench.files import CARD_FILE, LOGS, sha256_of
 from workbench.output import write_whole
 from workbench.registry.errors import BadRegistry
 
@@ -24,7 +23,6 @@ ENDINGS = (
     ".mdf", ".mf4", ".mcap", ".ulg", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods",
 )  # fmt: skip
 RESULT_FILE, CHARTS_FILE = "result.json", "charts.html"
-COPIED_AT_ONCE = 1 << 20
 LONGEST_FILE_NAME = 80
 _ID = re.compile(r"[0-9a-f]{16}")
 _ODD = re.compile(r"[^A-Za-z0-9_.-]+")
@@ -69,11 +67,9 @@ class Drop:
         path = part / LOG_FOLDER / name
         path.parent.mkdir(parents=True)
         try:
-            with path.open("w+b") as file:
-                shutil.copyfileobj(content, file, COPIED_AT_ONCE)
-                size = file.tell()
-                file.seek(0)
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
+            with path.open("wb") as file:
+                shutil.copyfileobj(content, file)
+            size, digest = path.stat().st_size, sha256_of(path)
             if size == 0:
                 raise BadLog(f"{name}: is empty")
             part.rename(self.folder)

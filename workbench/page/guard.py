@@ -45,7 +45,8 @@ class Guard:
             await PlainTextResponse(said, 421)(scope, receive, _with_headers(send, scope))
             return
         below = _below(scope, self._settings.prefix)
-        most = self._settings.most_bytes if _path(below) == UPLOAD_PATH else FORM_BYTES
+        dropping = str(below["path"]).rstrip("/") == UPLOAD_PATH
+        most = self._settings.most_bytes if dropping else FORM_BYTES
         declared = headers.get("content-length", "0")
         if not declared.isdigit() or int(declared) > most + FORM_BYTES:
             refusal = PlainTextResponse(_too_large_text(most), 413, {"Connection": "close"})
@@ -86,10 +87,6 @@ def _below(scope: Scope, prefix: str) -> Scope:
     out["path"] = (path[len(prefix) :] or "/") if inside else path
     out["root_path"] = ""
     return out
-
-
-def _path(scope: Scope) -> str:
-    return str(scope["path"]).rstrip("/")
 
 
 def _with_headers(send: Send, scope: Scope) -> Send:

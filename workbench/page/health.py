@@ -1,12 +1,10 @@
 """Whether the page and its registry are well, and figures of both for Prometheus."""
 
 import time
-from collections.abc import Iterator
+from contextlib import suppress
 
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram
 from prometheus_client import generate_latest as written
-from prometheus_client.core import GaugeMetricFamily
-from prometheus_client.registry import Collector
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
@@ -16,10 +14,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from workbench.jobs.metrics import PREFIX, MachineFigures
 from workbench.page.asked import Asked, Server
 from workbench.page.visitors import reading
-from workbench.registry.bench import Bench
 from workbench.registry.errors import RegistryAway
 from workbench.registry.overview import any_machine
-from workbench.registry.store import Registry
 
 REQUESTS = CollectorRegistry()
 ANSWERED = Counter(
@@ -47,29 +43,13 @@ class Counted:
 
         async def noted(message: Message) -> None:
             if message["type"] == "http.response.start":
-                ANSWERED.labels(_method(scope), str(message["status"])).inc()
+                # What is none of the usual methods would make figures without end.
+                method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST") else "other"
+                ANSWERED.labels(method, str(message["status"])).inc()
                 SECONDS_TAKEN.observe(time.perf_counter() - begun)
             await send(message)
 
         await self._app(scope, receive, noted)
-
-
-class TaskFigures(Collector):
-    """How many tasks the page has in each state."""
-
-    def __init__(self, registry: Registry) -> None:
-        self._bench = Bench(registry.database)
-
-    def collect(self) -> Iterator[GaugeMetricFamily]:
-        """The figure; nothing where the registry is away, which its own figures show."""
-        out = GaugeMetricFamily(f"{PREFIX}_page_tasks", "Tasks by state.", labels=["state"])
-        try:
-            counts = self._bench.counts()
-        except RegistryAway:
-            return
-        for state, count in sorted(counts.items()):
-            out.add_metric([state], count)
-        yield out
 
 
 async def health(request: Request) -> Response:
@@ -86,13 +66,12 @@ def metrics(asked: Asked) -> Response:
     """All figures in Prometheus' text format."""
     own = CollectorRegistry(auto_describe=False)
     own.register(MachineFigures(asked.registry))
-    own.register(TaskFigures(asked.registry))
+    with suppress(RegistryAway):  # which its own figures show
+        counts = asked.bench.counts()
+        tasks = Gauge(f"{PREFIX}_page_tasks", "Tasks by state.", ["state"], registry=own)
+        for state, count in sorted(counts.items()):
+            tasks.labels(state).set(count)
     return Response(written(own) + written(REQUESTS), media_type=CONTENT_TYPE_LATEST)
-
-
-def _method(scope: Scope) -> str:
-    """The method; what is none of the usual ones would make figures without end."""
-    return scope["method"] if scope["method"] in ("GET", "HEAD", "POST") else "other"
 
 
 HEALTH_ROUTES = [Route("/health", health), Route("/metrics", reading(metrics))]

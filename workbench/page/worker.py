@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -37,6 +37,12 @@ class _Progress:
 
     share: float = 0.0
     stage: str = ""
+
+    def advance(self, step: float) -> None:
+        self.share = min(self.share + step, 1.0)
+
+    def describe(self, words: str) -> None:
+        self.stage = words
 
 
 class NotOurs(BaseException):
@@ -91,8 +97,8 @@ def _made(
     task, files = claim.task, Drop(settings.root, claim.task.upload)
     try:
         work = Work(task.kind, files.log, files.card, files.results(task.id))
-        with _beating(bench, claim) as (advance, describe):
-            return "done", done(work, course_of(task.kind, advance, describe))
+        with _beating(bench, claim) as state:
+            return "done", done(work, course_of(task.kind, state.advance, state.describe))
     except UserError as error:
         return "failed", without_path(str(error), [files.folder / LOG_FOLDER / "log", files.card])
     except (OSError, MemoryError) as error:
@@ -103,17 +109,9 @@ def _made(
 
 
 @contextmanager
-def _beating(
-    bench: Bench, claim: WorkClaim
-) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+def _beating(bench: Bench, claim: WorkClaim) -> Iterator[_Progress]:
     """Within the block the task's progress is written, and NotOurs raised once it is not ours."""
     state = _Progress()
-
-    def advance(step: float) -> None:
-        state.share = min(state.share + step, 1.0)
-
-    def describe(words: str) -> None:
-        state.stage = words
 
     def beat() -> None:
         bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=clock())
@@ -124,7 +122,7 @@ def _beating(
             os._exit(STUBBORN_STATUS)
 
     with renewed(beat, QUEUE_POLL, stop):
-        yield advance, describe
+        yield state
 
 
 def _raise(_number: int, _frame: FrameType | None) -> None:
