@@ -53,7 +53,8 @@ class Chain:
         rng = np.random.default_rng(self.seed)
         state = (task.previous or {}).get("state", {})
         found = self.drift(champion.model, sources, rng, state)
-        evidence = {"drift": _without_state(found), "state": found.state}
+        drift = {key: value for key, value in asdict(found).items() if key != "state"}
+        evidence = {"drift": drift, "state": found.state}
         if found.verdict == "structure":
             return self._traced(champion, sources, found, evidence)
         if found.verdict != "drift":
@@ -83,13 +84,11 @@ class Chain:
             return Judgement("structure", f"{found.reason}; trace: {error}", evidence=evidence)
         evidence = {**evidence, "trace": _summary(traced)}
         reason = f"{found.reason}; {trace_sentence(traced)}"
-        made: tuple[Contender | None, Candidate | None, str]
-        if traced.trace.verdict == "effect":
-            made = self._designed(traced.model)
-        elif traced.trace.verdict == "none":  # other parameters do, which the test did not find
-            made = self._made(train)
-        else:
+        if traced.trace.verdict not in ("effect", "none"):
             return Judgement("structure", reason, evidence=evidence)
+        # "none": other parameters do, which the test did not find.
+        effect = traced.trace.verdict == "effect"
+        made = self._designed(traced.model) if effect else self._made(train)
         challenger, candidate, refused = made
         if challenger is None or challenger.design is None:
             return Judgement("refused", f"{reason}; {refused}", candidate, evidence)
@@ -111,10 +110,8 @@ class Chain:
         reason = f"{said}; {contest.reason}"
         if contest.won:
             return Judgement("promoted", reason, candidate, evidence)
-        model_alone = (
-            self._with_active_controllers(champion, challenger) if contest.model_won else None
-        )
-        if model_alone is None or candidate is None:
+        model_alone = contest.model_won and self._with_active_controllers(champion, challenger)
+        if not model_alone or candidate is None:
             return Judgement("refused", reason, candidate, evidence)
         stays = f"{reason}; so the model is replaced and the controllers stay"
         return Judgement("promoted", stays, model_alone, evidence, (candidate, reason))
@@ -128,12 +125,8 @@ class Chain:
         """
         if champion.design is None:
             return None
-        fresh = (
-            champion.design.compensator
-            if challenger.design is None
-            else (challenger.design.compensator)
-        )
-        made = replace(champion.design, compensator=fresh)
+        fresh = challenger.design or champion.design
+        made = replace(champion.design, compensator=fresh.compensator)
         model, rng = challenger.model, np.random.default_rng(self.seed)
         checked, _ = validate(model, made, rng)
         if not checked.passed:
@@ -169,8 +162,7 @@ class Chain:
         candidate = Candidate(
             model_document(model), design_document(made), validation_document(checked)
         )
-        missed = checked.figures[checked.judged]["model"].missed
-        refused = "; ".join(missed) if missed else ""
+        refused = "; ".join(checked.figures[checked.judged]["model"].missed)
         if made.recommended == "none":
             refused = "no controller keeps its goals"
         return Contender(model, made), candidate, refused
@@ -217,7 +209,3 @@ def _contender(task: Task, library: Library | None) -> Contender:
     except BadModel as error:
         raise BadModel(f"{task.machine}: active version: {error}") from None
     return Contender(found, made)
-
-
-def _without_state(found: Drift) -> dict[str, Any]:
-    return {key: value for key, value in asdict(found).items() if key != "state"}

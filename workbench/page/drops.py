@@ -10,7 +10,7 @@ from starlette.routing import Route
 
 from identification.errors import BadCard, UserError
 from workbench.jobs.options import clock
-from workbench.page import log_views
+from workbench.page import looks
 from workbench.page.asked import Asked, download
 from workbench.page.card_form import (
     FORM_SIGNALS,
@@ -46,7 +46,7 @@ def drop(asked: Asked) -> Response:
     files = asked.drop_of(secrets.token_hex(8))
     size, digest = files.store(file_name(given.filename), given.file)
     try:
-        asked.server.helpers(log_views.refuse_no_log, files.log)
+        asked.server.helpers(looks.refuse_no_log, files.log)
     except UserError:
         shutil.rmtree(files.folder, ignore_errors=True)
         raise
@@ -67,7 +67,7 @@ def columns(asked: Asked) -> Response:
     """Every column over time, before anything is known of it; the card is looked for after it."""
     upload, path = _upload(asked), asked.drop.log
     try:
-        html, rows = asked.server.helpers(log_views.columns_chart, path, upload.file)
+        html, rows = asked.server.helpers(looks.columns_chart, path, upload.file)
         response = asked.show("chart", html=html, said=f"{rows} rows")
     except UserError as error:
         response = _said(asked, str(error))
@@ -106,7 +106,7 @@ def picture(asked: Asked) -> Response:
     if not place.exists():
         return _said(asked, "The card does not read the log yet.", bad=False)
     try:
-        html = asked.server.helpers(log_views.doctor_chart, path, place)
+        html = asked.server.helpers(looks.doctor_chart, path, place)
     except UserError as error:
         return _said(asked, str(error))
     return asked.show("chart", html=html, said="")
@@ -118,7 +118,7 @@ def words(asked: Asked) -> Response:
     if not place.exists():
         return _said(asked, "", bad=False)
     try:
-        found = asked.server.helpers.slowly(log_views.doctor_words, path, place)
+        found = asked.server.helpers.slowly(looks.doctor_words, path, place)
     except UserError as error:
         return _said(asked, str(error))
     return asked.show("words", found=found)
@@ -147,9 +147,9 @@ def _proposed(asked: Asked) -> tuple[CardForm, str]:
     """The proposal as a form and why there is none, as far as that is known."""
     path, upload, helpers = asked.drop.log, _upload(asked), asked.server.helpers
     try:
-        return form_of(helpers.slowly(log_views.proposal, path), upload.file), ""
+        return form_of(helpers.slowly(looks.proposal, path), upload.file), ""
     except UserError as error:
-        return empty_form(helpers(log_views.headers, path), path.stem), str(error)
+        return empty_form(helpers(looks.headers, path), path.stem), str(error)
 
 
 def _store_card(asked: Asked, form: CardForm) -> str:
@@ -158,7 +158,7 @@ def _store_card(asked: Asked, form: CardForm) -> str:
     part = place.with_name(f"new-{place.name}")
     try:
         part.write_text(form.text(path.name), encoding="utf-8")
-        refused = asked.server.helpers(log_views.card_refused, part, path)
+        refused = asked.server.helpers(looks.card_refused, part, path)
         if refused:
             return refused.replace(part.name, "the card")
         part.replace(place)

@@ -16,10 +16,10 @@ from starlette.routing import Route
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.jobs.options import clock
-from workbench.page import version_views
+from workbench.page import looks
 from workbench.page.asked import Asked, download
+from workbench.page.looks import EXPORTS
 from workbench.page.pages import part
-from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
@@ -67,7 +67,7 @@ def compare(asked: Asked) -> Response:
         if found["design"] is not None
     ]
     try:
-        loops = asked.server.helpers(version_views.loops, designs[: len(set(numbers))])
+        loops = asked.server.helpers(looks.loops, designs[: len(set(numbers))])
     except UserError as error:
         return asked.show("said", said=str(error), bad=True)
     return asked.show("compare", lines=difference(before, after), numbers=numbers, loops=loops)
@@ -76,7 +76,7 @@ def compare(asked: Asked) -> Response:
 def report(asked: Asked) -> Response:
     """The report of a version's design."""
     design = json.dumps(asked.registry.document(_version(asked), "design"))
-    return report_response(asked.server.helpers(version_views.design_page, design))
+    return report_response(asked.server.helpers(looks.design_page, design))
 
 
 def stored_page(asked: Asked) -> Response:
@@ -103,7 +103,7 @@ def export(asked: Asked) -> Response:
     if target not in EXPORTS:
         raise HTTPException(404, f"The target is one of {', '.join(EXPORTS)}.")
     design = json.dumps(asked.registry.document(_version(asked), "design"))
-    files = asked.server.helpers(version_views.export_files, design, target)
+    files = asked.server.helpers(looks.export_files, design, target)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

@@ -76,25 +76,18 @@ class Doorkeeper:
 
     def visitor(self, request: Request, *, to_change: bool) -> Visitor:
         """Who asks; raises HTTPException where the token is none, or too many were tried."""
-        request.state.visitor = Visitor()  # until more is known, also for an error's page
-        request.state.visitor = self._visitor(request, to_change)
-        found: Visitor = request.state.visitor
-        return found
-
-    def _visitor(self, request: Request, to_change: bool) -> Visitor:
-        secret = bearer(request) or request.cookies.get(TOKEN_COOKIE, "")
         nobody = Visitor(role="read" if self._open else None)
-        if not secret:
-            return nobody
-        if not to_change:
-            at, found = self._known.get(secret, (0.0, nobody))
-            if time.monotonic() - at < SEEN_FOR:
-                return found
-        now_known = self.known(secret, address(request))
-        if now_known is None and bearer(request):
+        request.state.visitor = Visitor()  # until more is known, also for an error's page
+        in_header = bearer(request)
+        secret = in_header or request.cookies.get(TOKEN_COOKIE, "")
+        at, found = self._known.get(secret, (-SEEN_FOR, None))
+        if to_change or time.monotonic() - at >= SEEN_FOR:
+            found = self.known(secret, address(request)) if secret else None
+        if found is None and in_header:
             raise HTTPException(401, "This token is none, or was revoked.")
-        request.state.stale = now_known is None
-        return now_known or nobody
+        request.state.stale = found is None and secret != ""
+        request.state.visitor = found or nobody
+        return found or nobody
 
     def known(self, secret: str, where: str) -> Visitor | None:
         """The visitor of that token; None where it is none. Raises HTTPException after too many."""

@@ -1,11 +1,14 @@
-"""What the page asks of a log, as functions that run in a process of their own.
+"""What the page asks of a log and of a version's documents, as functions that run in a process of
+their own.
 
 Each takes paths and texts and gives plain values; errors of the user are `UserError`.
 """
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,13 +20,24 @@ from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
     from identification.arrays import Array
+    from workbench.documents.design import Design
     from workbench.documents.model import Identifiable
     from workbench.logs.unknown import UnknownLog
+    from workbench.report.chart import Colour, LineStyle
     from workbench.steps.first_card.proposal import Proposal
 
 MOST_COLUMNS = 12  # that the first picture shows
 FIRST_POINTS = 8000  # of each column's line, every peak kept
 LOGS_REMEMBERED = 1
+STYLES_OF: "Mapping[str, LineStyle]" = {"rst": "line", "pid": "dashed", "p-pi": "dotted"}
+EXPORTS = {
+    "c": "C99",
+    "st": "Structured Text",
+    "plcopen": "PLCopen XML",
+    "fmu": "FMU 3.0",
+    "json": "JSON",
+    "mat": "MAT",
+}
 
 
 class BadView(UserError):
@@ -168,3 +182,70 @@ def _clock(found: "UnknownLog") -> "tuple[Array, str, int | None]":
 def _label(one: Any) -> str:
     name = one.header or f"column {one.number}"
     return f"{name} [{one.unit_below}]" if one.unit_below else name
+
+
+@dataclass(frozen=True)
+class LoopsFound:
+    """Designs side by side: margins as a table, and the step response of each as HTML."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    chart: str
+    said: Sequence[str]
+
+
+def export_files(design: str, target: str) -> dict[str, bytes]:
+    """The files of the target, by name, of a design's document as text; raises UserError."""
+    from workbench.export.exported import exported
+    from workbench.export.targets import writers
+
+    made = writers(datetime.now(UTC))[target](exported(_design(design)))
+    return {
+        name: content.encode("utf-8") if isinstance(content, str) else bytes(content)
+        for name, content in made.items()
+    }
+
+
+def design_page(design: str) -> str:
+    """The report of a design's document."""
+    from workbench.report.reports import design_view
+
+    found = _design(design)
+    return design_view(found, found.motion == "rotary").page()
+
+
+def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
+    """Designs of versions by their numbers, each as text, side by side."""
+    from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
+    from workbench.report.design_tables import DESIGN_HEAD, margins_table
+    from workbench.report.reports import linear_step
+
+    rows: list[Sequence[str]] = []
+    lines: list[Line] = []
+    said: list[str] = []
+    for place, (number, text) in enumerate(designs):
+        try:
+            found = _design(text)
+            rows += [(f"version {number}", *row) for row in margins_table(found).whole]
+            for name, one in found.controllers.items():
+                t, y = linear_step(found, one)
+                colour: Colour = "reference" if place else "model"
+                style = STYLES_OF[name]
+                lines.append(Line(f"{number}: {name.upper()}", t, y, colour, style))
+            if found.recommendation:
+                said.append(f"version {number}: {found.recommendation.why}")
+        except UserError as error:
+            said.append(f"version {number}: {error}")
+    if not lines:
+        return LoopsFound((), (), "", said)
+    panel = Panel("time [s]", "position / step", lines, marks=[Mark(1.0, "y")])
+    chart = Chart("steps", "linear step response of each version's controllers", [panel])
+    return LoopsFound(("", *DESIGN_HEAD), rows, str(chart_html(chart)), said)
+
+
+def _design(text: str) -> "Design":
+    """The design of a document as text, read as from its file; raises UserError."""
+    from workbench.documents.design_file import read_design
+    from workbench.documents.reading import Stored
+
+    return read_design(Stored("design.json", json.loads(text)))
