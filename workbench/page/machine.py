@@ -24,7 +24,7 @@ from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
 from workbench.registry.difference import difference
-from workbench.registry.results import TestedLog, condition, last_logs, log_count, newest_lights
+from workbench.registry.results import TestedLog, condition, last_logs, newest_lights
 from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import Area, Chart, Line, Panel, chart_html
 
@@ -47,7 +47,7 @@ def machine(asked: Asked) -> Response:
         "machine", title=name, state=state, versions=list(reversed(versions)),
         decisions=list(reversed(registry.decisions(name))), logs=logs, other=other,
         alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
-        condition=condition(asked.database, name), total=log_count(asked.database, name),
+        condition=condition(asked.database, name), total=state.logs,
         reports=[path.name for path in _reports(asked)], tested=tested, lights=lights,
         charts="".join(str(chart_html(one)) for one in drawn),
     )  # fmt: skip

@@ -37,7 +37,8 @@ _BY_VERDICT: Mapping[str, MachineCondition] = {
 def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
     """The machine's state after a log of that verdict ("refused": what was found stays so)."""
     if verdict == "refused":
-        verdict = str((evidence.get("drift") or {}).get("verdict"))
+        found = (evidence.get("drift") or {}).get("verdict")
+        verdict = found if found in ("drift", "structure") else verdict
     return _BY_VERDICT.get(verdict, "not_judged")
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import and_, func, select
+from sqlalchemy import and_, select
 
 from workbench.registry.database import Database
 from workbench.registry.rows import judged_now
@@ -64,13 +64,6 @@ def condition(database: Database, machine: str) -> str:
     with database.reading() as session:
         found = session.scalar(select(MachineNowRow.state).where(MachineNowRow.machine == machine))
     return found or "no_log"
-
-
-def log_count(database: Database, machine: str) -> int:
-    """How many logs of the machine there are."""
-    query = select(func.count(LogRow.id)).where(LogRow.machine == machine)
-    with database.reading() as session:
-        return session.scalar(query) or 0
 
 
 def _judged(

@@ -25,28 +25,11 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from workbench.output import dumps
-from workbench.registry.values import (
-    DecisionKind,
-    Document,
-    Kind,
-    LogVerdict,
-    MachineCondition,
-    Role,
-    TaskKind,
-    TaskState,
-)
+from workbench.registry import values
+from workbench.registry.values import Document
 
-APPEND_ONLY = (
-    "machine",
-    "log",
-    "record",
-    "version",
-    "decision",
-    "attempt",
-    "outcome",
-    "notice",
-    "reopening",
-)
+APPEND_ONLY = ("machine", "log", "record", "version", "decision", "attempt", "outcome", "notice",
+               "reopening")  # fmt: skip
 PAGE_APPEND_ONLY = ("access_token", "access_token_end", "upload", "audit")
 NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -108,9 +91,10 @@ class JsonText(TypeDecorator[Any]):
 
 
 WORDS: tuple[Any, ...] = (
-    DecisionKind, Kind, LogVerdict, MachineCondition, Role, TaskKind, TaskState,
+    values.DecisionKind, values.Kind, values.LogVerdict, values.MachineCondition, values.Role,
+    values.TaskKind, values.TaskState,
 )  # fmt: skip
-TYPES: dict[Any, Any] = {
+COLUMN_TYPES: dict[Any, Any] = {
     str: StorableText(),
     datetime: UtcTime(),
     Document: JsonText(),
@@ -122,7 +106,7 @@ class Base(DeclarativeBase):
     """All tables of the registry."""
 
     metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = TYPES
+    type_annotation_map = COLUMN_TYPES
 
 
 def one_of(column: str, kind: Any) -> CheckConstraint:
@@ -159,13 +143,13 @@ class RecordRow(Base):
     __tablename__ = "record"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
-    kind: Mapped[Kind]
+    kind: Mapped[values.Kind]
     sha256: Mapped[str]
     document: Mapped[Document]
     made_at: Mapped[datetime]
     __table_args__ = (
         UniqueConstraint("machine", "kind", "sha256"),
-        one_of("kind", Kind),
+        one_of("kind", values.Kind),
     )
 
 
@@ -189,7 +173,7 @@ class DecisionRow(Base):
     __tablename__ = "decision"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
-    kind: Mapped[DecisionKind]
+    kind: Mapped[values.DecisionKind]
     version_id: Mapped[int] = mapped_column(ForeignKey("version.id"))
     log_id: Mapped[int | None] = mapped_column(ForeignKey("log.id"))
     reason: Mapped[str]
@@ -197,7 +181,7 @@ class DecisionRow(Base):
     made_by: Mapped[str]
     at: Mapped[datetime]
     __table_args__ = (
-        one_of("kind", DecisionKind),
+        one_of("kind", values.DecisionKind),
         UniqueConstraint("id", "machine", "version_id"),
         Index(None, "machine", "id"),
     )
@@ -260,12 +244,12 @@ class OutcomeRow(Base):
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     version_id: Mapped[int | None] = mapped_column(ForeignKey("version.id"))
-    verdict: Mapped[LogVerdict]
+    verdict: Mapped[values.LogVerdict]
     reason: Mapped[str]
     evidence: Mapped[Document]
     token: Mapped[str]
     at: Mapped[datetime]
-    __table_args__ = (one_of("verdict", LogVerdict),)
+    __table_args__ = (one_of("verdict", values.LogVerdict),)
 
 
 class NoticeRow(Base):
@@ -300,12 +284,12 @@ class AccessTokenRow(Base):
     __tablename__ = "access_token"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
-    role: Mapped[Role]
+    role: Mapped[values.Role]
     sha256: Mapped[str]
     made_by: Mapped[str]
     at: Mapped[datetime]
     __table_args__ = (
-        one_of("role", Role),
+        one_of("role", values.Role),
         Index(None, "name", unique=True),
         Index(None, "sha256", unique=True),
     )
@@ -342,8 +326,8 @@ class TaskRow(Base):
     __tablename__ = "task"
     id: Mapped[int] = mapped_column(primary_key=True)
     upload: Mapped[str] = mapped_column("upload_id", ForeignKey("upload.id"), index=True)
-    kind: Mapped[TaskKind]
-    state: Mapped[TaskState]
+    kind: Mapped[values.TaskKind]
+    state: Mapped[values.TaskState]
     stage: Mapped[str]
     share: Mapped[float]
     said: Mapped[str]
@@ -355,8 +339,8 @@ class TaskRow(Base):
     at: Mapped[datetime]
     ended_at: Mapped[datetime | None]
     __table_args__ = (
-        one_of("kind", TaskKind),
-        one_of("state", TaskState),
+        one_of("kind", values.TaskKind),
+        one_of("state", values.TaskState),
         Index(None, "state", "id"),
     )
 
@@ -383,7 +367,7 @@ class MachineNowRow(Base):
 
     __tablename__ = "machine_now"
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
-    state: Mapped[MachineCondition]
+    state: Mapped[values.MachineCondition]
     heard_at: Mapped[datetime | None]
     logs: Mapped[int]
     moved: Mapped[str | None]
