@@ -5,10 +5,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+<<<<<<< HEAD
 from workbench import options
 from workbench.ending import Step, step
 from workbench.jobs.options import JobOptions, worker
 from workbench.output import emit, next_step
+=======
+from workbench.ending import StatusCommand, Step, step
+from workbench.jobs.options import JobOptions
+from workbench.output import JSON_OPTION, emit, next_step
+from workbench.signature import by_fields, by_signature
+>>>>>>> 539bd60 (The worker that options make has a module of its own, which is imported where it is run)
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery
@@ -35,6 +42,8 @@ def command(given: JobOptions) -> int:
     has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
     given up after a day.
     """
+    from workbench.jobs.worker import worker
+
     with worker(given) as found:
         done = found.once()
     judged, alarms = done.judged, done.alarms

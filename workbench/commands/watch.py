@@ -10,11 +10,17 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
+<<<<<<< HEAD
 from workbench.jobs.options import JobOptions, clock, worker
 from workbench.signature import option
+=======
+from workbench.ending import StatusCommand
+from workbench.jobs.options import JobOptions, clock
+from workbench.signature import by_fields, by_signature, option
+>>>>>>> 539bd60 (The worker that options make has a module of its own, which is imported where it is run)
 
 if TYPE_CHECKING:
-    from workbench.jobs.options import Worker
+    from workbench.jobs.worker import Worker
 
 
 @options.command(
@@ -38,6 +44,7 @@ def command(
     tried again with every pass.
     """
     from workbench.jobs.watching import watch_machines
+    from workbench.jobs.worker import worker
 
     stop = threading.Event()
     with ExitStack() as stack:

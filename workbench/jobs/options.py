@@ -1,27 +1,17 @@
-"""Options that `reidentify` and `watch` share, and the worker that they make of them."""
+"""Options that `reidentify` and `watch` share."""
 
 import os
 import secrets
 import socket
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
 from workbench import options
 from workbench.signature import argument, option
-
-if TYPE_CHECKING:
-    from workbench.jobs.alarms import Delivery, Webhook
-    from workbench.jobs.lease import Clock
-    from workbench.jobs.metrics import MachineFigures
-    from workbench.jobs.passes import PassReport, Report
-    from workbench.registry.store import Registry
 
 
 def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -73,85 +63,6 @@ class JobOptions:
     metrics: Path | None = option("Write Prometheus metrics there after each pass.", metavar="FILE")
     seed: int = options.SEED_OPTION
     effects: tuple[Path, ...] = options.EFFECTS_OPTION
-
-
-@dataclass(frozen=True)
-class Done:
-    """What a pass did, and what became of the alarms; None without a webhook."""
-
-    judged: "PassReport"
-    alarms: "Delivery | None"
-
-
-@dataclass(frozen=True)
-class Worker:
-    """One worker: `once` is a pass with its alarms and metrics."""
-
-    options: JobOptions
-    registry: "Registry"
-    webhook: "Webhook | None"
-    report: "Report"
-    owner: str
-    figures: "MachineFigures"
-    stop: Callable[[], bool]
-
-    def once(self) -> Done:
-        """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
-        from workbench.cards.own_effects import library
-        from workbench.jobs.challenge import Terms
-        from workbench.jobs.judge import Chain
-        from workbench.jobs.lease import Patience, shared_clock
-        from workbench.jobs.metrics import write_metrics
-        from workbench.jobs.passes import Pass, PassSettings
-
-        given = self.options
-        settings = PassSettings(
-            owner=self.owner,
-            lease=timedelta(seconds=given.lease),
-            settle=timedelta(seconds=given.settle),
-            first=given.first,
-            order=given.order,
-            marker=given.marker,
-            patience=Patience(given.patience),
-        )
-        terms = Terms(held_out=given.margin)
-        judge = Chain(terms=terms, seed=given.seed, library=library(given.effects))
-        shared = settings.patience(shared_clock, self.registry.database, clock)
-        work = Pass(self.registry, judge, settings, shared, self.report, self.stop, clock)
-        done = work.run(given.root)
-        alarms = self._alarms(shared)
-        self.figures.passed(clock(), len(done.failed))
-        if given.metrics is not None:
-            write_metrics(given.metrics, self.figures)
-        return Done(done, alarms)
-
-    def _alarms(self, shared: "Clock") -> "Delivery | None":
-        from workbench.jobs.alarms import send_alarms
-        from workbench.registry.outbox import Outbox
-
-        if self.webhook is None:
-            return None
-        outbox = Outbox(self.registry.database)
-        return send_alarms(outbox, self.webhook, clock=shared, report=self.report, stop=self.stop)
-
-
-@contextmanager
-def worker(options: JobOptions, stop: Callable[[], bool] = lambda: False) -> Iterator[Worker]:
-    """A worker on the registry of the options; raises BadRoot, BadRegistry, RegistryAway."""
-    from workbench.jobs.alarms import Webhook
-    from workbench.jobs.events import reporter
-    from workbench.jobs.lease import Patience
-    from workbench.jobs.metrics import MachineFigures
-    from workbench.jobs.scan import machine_folders
-    from workbench.registry.database import location
-    from workbench.registry.store import Registry
-
-    machine_folders(options.root)
-    webhook = None if options.webhook is None else Webhook(options.webhook)
-    name = worker_name()
-    with Patience(options.patience)(Registry, location(options.where)) as registry:
-        report = reporter(sys.stderr, name)
-        yield Worker(options, registry, webhook, report, name, MachineFigures(registry), stop)
 
 
 def worker_name() -> str:
