@@ -1,18 +1,26 @@
 """A Dask cluster: processes of this computer, each on a core of its own, or any by its address."""
 
+import logging
 import math
 import os
 from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
-
-from distributed import Worker, WorkerPlugin
 
 from workbench.addresses import shown
 from workbench.documents.reading import versions
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
+
+try:
+    import dask
+    from distributed import Client, KilledWorker, LocalCluster, Worker, WorkerPlugin, wait
+    from distributed.comm.addressing import get_address_host_port, parse_address
+    from distributed.comm.registry import get_backend
+except ImportError:
+    raise BadCluster(NEEDED) from None
 
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS", "NUMBA", "NUMEXPR")}
 GATHERED = 10.0  # s that a result may take from its worker to here
@@ -47,8 +55,6 @@ class Cluster:
 
     def wait(self, futures: Collection[Any], seconds: float) -> Sequence[Any]:
         """Those of the futures that have ended, after the first or this time [s]."""
-        from distributed import wait
-
         try:
             with self.client.as_current():
                 ended = wait(futures, timeout=seconds, return_when="FIRST_COMPLETED").done
@@ -63,10 +69,6 @@ class Cluster:
 
         None: the worker that held the result has died, and another makes it anew.
         """
-        from concurrent.futures import CancelledError
-
-        from distributed import KilledWorker
-
         if future.status in ("lost", "pending"):
             return None
         try:
@@ -87,9 +89,8 @@ class Cluster:
 def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
     """Processes of this computer, a core each; a log may cost `attempts` of them.
 
-    Raises BadCluster where Dask is not installed or they do not start.
+    Raises BadCluster where they do not start.
     """
-    dask = _dask()
     environment = dask.config.get("distributed.nanny.pre-spawn-environ", {})
     settings = {
         # One log a worker at a time: a log that waits is not blamed for the death of a worker.
@@ -100,10 +101,6 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
         "distributed.nanny.pre-spawn-environ": {**environment, **ONE_THREAD},
     }
     with dask.config.set(settings):
-        import logging
-
-        from distributed import Client, LocalCluster
-
         try:
             made = LocalCluster(
                 n_workers=workers,
@@ -126,9 +123,6 @@ def cluster_at(address: str, timeout: float) -> Iterator[Cluster]:
     timeout: how long [s] it, and its first worker, may take to answer. Raises BadCluster also
     where its workers do not have this version of the workbench.
     """
-    _dask()
-    from distributed import Client
-
     _check_address(address)
     try:
         client = Client(address, timeout=timeout, set_as_default=False)
@@ -151,9 +145,6 @@ def cluster_at(address: str, timeout: float) -> Iterator[Cluster]:
 
 def _check_address(address: str) -> None:
     """Raises BadCluster where it is none; a client of Dask's would leave a traceback behind."""
-    from distributed.comm.addressing import get_address_host_port, parse_address
-    from distributed.comm.registry import get_backend
-
     try:
         get_backend(parse_address(address)[0])
         host, port = get_address_host_port(address)
@@ -188,15 +179,6 @@ def _gone(error: BaseException) -> BadCluster:
     return BadCluster(
         f"the cluster is gone ({said(error)}); results so far are kept, run again to go on"
     )
-
-
-def _dask() -> Any:
-    try:
-        import dask
-        import distributed  # noqa: F401 - what is missing is said before anything begins
-    except ImportError:
-        raise BadCluster(NEEDED) from None
-    return dask
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
-from workbench.page import drops, fleet, health, machine, sign_in, work
+from workbench.page import drops, fleet, health, machine, visitors, work
 from workbench.page.asked import Asked, Server, Visitor
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
@@ -60,7 +60,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
     app = Starlette(
         routes=[
             *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *drops.DROP_ROUTES, *work.WORK_ROUTES,
-            *sign_in.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
+            *visitors.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
             Mount("/static/assets", StaticFiles(directory=ASSETS)),
             Mount("/static", StaticFiles(directory=HERE / "static")),
         ],
