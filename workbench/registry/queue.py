@@ -67,9 +67,12 @@ class Queue:
             rows.lock_machine(session, machine, now)
             query = select(LogRow.sha256).where(LogRow.machine == machine)
             have = set(session.scalars(query))
-            first = {log.sha256: log for log in reversed(logs)}  # of files of one content
-            new = [log for log in first.values() if log.sha256 not in have]
-            session.add_all(LogRow(machine=machine, seen_at=now, **vars(log)) for log in new)
+            new: dict[str, SeenLog] = {}
+            for log in logs:
+                if log.sha256 not in have:
+                    new.setdefault(log.sha256, log)
+            every = new.values()
+            session.add_all(LogRow(machine=machine, seen_at=now, **vars(log)) for log in every)
             if new:
                 summary_heard(session, machine, len(new), now)
             return len(new)
@@ -164,7 +167,7 @@ class Queue:
             for kind, candidate, reason in _decided(judgement):
                 version, _ = rows.add_version(session, claim.machine, candidate, now)
                 rows.decide(session, kind, version, reason=reason, by=by, now=now,
-                       evidence=judgement.evidence, log_id=row.id)  # fmt: skip
+                            evidence=judgement.evidence, log_id=row.id)  # fmt: skip
             done = OutcomeRow(
                 log_id=row.id,
                 turn=now_turn,
