@@ -30,16 +30,17 @@ class MachineFigures(Collector):
     def collect(self) -> Iterator[GaugeMetricFamily]:
         """The figures; `up` 0 and no others of the registry where it is away."""
         try:
-            found = list(_of_machines(self._registry))
+            up, found = 1.0, list(_of_machines(self._registry))
         except RegistryAway:
-            yield _gauge("registry_up", "Whether the registry answers.", 0.0)
-        else:
-            yield _gauge("registry_up", "Whether the registry answers.", 1.0)
-            yield from found
+            up, found = 0.0, []
+        yield _family("registry_up", "Whether the registry answers.", value=up)
+        yield from found
         if self._last is not None:
             at, failed = self._last
-            yield _gauge("last_pass_timestamp_seconds", "End of the last pass.", at.timestamp())
-            yield _gauge("machines_failed", "Machines that the last pass could not handle.", failed)
+            end = at.timestamp()
+            yield _family("last_pass_timestamp_seconds", "End of the last pass.", value=end)
+            meaning = "Machines that the last pass could not handle."
+            yield _family("machines_failed", meaning, value=failed)
 
 
 def collected(figures: MachineFigures) -> CollectorRegistry:
@@ -73,9 +74,5 @@ def _of_machines(registry: Registry) -> Iterator[GaugeMetricFamily]:
     yield from (version, waiting, judged, unsent, lost)
 
 
-def _family(name: str, meaning: str, *labels: str) -> GaugeMetricFamily:
-    return GaugeMetricFamily(f"{PREFIX}_{name}", meaning, labels=labels)
-
-
-def _gauge(name: str, meaning: str, value: float) -> GaugeMetricFamily:
-    return GaugeMetricFamily(f"{PREFIX}_{name}", meaning, value=value)
+def _family(name: str, meaning: str, *labels: str, value: float | None = None) -> GaugeMetricFamily:
+    return GaugeMetricFamily(f"{PREFIX}_{name}", meaning, value, labels or None)
