@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from sqlalchemy import insert
 from sqlalchemy.orm import Session
-
 from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
+
 from workbench.registry.store import Registry
 from workbench.registry.tables import (
     ActiveVersionRow,
