@@ -1,6 +1,5 @@
 """A registry with many machines, written in bulk: a version in force and a few results each."""
 
-import json
 import math
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -8,14 +7,15 @@ from typing import Any
 import numpy as np
 from sqlalchemy import insert
 from sqlalchemy.orm import Session
-from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
 
 from workbench.registry.store import Registry
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
     LogRow,
+    MachineNowRow,
     MachineRow,
+    MachineTrendRow,
     OutcomeRow,
     RecordRow,
     VersionRow,
@@ -56,10 +56,10 @@ def _block(session: Session, numbers: range, rng: np.random.Generator, now: date
         at = {"machine": name, "made_at": now}
         rows[MachineRow].append({"name": name, "added_at": now})
         rows[RecordRow].append({**at, "id": k + 1, "kind": "model", "sha256": f"{k:064x}",
-                                "document": '{"friction": {}}'})  # fmt: skip
+                                "document": {"friction": {}}})  # fmt: skip
         rows[VersionRow].append({**at, "id": k + 1, "number": 1, "model_id": k + 1})
         rows[DecisionRow].append({"id": k + 1, "machine": name, "kind": "promoted", "at": now,
-                                  "version_id": k + 1, "reason": "first model", "evidence": "{}",
+                                  "version_id": k + 1, "reason": "first model", "evidence": {},
                                   "made_by": "benchmark"})  # fmt: skip
         rows[ActiveVersionRow].append({"machine": name, "version_id": k + 1, "decision_id": k + 1})
         for n in range(LOGS_EACH):
@@ -74,16 +74,16 @@ def _block(session: Session, numbers: range, rng: np.random.Generator, now: date
         rows[MachineNowRow].append({"machine": name, "state": state, "heard_at": heard,
                                     "logs": LOGS_EACH, "moved": moved,
                                     "moved_by": trend[moved][-1] / 10.0 - 1.0,
-                                    "moved_trend": json.dumps(trend[moved])})  # fmt: skip
-        rows[MachineTrendRow].append({"machine": name, "trend": json.dumps(trend)})
+                                    "moved_trend": trend[moved]})  # fmt: skip
+        rows[MachineTrendRow].append({"machine": name, "trend": trend})
     for table, values in rows.items():
         session.execute(insert(table), values)
 
 
-def _evidence(trend: dict[str, list[float]], n: int) -> str:
+def _evidence(trend: dict[str, list[float]], n: int) -> dict[str, Any]:
     parameters = [
         {"name": name, "unit": "N", "before": 10.0, "after": x[n], "low": x[n] - 0.1,
          "high": x[n] + 0.1, "change": x[n] / 10.0 - 1.0, "sd": 0.01}
         for name, x in trend.items()
     ]  # fmt: skip
-    return json.dumps({"drift": {"verdict": "none", "parameters": parameters}})
+    return {"drift": {"verdict": "none", "parameters": parameters}}
