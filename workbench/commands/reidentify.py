@@ -5,17 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-<<<<<<< HEAD
 from workbench import options
 from workbench.ending import Step, step
-from workbench.jobs.options import JobOptions, worker
-from workbench.output import emit, next_step
-=======
-from workbench.ending import StatusCommand, Step, step
 from workbench.jobs.options import JobOptions
-from workbench.output import JSON_OPTION, emit, next_step
-from workbench.signature import by_fields, by_signature
->>>>>>> 539bd60 (The worker that options make has a module of its own, which is imported where it is run)
+from workbench.output import emit, next_step
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery

@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-<<<<<<< HEAD
-from workbench.jobs.options import JobOptions, clock, worker
-from workbench.signature import option
-=======
-from workbench.ending import StatusCommand
 from workbench.jobs.options import JobOptions, clock
-from workbench.signature import by_fields, by_signature, option
->>>>>>> 539bd60 (The worker that options make has a module of its own, which is imported where it is run)
+from workbench.signature import option
 
 if TYPE_CHECKING:
     from workbench.jobs.worker import Worker
