@@ -8,7 +8,7 @@ from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.tracing.regression.stepwise import Choice
-from identification.tracing.remaining_structure import signals_at
+from identification.tracing.residuals import signals_at
 from identification.tracing.result import FreeCurve
 
 CURVE_PIECES = 40  # of the curve, with equally many rows each

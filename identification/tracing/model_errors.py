@@ -9,13 +9,12 @@ from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, rms
-from identification.estimation.regression.weighted_rows import stacked
+from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
 from identification.thresholds import ADEQUATE, AS_GOOD_AS_NONE, ASTRAY, COMPLETE, MATERIAL
-from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
 
@@ -28,43 +27,27 @@ def errors_of(
 
     Without test logs those of stretches left out: cross-validation, Stone (1974).
     """
-    own, found = model.stage, model.outcomes
     out = {}
-    other = seen_by(own, steps, seen) if seen else own
-    for name, stage, over in (("train", own, logs), ("test", other, seen or logs)):
-        errors: dict[str, tuple[Array, Array]] = {}
+    for name, over in (("train", logs), ("test", seen)):
+        stage = seen_by(model.stage, steps, over) if name == "test" and over else model.stage
+        left, size = dict[str, Array](), 0.0
         for equation in (MECHANICAL, ACTUATOR):
-            if equation not in found:
+            if equation not in model.outcomes:
                 continue
-            low = slowest if equation == MECHANICAL else 0.0
-            if name == "test" and not seen:
-                errors[equation] = left_out_residual(stacked(stage.parts[equation]), low)
-            else:
-                errors[equation] = row_residual(stage, equation, found[equation].fit.theta, low)
-        force = errors[MECHANICAL]
-        whole = rms(force[1])
-        size = rms(force[0]) if len(force[0]) else None  # nothing slides
+            rows = stacked(stage.parts[equation])
+            if equation == MECHANICAL:
+                rows = rows.at(rows.speed >= slowest)
+                size = rms(rows.b)
+            theta = model.outcomes[equation].fit.theta
+            left[equation] = rows.b - rows.X @ theta if over else left_unseen(rows)
+        force = rms(left[MECHANICAL]) if len(left[MECHANICAL]) else None  # nothing slides
         out[name] = Errors(
-            force_rms=size,
-            force_relative=size / whole if size is not None and whole else None,
-            position_rms=None if model.imposed else position_rms(model.plant, over, drive),
-            actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
+            force_rms=force,
+            force_relative=force / size if force is not None and size else None,
+            position_rms=None if model.imposed else position_rms(model.plant, over or logs, drive),
+            actuator_rms=rms(left[ACTUATOR]) if ACTUATOR in left else None,
         )
     return out
-
-
-@dataclass(frozen=True)
-class NoiseFloor:
-    """What the sensors alone leave: of the equation of motion [N] and of the actuator's [N/s], None
-    where there is none."""
-
-    force_rms: float
-    actuator_rms: float | None
-
-
-def noise_floor(base: Mapping[str, RowFit]) -> NoiseFloor:
-    """What the sensors of these rows' logs alone leave."""
-    return NoiseFloor(row_noise(base, MECHANICAL) or 0.0, row_noise(base, ACTUATOR))
 
 
 @dataclass(frozen=True)
@@ -85,7 +68,7 @@ def on_test(
     return OnTest(errors, None if model.imposed else misfit(model.plant, logs, drive))
 
 
-def share_left(before: OnTest, after: OnTest, noise: NoiseFloor, coulomb: float = 0.0) -> float:
+def share_left(before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.0) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
     Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. An equation that
@@ -112,7 +95,7 @@ def follows(before: OnTest, after: OnTest) -> bool:
 
 
 def _equation_share(
-    before: OnTest, after: OnTest, noise: NoiseFloor, least: float, beside: float
+    before: OnTest, after: OnTest, noise: Errors, least: float, beside: float
 ) -> float | None:
     """As `share_left`, of the first equation of which more than `least` times the noise's square
     was missing, and more force than `beside` [N]; None without one."""
@@ -125,26 +108,26 @@ def _equation_share(
     return None
 
 
-def predicted(left: OnTest, noise: NoiseFloor) -> bool:
+def predicted(left: OnTest, noise: Errors) -> bool:
     """Whether a model is complete: what it leaves of the test logs is hardly more than noise."""
-    force = left.errors.force_rms
-    if force is not None and force**2 > ADEQUATE * noise.force_rms**2:
+    force, floor = left.errors.force_rms, noise.force_rms or 0.0
+    if force is not None and force**2 > ADEQUATE * floor**2:
         return False
     return left.misfit is None or left.misfit <= ADEQUATE
 
 
-def lacks(model: FittedStructure, errors: Errors, noise: NoiseFloor) -> bool:
+def lacks(model: FittedStructure, errors: Errors, noise: Errors) -> bool:
     """Whether a model lacks something of account on the logs of its fit, with these errors there.
 
     A free run that leaves far more than noise, and more than a trifle of the motion; or force far
     beyond noise, of a prescribed motion beyond noise, and more than a trifle of the Coulomb level.
     """
-    force, p = errors.force_rms, model.plant.friction
+    force, floor, p = errors.force_rms, noise.force_rms or 0.0, model.plant.friction
     least = ADEQUATE if model.imposed else ASTRAY
-    beyond = 0.0 if force is None else force**2 - noise.force_rms**2
+    beyond = 0.0 if force is None else force**2 - floor**2
     by_force = (
         force is not None
-        and force**2 > least * noise.force_rms**2
+        and force**2 > least * floor**2
         and beyond > (MATERIAL * max(p.F_cp, p.F_cn)) ** 2
     )
     if model.imposed:

@@ -24,8 +24,6 @@ from identification.tracing.regression.stepwise import Step
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Change
 
-MOTION_SHARE = 0.3  # share of a column's square that is motion and not noise, at least
-
 
 def parameter_drift(
     after: FittedStructure, steps: Sequence[Step], seen: Sequence[MotionLog], rig: Rig
@@ -88,7 +86,7 @@ def changes(
     while len(free) < len(names):
         options = []
         for i in range(len(names)):
-            if i in free or gram[i, i] < MOTION_SHARE * (A[:, i] @ A[:, i]):
+            if i in free:
                 continue
             at = [*free, i]
             step = np.linalg.lstsq(gram[np.ix_(at, at)], slope[at], rcond=1e-8)[0]

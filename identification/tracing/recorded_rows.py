@@ -9,26 +9,25 @@ from identification.effects._library import Library
 from identification.errors import NotIdentifiable
 from identification.estimation.recorded_logs import (
     RecordedLogs,
+    chosen_drive,
     commanded,
-    left_by_actuator,
-    left_share,
     needed,
     slower_remarks,
     with_clocks,
 )
-from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog
+from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.inertia import speed_ratio
-from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt
-from identification.thresholds import FOURFOLD, WORSE
-from identification.tracing.regression.candidates import best_of
+from identification.thresholds import FOURFOLD
 from identification.tracing.remaining_structure import FEWEST_ROWS
 
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 OF_SPEED = frozenset({"v", "reversal"})
+COMMAND_SAYS_LITTLE = (
+    "the command explains little of the force, so effects between command and force were not tried"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +53,20 @@ class RecordedRows:
 
 
 def recorded_rows(
-    train: Sequence[Log], rig: Rig, library: Library, halt: Halt | None = None,
-    share: float | None = None,
-) -> RecordedRows:  # fmt: skip
+    train: Sequence[Log], rig: Rig, halt: Halt | None = None, share: float | None = None
+) -> RecordedRows:
     """The training logs as rows; raises NotIdentifiable where too little of the motion slides.
 
     halt: asked before whatever is made of them; share: of the command's step to the next sample, by
     default what a machine without effects shows of it.
     """
-    remarks: list[str] = []
     slower = needed(train, rig)
-    said = slower_remarks(train, slower)
-    train = slower
-    driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
-    drive: Drive = "command" if driven else "force"
-    recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
+    drive: Drive = "command" if rig.kind == "motor" else chosen_drive(slower, rig, None)
+    recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(slower)
     recorded, refused = _prescribed_if_needed(recorded)
-    recorded = with_clocks(recorded, said, share)
-    return RecordedRows(recorded, refused, (*recorded.remarks, *remarks))
+    recorded = with_clocks(recorded, slower_remarks(train, slower), share)
+    told = (COMMAND_SAYS_LITTLE,) if drive == "force" and commanded(slower) else ()
+    return RecordedRows(recorded, refused, (*recorded.remarks, *told))
 
 
 def imposed_rows(rows: RecordedRows) -> RecordedRows:
@@ -83,30 +78,6 @@ def imposed_rows(rows: RecordedRows) -> RecordedRows:
 
 def _imposed(recorded: RecordedLogs) -> RecordedLogs:
     return replace(recorded, imposed=True).of(recorded.plain)
-
-
-def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
-    """Whether an actuator with a logged command is to be tested too: a linear one, or one that
-    some effect of the library makes linear."""
-    if rig.kind == "motor" or not commanded(train):
-        return False
-    left = left_by_actuator(train)
-    if left * WORSE > 1.0:
-        logs = [motion_log(log, held=False, by_command=True) for log in train]
-        stage, first = first_stage(logs, True)
-        own = [e for e in library.values() if e.place.in_actuator]
-        tried = [best_of(stage, effect, first) for effect in own if ACTUATOR in first]
-        rows = first[ACTUATOR].rows if ACTUATOR in first else None
-        fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
-        left = min([left, *(left_share(one, rows.sd, rows.b) for one in fits if rows is not None)])
-    if left * WORSE > 1.0:
-        remarks.append(
-            f"the command explains little of the force (a linear actuator leaves {100 * left:.0f}"
-            " % of"
-            " its rate), so effects between command and force were not tried"
-        )
-        return False
-    return True
 
 
 def _prescribed_if_needed(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIdentifiable | None]:

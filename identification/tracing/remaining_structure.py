@@ -26,10 +26,10 @@ from identification.signals.sampling import samples
 from identification.thresholds import ASTRAY
 from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, SEPARATE, dependence
 from identification.tracing.regression.stepwise import Choice
+from identification.tracing.residuals import joined, signals_at, signals_of
 from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30
-NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
@@ -157,11 +157,8 @@ def in_run(
 
     least: share of the rate or curvature that a signal explains where it is named; None: as usual.
     """
-    errors: list[Array] = []
-    rates: list[Array] = []
-    bends: list[Array] = []
-    windows: list[IntArray] = []
-    found: dict[str, list[Array]] = {}
+    errors, rates, bends = list[Array](), list[Array](), list[Array]()
+    windows, each = list[IntArray](), list[dict[str, Array]]()
     count = 0
     for one in logs:
         begun = starts(one, drive)
@@ -169,21 +166,18 @@ def in_run(
         if r is None:
             return Dependence((), 0.0)
         at = np.arange(0, len(one.log), max(THINNED, samples(THINNED, one.log.h)))
-        s = one.signals
         own = {k: v[at] for k, v in signals_of(one).items()}
         window = window_of(begun, len(one.log))
-        if "u" in s:
-            own["du"] = np.gradient(s["u"], one.log.h)[at]
+        if "u" in own:
+            own["du"] = np.gradient(one.signals["u"], one.log.h)[at]
         half = max(1, round(BEND / one.log.h))
         errors.append(r[0][at])
         rates.append(_change(r[0], at, half, window, 1))
         bends.append(_change(r[0], at, half, window, 2))
         windows.append(window[at] + count)
+        each.append(own)
         count += len(begun.at)
-        for k, v in own.items():
-            found.setdefault(k, []).append(v)
-    signals = {k: np.concatenate(v) for k, v in found.items() if len(v) == len(logs)}
-    signals = {k: v for k, v in signals.items() if np.ptp(v) > 0}
+    signals = joined(each)
     # An error lasts to the end of its window, so windows are left out whole; and what is lost at
     # one stop must not outweigh all others.
     block = np.concatenate(windows) % BLOCKS
@@ -191,14 +185,14 @@ def in_run(
     whole, rate, bend = (soft(np.concatenate(x)) for x in (errors, rates, bends))
     sizes = [x**2 - np.mean(x**2) for x in (rate, bend)]
     of = partial(dependence, signals=signals, up=way, block=block)
-    each = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
-    each = [one for one in each if one.depends_on] or [of(x, least=least) for x in sizes]
-    each = sorted((one for one in each if one.depends_on), key=lambda one: -one.explained)
-    if not each:
+    told = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
+    told = [one for one in told if one.depends_on] or [of(x, least=least) for x in sizes]
+    told = sorted((one for one in told if one.depends_on), key=lambda one: -one.explained)
+    if not told:
         return Dependence((), 0.0)
-    named = tuple(dict.fromkeys(name for one in each for name in one.depends_on))
+    named = tuple(dict.fromkeys(name for one in told for name in one.depends_on))
     held = all(one.held for one in logs)
-    return replace(each[0], depends_on=_with_command(named, held))
+    return replace(told[0], depends_on=_with_command(named, held))
 
 
 def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:
@@ -207,42 +201,3 @@ def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> 
     low, high = np.maximum(at - half, 0), np.minimum(at + half, len(r) - 1)
     found = r[high] - r[low] if order == 1 else r[high] - 2.0 * r[at] + r[low]
     return np.asarray(np.where(window[low] == window[high], found, 0.0))
-
-
-def signals_of(one: MotionLog) -> dict[str, Array]:
-    """Signals of a log on which a residual may depend, (n,) each: those logged, velocity, command,
-    time since the log's start and since the last reversal [s]."""
-    s = one.signals
-    own = {k: v for k, v in s.items() if k not in NOT_SIGNALS}
-    return {**own, "t": s["t"] - s["t"][0], "reversal": since_reversal(s["d"], one.log.h)}
-
-
-def signals_at(stage: EffectRows, equation: str) -> dict[str, Array]:
-    """Signals that vary, at the middle of an equation's rows over all logs."""
-    out: dict[str, list[Array]] = {}
-    for i, one in enumerate(stage.logs):
-        rows = one.sliding if equation == MECHANICAL else one.whole
-        if equation == BREAKAWAY:
-            middle = stage.events[i].at
-        elif equation == REST:
-            middle = stage.at_rest[i].start
-        else:
-            assert rows is not None
-            middle = rows.middle
-        own = {k: v[middle] for k, v in signals_of(one).items()}
-        if rows is not None and (equation == ACTUATOR or (equation == MECHANICAL and one.held)):
-            own["du"] = rows.first @ one.signals["u"]
-        if equation == BREAKAWAY:
-            own["rest"] = stage.events[i].rested
-        for k, v in own.items():
-            out.setdefault(k, []).append(v)
-    joined = {k: np.concatenate(v) for k, v in out.items() if len(v) == len(stage.logs)}
-    return {k: v for k, v in joined.items() if len(v) and np.ptp(v) > 0}
-
-
-def since_reversal(d: Array, h: float) -> Array:
-    """Time since the direction last changed or the body stood still [s], (n,)."""
-    n = len(d)
-    changed = np.concatenate([[True], d[1:] != d[:-1]])
-    at = np.maximum.accumulate(np.where(changed, np.arange(n), 0))
-    return np.asarray((np.arange(n) - at) * h, dtype=np.float64)

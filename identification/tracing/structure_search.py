@@ -13,7 +13,6 @@ from identification.estimation.run_or_equation import by_equation_if_surer
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
 from identification.thresholds import ADEQUATE, ASTRAY, OF_ACCOUNT
@@ -21,7 +20,6 @@ from identification.tracing.free_run.backward_elimination import (
     Setting,
     equations_explained,
     fewest,
-    first_alone,
     suffices,
 )
 from identification.tracing.free_run.forward_selection import judged_forward
@@ -33,11 +31,15 @@ INTERVALS = "the last step of the plain model's fit, with its intervals"
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The plain model, and the effects that the equations choose, or the first of them."""
+    """The effects that the equations choose, or the first of them, and what trying them needs."""
 
-    plain: PlainModel
     setting: Setting
     choice: Choice
+
+    @property
+    def plain(self) -> PlainModel:
+        """The plain model."""
+        return self.setting.plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,26 +50,20 @@ class Refinement:
     model: FittedStructure
 
 
-def first_effect(
-    plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Progress
-) -> Selection:
+def first_effect(plain: PlainModel, rng: np.random.Generator, report: Progress) -> Selection:
     """The effect that the equations call for first."""
-    rows, start, first, library = plain.rows, plain.start, plain.first, plain.library
-    logs = list(rows.logs)
-    setting = Setting(
-        logs, logs, rows.drive, rig, library, start, first, plain.model, rng.spawn(1)[0]
-    )
-    return Selection(plain, setting, choose(start, first, library, rng, report, most=1))
+    setting = Setting(plain, rng.spawn(1)[0])
+    choice = choose(plain.start, plain.first, plain.library, rng, report, most=1)
+    return Selection(setting, choice)
 
 
 def selection(begin: Selection, rng: np.random.Generator, report: Progress) -> Selection:
     """The effects that the equations call for, one after the other."""
-    plain, setting = begin.plain, begin.setting
-    choice = begun = begin.choice
-    alone = first_alone(begun, setting)
-    if begun.steps and not suffices(alone, begun, setting):
-        choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
-    return Selection(plain, setting, choice)
+    plain, begun = begin.plain, begin.choice
+    if not begun.steps or suffices(begun, begin.setting):
+        return begin
+    choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
+    return replace(begin, choice=choice)
 
 
 def share_beside(plain: PlainModel, choice: Choice) -> float:
@@ -87,8 +83,7 @@ def share_beside(plain: PlainModel, choice: Choice) -> float:
 def refinement(chosen: Selection, report: Progress) -> Refinement:
     """The effects refined on the free run, without those that it does without, with those that
     only it shows."""
-    setting, choice, plain = chosen.setting, chosen.choice, chosen.plain.model
-    model = plain
+    setting, choice, model = chosen.setting, chosen.choice, chosen.plain.model
     if choice.steps:
         choice, model = fewest(choice, setting)
     report("judging", 0.0)
@@ -124,34 +119,23 @@ def all_but_explained(choice: Choice) -> bool:
     )
 
 
-def without_effects(plain: PlainModel, choice: Choice) -> Choice:
-    """The choice of no effect; those tried are remembered."""
-    start, first = plain.start, plain.first
-    return Choice(start, first, (), start, first, choice.tried)
-
-
-def settled_plain(
-    chosen: Selection, found: Refinement, rng: np.random.Generator, report: Progress
-) -> tuple[Selection, Refinement]:
-    """The same with the plain model as the estimator gives it, where no effect was found.
+def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:
+    """The plain model as the estimator gives it, where no effect was found.
 
     Its run is then that of the fit, if this is driven as the logs are judged.
     """
-    if found.choice.steps:
-        return chosen, found
-    plain, recorded = chosen.plain, chosen.plain.recorded
+    recorded = plain.recorded
     asking = recorded.halt.asking(report)
     fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
     if fit is None:  # at least no worse than the equation of motion by itself
         with recorded.halt.closing():
             fit = by_equation_if_surer(plain.model.plant.friction, recorded)
     if fit is None:
-        return chosen, found
+        return plain
     model = replace(plain.model, fit=fit)
     if fit.drive == recorded.drive and not fit.imposed:
         plant = Plant(fit.friction, fit.actuator)
         with recorded.halt.closing():
             left = misfit(plant, recorded.logs, recorded.drive)
         model = replace(model, plant=plant, misfit=left)
-    chosen = replace(chosen, plain=replace(plain, model=model))
-    return chosen, replace(found, model=model)
+    return replace(plain, model=model)

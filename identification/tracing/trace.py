@@ -15,9 +15,8 @@ from identification.errors import NotIdentifiable
 from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.structure_fit import FittedStructure, band
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -25,24 +24,18 @@ from identification.model.surroundings import Surroundings
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
-from identification.thresholds import COMPLETE, WORSE
+from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
-from identification.tracing.judgement import (
-    AS_LARGE_AS_FRICTION,
-    HeldOut,
-    Judgement,
-    held_out,
-    judgement,
-)
+from identification.tracing.free_run.backward_elimination import only
+from identification.tracing.held_out import HeldOut
+from identification.tracing.judgement import NOTHING, Judgement, judgement
 from identification.tracing.lag_beside import follows_with_lag, lag_beside
-from identification.tracing.model_errors import row_noise
-from identification.tracing.plain_model import plain_model
-from identification.tracing.predictive_check import predicts_worse
-from identification.tracing.probability import Evidence, evidence
+from identification.tracing.plain_model import PlainModel, plain_model
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
-from identification.tracing.result import MissingForce, Trace, TraceVerdict
+from identification.tracing.residuals import residuals_of, run_residual
+from identification.tracing.result import Dependence, Left, Trace, TraceVerdict
 from identification.tracing.structure_search import (
     Refinement,
     Selection,
@@ -51,17 +44,13 @@ from identification.tracing.structure_search import (
     selection,
     settled_plain,
     share_beside,
-    without_effects,
 )
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
 from identification.tracing.verdict import (
     found_effect,
-    missing_force,
     next_experiment,
     parameters_of,
-    residuals_of,
     rivals_of,
-    run_residual,
 )
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
@@ -183,91 +172,30 @@ def _traced(
     """The trace of logs on which nothing acts but the applied force and what the library has."""
     begin, settle, choose = rng.spawn(3)
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
+    plain = chosen.plain
     report("refitting", 0.0)
     found = refinement(chosen, report)
+    doubt = ""
     with halt.closing():
-        seen = [chosen.plain.rows.recorded.given(log) for log in test]
-        found, held, doubt = _proved(chosen, found, seen, rig)
+        held = HeldOut(plain, found, tuple(map(plain.rows.recorded.given, test)))
+        if found.choice.steps and (against := held.against):
+            names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
+            doubt = f"the equations call for {names}, but with it {against}: not named"
+            found = Refinement(only(found.choice, ()), plain.model)
     report("settling", 0.0)
-    chosen, found = settled_plain(chosen, found, settle, report)
+    if not found.choice.steps:
+        plain = settled_plain(plain, settle, report)
+        held = replace(held, plain=plain, found=replace(found, model=plain.model))
     report("telling", 0.0)
     with halt.closing():
-        held = held or held_out(chosen, found, seen, rig)
-        lacks = _missing(chosen, found, seen)
-        terms = evidence(_share_left(found, held, lacks), len(found.choice.steps))
-        judged = judgement(chosen, found, held, terms, seen, rig)
-        told = _told(chosen, found, judged, terms, halt.not_tried, seen, lacks)
+        told = _told(held, judgement(held), halt.not_tried)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
-
-
-def _share_left(found: Refinement, held: HeldOut, lacks: MissingForce | None) -> float:
-    """The share of the missing force that effects leave: none where the run leaves nothing but
-    noise; by the error of the run of those that act in stops alone, of which the force while
-    sliding says nothing."""
-    if held.followed:
-        return 0.0
-    of_error = float(np.sqrt(held.share))
-    of_force = None if lacks is None else lacks.share_left
-    if of_force is None:
-        return of_error
-    in_stops = all(step.candidate.effect.place.in_stops for step in found.choice.steps)
-    return min(of_force, of_error) if in_stops else of_force
-
-
-def _missing(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
-) -> MissingForce | None:  # fmt: skip
-    """The force that the plain model and the refined one lack on the test logs, or without them on
-    those of the fit."""
-    choice, after, logs = found.choice, found.model, list(chosen.plain.rows.logs)
-    slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(after))
-    return missing_force(chosen.plain.model, after, seen or logs, slowest)
 
 
 def _slides(log: Log, rig: Rig) -> bool:
     """Whether the body slides in a log, for long enough to judge."""
     one = motion_log(log, held=rig.kind == "motor", by_command=False)
     return len(one.sliding.start) >= FEWEST_ROWS
-
-
-def _proved(
-    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
-) -> tuple[Refinement, HeldOut | None, str]:
-    """The refinement and what it leaves of the held-out logs, or the plain model where its effects
-    do not explain most of what was missing there, or predict force or position worse; and what to
-    say of it."""
-    plain, after = chosen.plain.model, found.model
-    if not found.choice.steps:
-        return found, None, ""
-    held = held_out(chosen, found, seen, rig)
-    if not held.proved:
-        return _unproved(
-            chosen, found, "more than half of what was missing on the test logs is left"
-        )
-    if held.hides_friction:
-        return _unproved(chosen, found, AS_LARGE_AS_FRICTION)
-    was, now = (one["test"].force_rms for one in (held.before, held.after))
-    if was is not None and now is not None and now > WORSE * was:
-        return _unproved(
-            chosen, found, f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
-        )
-    if not seen or plain.imposed or after.imposed:
-        return found, held, ""
-    worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
-    if worse is None:
-        return found, held, ""
-    return _unproved(
-        chosen, found,
-        f"the position of the test logs is predicted worse over {worse.seconds:g} s"
-        f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)",
-    )  # fmt: skip
-
-
-def _unproved(chosen: Selection, found: Refinement, said: str) -> tuple[Refinement, None, str]:
-    """The plain model in place of effects that do not carry over, and what to say of it."""
-    names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
-    plain = Refinement(without_effects(chosen.plain, found.choice), chosen.plain.model)
-    return plain, None, f"the equations call for {names}, but with it {said}: not named"
 
 
 def _chosen(
@@ -280,19 +208,16 @@ def _chosen(
     """
     _, choose = rngs
     report("recording", 0.0)
-    first = _first(recorded_rows(train, rig, library, halt), rig, library, rngs, report)
+    first = _first(recorded_rows(train, rig, halt), library, rngs, report)
     share = share_beside(first.plain, first.choice)
-    if share == 0.0:
-        chosen = selection(first, choose, report)
-        share = share_beside(chosen.plain, chosen.choice)
-        if share == 0.0:
-            return chosen
-    rows = recorded_rows(train, rig, library, halt, share)
-    return selection(_first(rows, rig, library, rngs, report), choose, report)
+    if share != 0.0:
+        rows = recorded_rows(train, rig, halt, share)
+        first = _first(rows, library, rngs, report)
+    return selection(first, choose, report)
 
 
 def _first(
-    rows: RecordedRows, rig: Rig, library: Library,
+    rows: RecordedRows, library: Library,
     rngs: tuple[np.random.Generator, np.random.Generator], report: Progress,
 ) -> Selection:  # fmt: skip
     """The plain model of the rows, and the effect that the equations call for first beside it."""
@@ -300,41 +225,40 @@ def _first(
     report("refining", 0.0)
     plain = plain_model(rows, library, begin)
     report("tracing", 0.0)
-    return first_effect(plain, rig, choose, report)
+    return first_effect(plain, choose, report)
 
 
-def _told(
-    chosen: Selection, found: Refinement, judged: Judgement, terms: Evidence,
-    not_tried: tuple[str, ...], seen: Sequence[MotionLog], lacks: MissingForce | None,
-) -> Trace:  # fmt: skip
-    """All of it as the trace's result; terms: evidence of the effects; seen: the test logs."""
-    rows, before = chosen.plain.rows, chosen.plain.model
-    choice, after, logs = found.choice, found.model, list(rows.logs)
+def _told(held: HeldOut, judged: Judgement, not_tried: tuple[str, ...]) -> Trace:
+    """All of it as the trace's result."""
+    plain, choice, after = held.plain, held.found.choice, held.found.model
+    before, rows, terms = plain.model, plain.rows, held.evidence
+    left = judged.left if judged.verdict == "unknown" else NOTHING
+    share = 0.0 if judged.complete else held.share
     return Trace(
         verdict=_so_far(judged.verdict, after, not_tried),
-        before=judged.before,
-        after=judged.after,
-        noise_y=float(np.mean([one.noise.y for one in logs])),
-        noise_F=float(np.mean([one.noise.F for one in logs])),
-        noise_force=row_noise(choice.base, MECHANICAL) or 0.0,
-        noise_actuator=row_noise(choice.base, ACTUATOR),
-        effects=tuple(found_effect(s, after, choice, terms) for s in choice.steps),
-        rivals=rivals_of(choice, seen),
-        unknown=judged.left,
+        before=held.before,
+        after=held.after,
+        noise_y=float(np.mean([one.noise.y for one in rows.logs])),
+        noise_F=float(np.mean([one.noise.F for one in rows.logs])),
+        noise_force=held.noise.force_rms or 0.0,
+        noise_actuator=held.noise.actuator_rms,
+        effects=tuple(found_effect(s, after, terms) for s in choice.steps),
+        rivals=rivals_of(choice, held.seen),
+        unknown=left,
         drift=judged.drift,
-        next_experiment=_next(judged, choice, not_tried),
+        next_experiment=_next(judged.verdict, choice, left, not_tried),
         not_tried=not_tried,
-        parameters_before=_estimates(before, chosen, not_tried),
-        parameters_after=_estimates(after, chosen, not_tried),
+        parameters_before=_estimates(before, plain, not_tried),
+        parameters_after=_estimates(after, plain, not_tried),
         plant=after.plant,
-        residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
-        run=run_residual(before, after, logs, rows.drive),
+        residuals=residuals_of(choice),
+        run=run_residual(before, after, rows.logs, rows.drive),
         remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
         complete=judged.complete and not not_tried,
-        left=judged.rest,
+        left=Left(share, judged.left.depends_on),
         command_period=rows.recorded.command_period,
         curves=free_curves(choice),
-        missing_force=lacks,
+        missing_force=held.missing,
         evidence=terms if choice.steps else (),
     )
 
@@ -345,18 +269,20 @@ def _left_out(not_tried: tuple[str, ...]) -> list[str]:
     return [said] if not_tried else []  # the verdict's sentence says it too
 
 
-def _next(judged: Judgement, choice: Choice, not_tried: tuple[str, ...]) -> str:
+def _next(
+    verdict: TraceVerdict, choice: Choice, left: Dependence, not_tried: tuple[str, ...]
+) -> str:
     """The run that would tell more; of a halted trace that knows nothing yet, its rest."""
-    if not_tried and judged.verdict in ("none", "unknown"):
+    if not_tried and verdict in ("none", "unknown"):
         return "first the rest of this trace, which ended early: give it more time"
-    return next_experiment(judged.verdict, choice, judged.left)
+    return next_experiment(verdict, choice, left)
 
 
 def _estimates(
-    model: FittedStructure, chosen: Selection, not_tried: tuple[str, ...]
+    model: FittedStructure, plain: PlainModel, not_tried: tuple[str, ...]
 ) -> dict[str, Estimate]:
     """The parameters of a model; a null of a halted trace is one for now."""
-    found = parameters_of(model, chosen.plain.recorded)
+    found = parameters_of(model, plain.recorded)
     if not not_tried or model.fit is not None:
         return found
     return {

@@ -1,36 +1,29 @@
 """What is told of a choice: verdict, effects and sizes, rivals, the run that would tell more."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from identification.arrays import Array
 from identification.estimation.estimates import beside_in, of_effect
 from identification.estimation.imposed_motion import imposed_estimates
-from identification.estimation.latent_force import latent_forces
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.regression.row_fit import RowFit, rms
-from identification.estimation.regression.weighted_rows import stacked
+from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
+from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.windows import position_errors
-from identification.model.estimates import Drive, Estimate
+from identification.model.estimates import Estimate
 from identification.thresholds import HALF
 from identification.tracing.model_errors import seen_by
 from identification.tracing.probability import Evidence, probability
 from identification.tracing.regression.candidates import EffectCandidate
-from identification.tracing.regression.cross_validation import left_out_residual
 from identification.tracing.regression.stepwise import Choice, Step, equal_rivals, explained_part
-from identification.tracing.remaining_structure import signals_at, signals_of
 from identification.tracing.result import (
     Change,
     Dependence,
     EffectRival,
     FoundEffect,
-    MissingForce,
-    Residual,
     TraceVerdict,
 )
 
@@ -52,7 +45,6 @@ SAID = {
     "reversal": "the time since it last reversed or stopped (reversal)",
     "rest": "the time at rest (rest)",
 }
-POSITION = "position"  # the residual of the free run
 RIVALS_SHOWN = 6  # rivals of each effect
 
 
@@ -70,9 +62,7 @@ def explains_most(share: float) -> bool:
     return share <= HALF
 
 
-def found_effect(
-    step: Step, after: FittedStructure, choice: Choice, terms: Evidence
-) -> FoundEffect:  # fmt: skip
+def found_effect(step: Step, after: FittedStructure, terms: Evidence) -> FoundEffect:
     """An effect taken, with its sizes in the refined plant, the share it explains and how probable
     it is by the evidence, which it shares with rivals that explain as much."""
     effect = step.candidate.effect
@@ -118,7 +108,7 @@ def _test_rms(step: Step, rival: EffectCandidate, seen: EffectRows | None) -> fl
     o = rival.outcomes[MECHANICAL]
     slowest = step.candidate.outcomes.get(MECHANICAL, o).slowest
     if seen is None:
-        return rms(left_out_residual(o.rows, slowest)[0])
+        return rms(left_unseen(o.rows.at(o.rows.speed >= slowest)))
     parts = [
         with_effect(seen, MECHANICAL, rival.effect, rival.values, i, rows)
         for i, rows in enumerate(seen.parts[MECHANICAL])
@@ -160,94 +150,3 @@ def parameters_of(model: FittedStructure, recorded: RecordedLogs) -> dict[str, E
     if model.imposed:
         return imposed_estimates(model.plant, model.stage.theta, model.sd, recorded)
     return structure_estimates(model.plant, model.sd, recorded)
-
-
-def residuals_of(
-    start: EffectRows, first: Mapping[str, RowFit], end: EffectRows, base: Mapping[str, RowFit]
-) -> tuple[Residual, ...]:
-    """Rows for the pictures."""
-    out = []
-    for equation in (MECHANICAL, ACTUATOR):
-        if equation not in first or len(first[equation].rows.b) != len(base[equation].rows.b):
-            continue
-        a, b = first[equation], base[equation]
-        keep = b.rows.speed >= b.slowest
-        windows = [one.sliding if equation == MECHANICAL else one.whole for one in start.logs]
-        t, number, offset = [], [], 0.0
-        for i, (one, w) in enumerate(zip(start.logs, windows, strict=True)):
-            assert w is not None
-            t.append(offset + one.log["t"][w.middle] - one.log["t"][0])
-            number.append(np.full(len(w.start), float(i)))
-            offset += one.log.duration
-        signals = {k: v[keep] for k, v in signals_at(start, equation).items()}
-        out.append(
-            Residual(
-                equation,
-                np.concatenate(t)[keep],
-                np.concatenate(number)[keep],
-                (a.fit.residual * a.rows.sd)[keep],
-                (b.fit.residual * b.rows.sd)[keep],
-                b.rows.sd[keep],
-                signals,
-            )
-        )
-    return tuple(out)
-
-
-def missing_force(
-    before: FittedStructure, after: FittedStructure, logs: Sequence[MotionLog], slowest: float
-) -> MissingForce | None:
-    """The force that either model lacks on these logs, above a speed [m/s]; None where no body
-    slides."""
-    was = latent_forces(before.plant, logs, slowest)
-    now = latent_forces(after.plant, logs, slowest) if after is not before else was
-    both = [old.slides & new.slides for old, new in zip(was.logs, now.logs, strict=True)]
-    if not any(np.any(one) for one in both):
-        return None
-    every: dict[str, list[Array]] = {}
-    t, number, offset = [], [], 0.0
-    left: list[tuple[Array, Array, Array]] = []
-    for i, (one, old, new) in enumerate(zip(logs, was.logs, now.logs, strict=True)):
-        at = np.flatnonzero(both[i])
-        t.append(offset + one.log["t"][at] - one.log["t"][0])
-        number.append(np.full(len(at), float(i)))
-        offset += one.log.duration
-        left.append((-old.force[at], -new.force[at], new.sd[at]))
-        for name, values in signals_of(one).items():
-            every.setdefault(name, []).append(values[at])
-    signals = {k: np.concatenate(v) for k, v in every.items() if len(v) == len(logs)}
-    old_force, new_force, sd = (np.concatenate(parts) for parts in zip(*left, strict=True))
-    sliding = Residual(
-        MECHANICAL, np.concatenate(t), np.concatenate(number), old_force, new_force, sd,
-        {k: v for k, v in signals.items() if len(v) and np.ptp(v) > 0},
-    )  # fmt: skip
-    return MissingForce(was, now, sliding)
-
-
-def run_residual(
-    before: FittedStructure, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
-) -> Residual | None:
-    """Error of the shown position in the free run, sample by sample, for the pictures.
-
-    None where a model's inertia is of no account, or its run cannot be followed.
-    """
-    if before.imposed or after.imposed:
-        return None
-    found: list[list[Array]] = []
-    for model in (before,) if after is before else (before, after):
-        errors = [position_errors(model.plant, log, drive) for log in logs]
-        found.append([e for e in errors if e is not None])
-        if len(found[-1]) < len(logs):
-            return None
-    ends = np.cumsum([0.0, *(log.log.duration for log in logs)])
-    sizes = [len(log.log) for log in logs]
-    t = [log.log["t"] - log.log["t"][0] + at for log, at in zip(logs, ends[:-1], strict=True)]
-    return Residual(
-        POSITION,
-        np.concatenate(t),
-        np.repeat(np.arange(float(len(logs))), sizes),
-        np.concatenate(found[0]),
-        np.concatenate(found[-1]),
-        np.repeat([log.noise.y for log in logs], sizes),
-        {},
-    )

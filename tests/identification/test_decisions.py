@@ -31,13 +31,13 @@ ENOUGH = {
 }  # fmt: skip
 # Where a search begins, what it tries and when it ends.
 STEER = {
-    "FAR_BEYOND", "HARDLY", "LAG", "LASTING_SHARE", "LASTING_STEP", "LEAD", "LONG_TIME",
-    "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN", "WORTH",
+    "FAR_BEYOND", "LAG", "LASTING_SHARE", "LASTING_STEP", "LEAD", "LONG_TIME",
+    "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN",
 }  # fmt: skip
 # What still decides outside of `thresholds`.
 ELSEWHERE = {
     "BENT", "BRAKES", "BY_CHANCE", "CLEARLY", "INERTIA_SHARE", "KICK_FROM", "KICK_GAINS",
-    "MOST_EXPLAINED", "MOST_SPIKES", "MOTION_SHARE", "RIGID_CONTACT",
+    "MOST_EXPLAINED", "MOST_SPIKES", "RIGID_CONTACT",
     "SECOND_SIGNAL", "SHIFT", "SIGNAL_SHOWN", "SMALL_TERM",
 }  # fmt: skip
 LITERALS = {0.5, 1e-300, 3, 4, 50}  # halves, rows of a statistic, and what is not to be divided by

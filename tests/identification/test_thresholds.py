@@ -92,7 +92,7 @@ from identification.tracing.free_run.backward_elimination import (
 )
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.levels_refitted import explains_the_change, follows_worse
-from identification.tracing.model_errors import NoiseFloor, OnTest, lacks, share_left
+from identification.tracing.model_errors import OnTest, lacks, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.predictive_check import is_worse
 from identification.tracing.recorded_rows import told_by_speed
@@ -103,13 +103,13 @@ from identification.tracing.regression.stepwise import (
     Step,
     equal_rivals,
     gives_way,
-    is_trusted,
     material,
     merit,
 )
 from identification.tracing.result import Errors
 from identification.tracing.verdict import explains_most as explains_most_of_it
 from tests.identification.motor_logs import K_A, NOISE, H, made, plant, seen
+from tests.identification.tracing.settings import setting_of
 
 N = 100  # rows
 NONE = np.zeros(1)
@@ -172,12 +172,11 @@ def run(misfit: float, *, imposed: bool = False) -> FittedStructure:
 
 def setting(plain: float, *, first: float = 1.0) -> Setting:
     """A trace of which the plain run, and its equation of sliding, leave this."""
-    before = {MECHANICAL: leaving(first)}
-    rig, rng = Rig("motor", force_per_command=K_A), np.random.default_rng(0)
-    return Setting([log()], [log()], "command", rig, {}, stage(), before, run(plain), rng)
+    model = replace(run(plain), outcomes={MECHANICAL: leaving(first)})
+    return setting_of([log()], model, {}, np.random.default_rng(0))
 
 
-FLOOR = NoiseFloor(1.0, None)  # of the sensors
+FLOOR = Errors(1.0, None, None, None)  # of the sensors
 
 
 def left_of(force: float) -> OnTest:
@@ -362,8 +361,6 @@ def test_half() -> None:
     assert explains_most(1.0, 0.45) and not explains_most(1.0, 0.55)
     assert 1.0 + 0.24 < decisive(1.6, ()) < 1.0 + 0.375
     assert not is_unexplained(0.4) and is_unexplained(0.625)
-    # Where much is left, an effect that does not carry over has to explain most of it.
-    assert not is_trusted(1.0, 0.44) and is_trusted(1.0, 0.69)
 
 
 def test_far_less() -> None:
@@ -405,7 +402,6 @@ def test_worse() -> None:
     assert LeftOfEquation(1.06, 1.0, 9.0).surer
     assert not is_worse(10.0, 10.3) and is_worse(10.0, 10.8)
     assert not is_worse(1.0, 1.4)  # both are noise
-    assert is_trusted(0.94, 0.0) and not is_trusted(0.97, 0.0)
 
 
 def test_of_account() -> None:

@@ -8,49 +8,50 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.effects._library import Library
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
+from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
-from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halt
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, EARNS, HOPELESS, OF_ACCOUNT
-from identification.tracing.regression.stepwise import Choice, Step, absorb
-
-LEAST_MASS = 0.1  # of the mass before, that a regression may leave
+from identification.tracing.plain_model import PlainModel
+from identification.tracing.regression.stepwise import Choice, Step, with_candidate
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What every trial needs: logs whole and cut short, how they are driven, and the library.
+    """What every trial needs: the plain model and its logs, and these cut short.
 
     made: models by the keys of their effects.
     """
 
-    logs: Sequence[MotionLog]
-    short: Sequence[MotionLog]
-    drive: Drive
-    rig: Rig
-    library: Library
-    start: EffectRows
-    first: Mapping[str, RowFit]
-    plain: FittedStructure
+    plain: PlainModel
     rng: np.random.Generator
+    short: Sequence[MotionLog] = ()
     made: dict[frozenset[str], FittedStructure] = field(default_factory=dict)
 
     @property
     def recorded(self) -> RecordedLogs:
         """The logs as the estimator takes them."""
-        return RecordedLogs(tuple(self.logs), self.rig, self.drive, halt=self.halt)
+        return self.plain.rows.recorded
+
+    @property
+    def logs(self) -> tuple[MotionLog, ...]:
+        """The logs, whole."""
+        return self.recorded.logs
+
+    @property
+    def drive(self) -> Drive:
+        """What drives their runs."""
+        return self.recorded.drive
 
     @property
     def halt(self) -> Halt:
         """Whether trials are to go on."""
-        return self.logs[0].halt
+        return self.recorded.halt
 
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
@@ -59,12 +60,7 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
     if not steps:
         return ADEQUATE
     least = ADEQUATE if setting.drive == "command" else ASTRAY
-    return max(least, 1.0 + OF_ACCOUNT * (setting.plain.misfit - 1.0))
-
-
-def seconds(setting: Setting) -> float:
-    """Duration of all logs [s]; what a run leaves counts as one independent sample a second."""
-    return sum(one.log.duration for one in setting.logs)
+    return max(least, 1.0 + OF_ACCOUNT * (setting.plain.model.misfit - 1.0))
 
 
 def fitted(choice: Choice, setting: Setting) -> FittedStructure:
@@ -76,28 +72,23 @@ def fitted(choice: Choice, setting: Setting) -> FittedStructure:
 
 
 def _model(choice: Choice, setting: Setting) -> FittedStructure:
-    near = None if setting.plain.imposed else setting.plain.plant.friction
+    plain = setting.plain.model
+    near = None if plain.imposed else plain.plant.friction
     model = fitted_structure(
         choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
     )  # fmt: skip
-    if model.imposed:
-        return model
-    if setting.halt.reached():
+    if setting.halt.reached() and not model.imposed:
         keys = ", ".join(step.candidate.effect.key for step in choice.steps)
         setting.halt.left_out(f"the refinement of {keys} on the free run, to its end")
     return model
 
 
-def first_alone(choice: Choice, setting: Setting) -> FittedStructure | None:
-    """The model of a choice of one effect, where the equations call for no other."""
-    return fitted(choice, setting) if choice.steps and equations_explained(choice.base) else None
-
-
-def suffices(alone: FittedStructure | None, choice: Choice, setting: Setting) -> bool:
-    """Whether the run is followed with the effects of a choice, so that no other is looked for."""
-    return alone is not None and (
-        alone.imposed or alone.misfit <= followed_up_to(choice, setting, False)
-    )
+def suffices(choice: Choice, setting: Setting) -> bool:
+    """Whether neither the equations nor the run call for another effect beside those chosen."""
+    if not (choice.steps and equations_explained(choice.base)):
+        return False
+    model = fitted(choice, setting)
+    return model.imposed or model.misfit <= followed_up_to(choice, setting, False)
 
 
 def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
@@ -108,7 +99,7 @@ def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
     """
     best: tuple[Choice, FittedStructure] | None = None
     for n in range(1, len(choice.steps) + 1):
-        part, whole = first_steps(choice, n), n == len(choice.steps)
+        part, whole = only(choice, choice.steps[:n]), n == len(choice.steps)
         if not whole and not equations_explained(choice.steps[n].base):
             continue
         model = fitted(part, setting)
@@ -122,7 +113,7 @@ def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
                     f"{step.candidate.effect.key}, called for by the equations, on the free run"
                 )
             break
-    return best or (choice, setting.plain)
+    return best or (choice, setting.plain.model)
 
 
 def earned(before: float) -> float:
@@ -143,29 +134,19 @@ def equations_explained(base: Mapping[str, RowFit]) -> bool:
     return all(mean_square(base[e]) <= ASTRAY for e in (MECHANICAL, ACTUATOR) if e in base)
 
 
-def first_steps(choice: Choice, count: int) -> Choice:
-    """The choice up to so many effects."""
-    if count == len(choice.steps):
-        return choice
-    return only(choice, choice.steps[:count])
-
-
 def only(choice: Choice, stay: tuple[Step, ...]) -> Choice:
-    """The choice with these of its steps."""
+    """The choice with these of its steps; those tried are remembered."""
+    if len(stay) == len(choice.steps):
+        return choice
     end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
-
-
-def keeping(plant: Plant, stay: Sequence[Step]) -> Plant:
-    """The plant with the effects of these steps only."""
-    keys = {step.candidate.effect.key for step in stay}
-    return replace(plant, effects=tuple(a for a in plant.effects if a.key in keys))
+    return replace(choice, steps=stay, end=end, base=base)
 
 
 def without(model: FittedStructure, stay: Sequence[Step], setting: Setting) -> Plant:
     """The model's plant with the effects of these steps only; the plain one where none stays."""
-    kept = keeping(model.plant, stay)
-    return kept if stay else replace(kept, friction=setting.plain.plant.friction)
+    keys = {step.candidate.effect.key for step in stay}
+    kept = replace(model.plant, effects=tuple(a for a in model.plant.effects if a.key in keys))
+    return kept if stay else replace(kept, friction=setting.plain.model.plant.friction)
 
 
 def with_steps(
@@ -174,5 +155,5 @@ def with_steps(
     """The stage with these effects in it, and what it leaves."""
     stage, outcomes = start, first
     for step in steps:
-        stage, outcomes = settled_fits(replace(absorb(stage, step.candidate), scales={}))
+        stage, outcomes = with_candidate(stage, step.candidate)
     return stage, outcomes

@@ -10,7 +10,7 @@ from identification.errors import UserError
 from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD, by_load
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit, briefly, refit
-from identification.estimation.windowed_run.run_errors import judge, loss, misfit
+from identification.estimation.windowed_run.run_errors import judge, loss
 from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.model.karnopp import Karnopp
@@ -20,9 +20,7 @@ from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.free_run.trial_structures import Trial, seen_in_run
 from identification.tracing.regression.stepwise import Step
 
-WORTH = 1.25  # times that, up to which an effect's other starts are tried
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
-LARGER = 3  # starts of a play, from the best up
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +33,9 @@ class RunContender:
     misfit: float
 
 
-@dataclass(frozen=True, eq=False)
-class Begun:
-    """A trial after a first search: the plant, what its run leaves, and other plants to begin
-    from."""
-
-    trial: Trial
-    plant: Plant
-    loss: float
-    misfit: float
-    others: tuple[Plant, ...]
-
-
-def begun_with(trial: Trial, setting: Setting) -> list[Begun]:
-    """The effect at the best of its starts, after a first search; empty where it has none."""
+def contender(trial: Trial, setting: Setting) -> RunContender | None:
+    """The effect from the best of its starts, after a first search refined a little on the short
+    logs; None where no plant can have it there."""
     plants = []
     for values in trial.values:
         try:
@@ -58,21 +45,16 @@ def begun_with(trial: Trial, setting: Setting) -> list[Begun]:
         except UserError:
             continue
     if not plants:
-        return []
-    errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
+        return None
     try:
+        errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        at = int(np.argmin(costs))
-        first = _first(plants[at], trial.effect, setting)
-        others: tuple[Plant, ...] = ()
-        if trial.effect.place.shows and len(trial.effect.params) == 1:
-            # The plain parameters are bent to do without it: a larger size may be the better start.
-            others = tuple(plants[at + 1 : at + LARGER])
-        left_by = misfit(first, setting.short, setting.drive)
-        return [Begun(trial, first, loss(errors_of(first)), left_by, others)]
+        first = _first(plants[int(np.argmin(costs))], trial.effect, setting)
+        found = refit(first, setting.short, setting.drive, prior=even(first), effort="quick")
     except UserError:  # two effects of a kind that a plant takes one of
-        return []
+        return None
+    return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:
@@ -90,24 +72,6 @@ def less_load(base: Plant, acting: Acting) -> Plant:
     return replace(base, friction=Karnopp.from_array(nine))
 
 
-def on_short_logs(one: Begun, setting: Setting, enough: float) -> RunContender | None:
-    """The contender refined a little on the short logs, from its other starts too.
-
-    enough: misfit from which it may be the best; far above it no other start is tried.
-    """
-    trial = one.trial
-    try:
-        found = near_start(one.plant, setting)
-        for other in one.others:
-            if found.misfit <= COMPLETE or found.misfit > WORTH * enough:
-                break
-            again = near_start(_first(other, trial.effect, setting), setting)
-            found = min(found, again, key=lambda x: x.misfit)
-    except UserError:
-        return None
-    return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
-
-
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
@@ -116,11 +80,6 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
     return plant
-
-
-def near_start(plant: Plant, setting: Setting) -> Refit:
-    """The plant after a first search refined a little on the short logs."""
-    return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:

@@ -6,7 +6,7 @@ run, beside what was found and in its place; it is taken only if the run then le
 nothing but noise, so a term that merely helps is never taken here.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,37 +14,26 @@ from scipy.stats import chi2
 
 from identification.effects._base import Effect
 from identification.estimation.regression.effect_columns import by_load, equations_of
-from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.motion_log import shortened
-from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
+from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit
 from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HALF, HOPELESS, OF_ACCOUNT
+from identification.thresholds import ADEQUATE, HALF, HOPELESS, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
-    earned,
     enough,
     equations_explained,
-    seconds,
     with_steps,
 )
-from identification.tracing.free_run.contenders import (
-    Begun,
-    RunContender,
-    begun_with,
-    near_start,
-    on_short_logs,
-    on_whole_logs,
-)
+from identification.tracing.free_run.contenders import RunContender, contender, on_whole_logs
 from identification.tracing.free_run.trial_structures import driven_only, structures
 from identification.tracing.regression.candidates import EffectCandidate, trial
-from identification.tracing.regression.significance import by_luck
-from identification.tracing.regression.stepwise import Choice, Step, absorb
+from identification.tracing.regression.stepwise import Choice, Step, with_candidate
 
 SHORT_SECONDS = 15.0  # s of each log on which contenders are tried first
 RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
@@ -58,22 +47,14 @@ def judged_forward(
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
     if model.imposed or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
-    if model.misfit > enough(setting, choice.steps) and hidden(choice):
-        found = setting.halt.tried(
-            RUN_ALONE, lambda: _contested(choice, model, setting, report), None
-        )
-        if found is not None:
-            return found
-    return choice, model
+    if model.misfit <= enough(setting, choice.steps) or not hidden(choice):
+        return choice, model
 
+    def contested() -> tuple[Choice, FittedStructure] | None:
+        cut = [most_left(model.plant, x, setting.drive, SHORT_SECONDS) for x in setting.logs]
+        return contest(choice, model, replace(setting, short=cut), report)
 
-def _contested(
-    choice: Choice, model: FittedStructure, setting: Setting, report: Report
-) -> tuple[Choice, FittedStructure] | None:
-    """The choice and its model with what a contest on short logs adds or exchanges, if anything."""
-    logs, drive = setting.logs, setting.drive
-    short = [most_left(model.plant, one, drive, SHORT_SECONDS) for one in logs]
-    return contest(choice, model, replace(setting, short=short), report)
+    return setting.halt.tried(RUN_ALONE, contested, None) or (choice, model)
 
 
 def hidden(choice: Choice) -> bool:
@@ -94,59 +75,22 @@ def contest(
     choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure] | None:
     """The best structure of one effect more, or of another in an effect's place, if decisive."""
-    begun = list[Begun]()
+    found = list[RunContender]()
     tried = list(structures(choice, model, setting))
     for i, attempt in enumerate(tried):
-        begun += begun_with(attempt, setting)
-        report("judging", 0.5 * (i + 1) / len(tried))
-    # What a sensor shows leads the run astray, so its loss tells nothing.
-    begun.sort(key=lambda one: (one.misfit > ADEQUATE, one.loss))
-    promising = earning(choice, model, setting)
-    screened = screening(begun, setting, promising, report)
-    if not screened or screened[0].misfit > promising:
+        one = contender(attempt, setting)
+        found += [] if one is None else [one]
+        report("judging", (i + 1) / len(tried))
+    if not found:
         return None
-    winner = screened[0]
+    winner = min(found, key=lambda one: one.misfit)
     done = on_whole_logs(winner, setting)
-    rivals = [one for one in screened if one.effect.key != winner.effect.key]
+    rivals = [one for one in found if one.effect.key != winner.effect.key]
     if done.misfit > decisive(model.misfit, rivals) or scales_alone(
         winner.effect, done.plant, setting.logs
     ):
         return None
-    taken = _taken(winner, done, rivals, setting, model.misfit)
-    return None if by_luck(taken[0].steps[-1].p_value) else taken
-
-
-def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
-    """Misfit on the short logs that one effect more has to get below, beside others.
-
-    What a refinement on the short logs alone does without it is no merit of the effect.
-    """
-    if not choice.steps:
-        return np.inf
-    without = near_start(model.plant, setting).misfit
-    return np.inf if without <= COMPLETE else earned(without)
-
-
-def screening(
-    begun: Sequence[Begun], setting: Setting, promising: float, report: Report
-) -> list[RunContender]:
-    """The contenders refined a little on the short logs, the best first.
-
-    begun: those followed first, then from the least loss up. Once one is followed, those far behind
-    it are not tried.
-    """
-    screened = list[RunContender]()
-    lost = np.inf
-    for i, one in enumerate(begun):
-        if one.misfit > lost:
-            continue
-        found = on_short_logs(one, setting, promising)
-        if found is not None:
-            screened.append(found)
-            if found.misfit <= ADEQUATE:
-                lost = ASTRAY if one.misfit <= ADEQUATE else lost
-        report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
-    return sorted(screened, key=lambda one: one.misfit)
+    return _taken(winner, done, rivals, setting, model.misfit)
 
 
 def scales_alone(effect: Effect, plant: Plant, logs: Sequence[MotionLog]) -> bool:
@@ -182,41 +126,32 @@ def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> Mot
 
 
 def _taken(
-    winner: RunContender,
-    done: Refit,
-    rivals: Sequence[RunContender],
-    setting: Setting,
+    winner: RunContender, done: Refit, rivals: Sequence[RunContender], setting: Setting,
     before: float,
-) -> tuple[Choice, FittedStructure]:
-    """The choice with the winner as its last step, and the model."""
-    stage, base = with_steps(winner.steps, setting.start, setting.first)
-    values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
-    count = seconds(setting)
-    scaled = [_as_candidate(one, stage, base, count * (before - one.misfit)) for one in rivals]
-    mine = _as_candidate(
-        replace(winner, plant=done.plant), stage, base, count * (before - done.misfit)
-    )
+) -> tuple[Choice, FittedStructure]:  # fmt: skip
+    """The choice with the winner as its last step, and the model; before: misfit without it."""
+    plain = setting.plain
+    stage, base = with_steps(winner.steps, plain.start, plain.first)
+    seconds = sum(one.log.duration for one in setting.logs)
+
+    def candidate(one: RunContender) -> EffectCandidate:
+        """A contender as the equations see it; what a run leaves counts as one sample a second."""
+        values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
+        told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
+        gain = seconds * (before - one.misfit)
+        return EffectCandidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
+
+    mine = candidate(replace(winner, plant=done.plant, misfit=done.misfit))
+    others = sorted(map(candidate, rivals), key=lambda c: -c.gain)
     explained = 1.0 - max(done.misfit - 1.0, 0.0) / max(before - 1.0, 1e-300)
-    p_value = luck(mine, len(setting.library))
-    step = Step(
-        replace(mine, values=values), p_value, tuple(sorted(scaled, key=lambda c: -c.gain)),
-        stage, base, explained,
-    )  # fmt: skip
-    end, last = settled_fits(replace(absorb(stage, step.candidate), scales={}))
-    choice = Choice(setting.start, setting.first, (*winner.steps, step), end, last, ())
+    p_value = luck(mine, len(plain.library))
+    step = Step(mine, p_value, tuple(others), stage, base, explained)
+    end, last = with_candidate(stage, mine)
+    choice = Choice(plain.start, plain.first, (*winner.steps, step), end, last)
     return choice, FittedStructure(end, last, done.plant, done.sd, False, done.misfit)
 
 
 def luck(candidate: EffectCandidate, tried: int) -> float:
-    """Chance that any of so many effects gains as much, every second counted as one sample."""
+    """Chance that any of so many effects gains as much."""
     free = len(candidate.effect.params)
     return float(min(1.0, tried * chi2.sf(max(candidate.gain, 0.0), free)))
-
-
-def _as_candidate(
-    one: RunContender, stage: EffectRows, base: Mapping[str, RowFit], gain: float
-) -> EffectCandidate:
-    """A contender as the equations see it."""
-    values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
-    told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
-    return EffectCandidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)

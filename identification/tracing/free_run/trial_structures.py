@@ -62,21 +62,21 @@ def _beside(
     ranked = sorted(tried, key=lambda one: -one.gain)
     shown = {one.effect.key for one in ranked[: RIVALS_TRIED if instead else 0]}
     free = loose(base, setting.drive)
-    for key, effect in setting.library.items():
+    for key, effect in setting.plain.library.items():
         if key in keys or key in ABSORBED:
             continue
         if setting.drive == "force" and effect.place.in_actuator:
             continue
-        if effect.place.elastic and rigid(setting.first):
+        if effect.place.elastic and rigid(setting.plain.first):
             continue
-        if not all(gives_way(one, setting.first) for one in tried if one.effect.key == key):
+        if not all(gives_way(one, setting.plain.first) for one in tried if one.effect.key == key):
             continue
         # Where every trial is a search, what the equations chose is not contested by all.
         if key in shown or (seen_in_run(effect) and not (instead and free)):
             own = base
             values = [inside(effect, regressed[key].values)] if key in regressed else []
             if values and effect.place.in_stops:
-                own, values = grown(regressed[key], base, setting.start)
+                own, values = grown(regressed[key], base, setting.plain.start)
             values += grid(effect, base, setting.short)
             if values:
                 yield Trial(steps, own, effect, values)

@@ -24,7 +24,6 @@ from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
     mean_square,
-    rough,
     row_fit,
     settled_fits,
 )
@@ -35,7 +34,7 @@ from identification.estimation.regression.signals_behind_effects import (
     shown_to_true,
 )
 from identification.progress import Halted, Progress
-from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
+from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
     FirstShape,
@@ -44,7 +43,6 @@ from identification.tracing.regression.candidates import (
     refined,
     unrefined,
 )
-from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import by_luck, chance
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
@@ -52,7 +50,6 @@ MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
 IN_SIGHT = 0.1  # of what the best shape of any effect's grid gains, from which a shape is refined
-HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even searched
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
 FURTHER_EFFECT = "a further effect beside the first"
@@ -118,8 +115,6 @@ def choose(
                 stage, base, steps = polished(stage, base, steps)
     except Halted:
         start.logs[0].halt.left_out(FURTHER_EFFECT if steps else EFFECTS)
-    if steps and rough(base):
-        stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
 
 
@@ -134,50 +129,13 @@ def accepted(
         step = next_step(tried, stage, base, rng)
         if step is None:
             return None
-        after, left = settled_fits(replace(absorb(step.stage, step.candidate), scales={}))
+        after, left = with_candidate(step.stage, step.candidate)
         both = base.keys() & left.keys()
         if sum(left[e].criterion for e in both) <= sum(base[e].criterion for e in both):
             return step, after, left
-        if all(mean_square(base[e]) <= HARDLY for e in step.candidate.outcomes):
-            return None
         key = step.candidate.effect.key
         tried = [one for one in tried if one.effect.key != key]
     return None
-
-
-def trusted(
-    start: EffectRows, steps: Sequence[Step]
-) -> tuple[EffectRows, Mapping[str, RowFit], list[Step]]:
-    """The leading steps that carry over to logs left out, or else explain most of what is missing.
-
-    Where much is left whatever is added, a term that explains a part of it lowers the training
-    error and may raise that of another run (measured on EMPS). Source: cross-validation, Stone
-    (1974); `README.md` of `tracing`, (5).
-    """
-    kept: list[Step] = []
-    stage, base = start, base_fits(start)
-    slowest = base[MECHANICAL].slowest
-    error = left_out_error(stage, slowest)
-    missing = mean_square(base[MECHANICAL]) - 1.0
-    for step in steps:
-        after, found = settled_fits(replace(absorb(stage, step.candidate), scales={}))
-        without = left_out_error(after, slowest)
-        if error > 0 and MECHANICAL in step.candidate.outcomes:
-            less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
-            stays = is_trusted(without / error, less / max(missing, 1e-300))
-        else:
-            stays = is_trusted(np.inf, share(step.candidate, step.base))
-        if not stays:
-            break
-        kept.append(step)
-        stage, base, error = after, found, without
-    return stage, base, kept
-
-
-def is_trusted(left: float, explained: float) -> bool:
-    """Whether an effect carries over, or explains most; left: share of the error on logs left out,
-    explained: of what is missing. Ours: `../README.md`, (5)."""
-    return left * WORSE < 1.0 or explained >= HALF
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
@@ -187,27 +145,28 @@ def _report(report: Progress, turn: int, part: float) -> None:
 def polished(
     stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
 ) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
-    """Every effect that is in columns at its best beside the others; those not needed any more go.
+    """Every effect that is in columns at its best beside the others.
 
-    Source: the backward part of stepwise regression, Efroymson (1960).
+    Source: the exchange of stepwise regression, Efroymson (1960).
     """
     scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
-    for effect, _values in stage.chosen[:-1]:
-        others = tuple(x for x in stage.chosen if x[0].key != effect.key)
+    at_best = {step.candidate.effect.key: step.candidate.values for step in steps}
+    for effect, _ in stage.chosen[:-1]:
+        others = tuple((e, at_best[e.key]) for e, _ in stage.chosen if e.key != effect.key)
         without = replace(stage, chosen=others, scales=scales)
         candidate = best_of(without, effect, base_fits(without))
-        at = next(i for i, s in enumerate(steps) if s.candidate.effect.key == effect.key)
-        if candidate is None or merit(candidate) <= 0:
-            stage, steps = replace(stage, chosen=others), steps[:at] + steps[at + 1 :]
-            continue
-        renewed = [(e, candidate.values if e.key == effect.key else v) for e, v in stage.chosen]
-        stage = replace(stage, chosen=tuple(renewed))
-        steps = [*steps]
-        steps[at] = replace(
-            steps[at], candidate=replace(steps[at].candidate, values=candidate.values)
-        )
-    stage, found = settled_fits(replace(stage, scales={}))
-    return stage, found, steps
+        if candidate is not None:
+            at_best[effect.key] = candidate.values
+    renewed = tuple((effect, at_best[effect.key]) for effect, _ in stage.chosen)
+    stage, found = settled_fits(replace(stage, chosen=renewed, scales={}))
+    return (
+        stage,
+        found,
+        [
+            replace(s, candidate=replace(s.candidate, values=at_best[s.candidate.effect.key]))
+            for s in steps
+        ],
+    )
 
 
 def all_candidates(
@@ -406,6 +365,13 @@ def shift_rms(candidate: EffectCandidate, stage: EffectRows, one: MotionLog) -> 
     """Spread of what a sensor effect adds to the shown position [m]."""
     true = shown_to_true(candidate.effect, candidate.values, one, stage.friction)
     return float(np.std(one.log["y"] - true))
+
+
+def with_candidate(
+    stage: EffectRows, candidate: EffectCandidate
+) -> tuple[EffectRows, dict[str, RowFit]]:
+    """The stage with the effect in it, fitted, and what it leaves."""
+    return settled_fits(replace(absorb(stage, candidate), scales={}))
 
 
 def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:

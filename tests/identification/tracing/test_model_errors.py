@@ -6,7 +6,6 @@ import pytest
 
 from identification.estimation.structure_fit import FittedStructure
 from identification.tracing.model_errors import (
-    NoiseFloor,
     OnTest,
     follows,
     lacks,
@@ -25,18 +24,23 @@ def left_of(
     return OnTest(Errors(force, None, None, actuator), misfit)
 
 
+def sensors(force: float, actuator: float | None = None) -> Errors:
+    """What the sensors alone leave of the equations."""
+    return Errors(force, None, None, actuator)
+
+
 def test_without_a_force_error_nothing_is_held_against_it() -> None:
-    assert share_left(left_of(None), left_of(None), NoiseFloor(0.1, None)) == 0.0
+    assert share_left(left_of(None), left_of(None), sensors(0.1)) == 0.0
 
 
 def test_the_share_left_is_beyond_what_the_sensors_leave_alone() -> None:
-    left = share_left(left_of(2.0), left_of(1.0), NoiseFloor(0.5, None))
+    left = share_left(left_of(2.0), left_of(1.0), sensors(0.5))
     assert left == pytest.approx((1.0 - 0.25) / (4.0 - 0.25))
 
 
 def test_the_share_is_that_of_the_first_error_that_stood_out() -> None:
     """An effect of stops hardly shows in the equation of sliding, but in the run."""
-    noise = NoiseFloor(1.0, 10.0)
+    noise = sensors(1.0, 10.0)
     assert share_left(left_of(1.2, 11.0, 21.0), left_of(1.19, 11.0, 2.0), noise) == 0.05
     assert share_left(left_of(1.2, 11.0, 21.0), left_of(1.19, 11.0, 0.9), noise) == 0.0
     # A stop lost by luck is not held against what explains the force, or the actuator.
@@ -47,7 +51,7 @@ def test_the_share_is_that_of_the_first_error_that_stood_out() -> None:
 
 
 def test_a_run_that_lacks_much_comes_before_an_equation_that_lacks_little() -> None:
-    noise = NoiseFloor(1.0, None)
+    noise = sensors(1.0)
     assert share_left(left_of(1.5, None, 21.0), left_of(1.5, None, 6.0), noise) == 0.25
     assert share_left(left_of(2.5, None, 21.0), left_of(2.5, None, 6.0), noise) == 1.0
     assert share_left(left_of(1.5, None, 1.4), left_of(1.5, None, 1.0), noise) == 1.0
@@ -70,7 +74,7 @@ def test_a_run_follows_that_leaves_noise_where_more_had_been_left(
 def test_a_model_is_complete_that_leaves_hardly_more_than_noise(
     force: float | None, misfit: float | None, expected: bool
 ) -> None:
-    assert predicted(left_of(force, None, misfit), NoiseFloor(1.0, None)) is expected
+    assert predicted(left_of(force, None, misfit), sensors(1.0)) is expected
 
 
 def test_a_run_that_leaves_more_than_noise_lacks_something_where_it_is_off_the_motion(
@@ -80,11 +84,11 @@ def test_a_run_that_leaves_more_than_noise_lacks_something_where_it_is_off_the_m
     model = FittedStructure(stage(), {}, plant(), {}, False, 5.0)
     for off, lacking in ((2e-3, True), (5e-4, False)):
         monkeypatch.setattr("identification.tracing.model_errors.off", lambda _, off=off: off)
-        assert lacks(model, errors, NoiseFloor(1.0, None)) is lacking
-    assert not lacks(replace(model, misfit=1.2), errors, NoiseFloor(1.0, None))
+        assert lacks(model, errors, sensors(1.0)) is lacking
+    assert not lacks(replace(model, misfit=1.2), errors, sensors(1.0))
     far = Errors(9.0, None, None, None)  # of an equation: a run that is followed answers it
-    assert lacks(replace(model, misfit=1.2), far, NoiseFloor(1.0, None))
-    assert not lacks(replace(model, misfit=1.05), far, NoiseFloor(1.0, None))
+    assert lacks(replace(model, misfit=1.2), far, sensors(1.0))
+    assert not lacks(replace(model, misfit=1.05), far, sensors(1.0))
 
 
 @pytest.mark.parametrize(("force", "expected"), [(1.1, False), (2.0, True), (None, False)])
@@ -93,6 +97,6 @@ def test_a_prescribed_motion_lacks_force_beyond_noise_that_friction_would_feel(
 ) -> None:
     model = FittedStructure(stage(), {}, plant(), {}, True)
     errors = Errors(force, None, None, None)
-    assert lacks(model, errors, NoiseFloor(1.0, None)) is expected
-    small = NoiseFloor(1e-3, None)  # far above the noise, but nothing beside friction
+    assert lacks(model, errors, sensors(1.0)) is expected
+    small = sensors(1e-3)  # far above the noise, but nothing beside friction
     assert not lacks(model, Errors(2e-3, None, None, None), small)

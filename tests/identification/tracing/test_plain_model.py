@@ -17,7 +17,7 @@ COGGING = {"cogging": {"a": 1.5, "b": 0.0, "period": 0.012}}
 
 def plain_of(effects: dict[str, dict[str, float]] | None) -> PlainModel:
     library = built_in()
-    rows = recorded_rows([made(4, effects)], RIG, library)
+    rows = recorded_rows([made(4, effects)], RIG)
     return plain_model(rows, library, np.random.default_rng(0))
 
 

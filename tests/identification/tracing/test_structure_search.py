@@ -9,14 +9,13 @@ import pytest
 from identification.effects._library import built_in
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure
-from identification.log import Rig
 from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.structure_search import all_but_explained, by_equations
-from tests.identification.motor_logs import K_A, made, plant, seen
+from tests.identification.motor_logs import made, plant, seen
+from tests.identification.tracing.settings import setting_of
 
-MOTOR = Rig("motor", force_per_command=K_A)
 BENT = {"m": 0.5, "spring.k": 30.0, "F_sp": 2.0}  # deviations of a run that is not followed
 
 
@@ -28,7 +27,7 @@ def spring() -> tuple[Setting, Choice]:
     start, first = first_stage([one], False)
     plain = FittedStructure(start, first, plant(), {}, False, 90.0)
     library = {"spring": built_in()["spring"]}
-    setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
+    setting = setting_of([one], plain, library, rng)
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
 
 
@@ -36,7 +35,7 @@ def model(misfit: float) -> FittedStructure:
     """A plant with another spring, of which the run leaves this."""
     setting, choice = spring()
     bent = plant({"spring": {"k": 55.0}})
-    return replace(setting.plain, plant=bent, sd=BENT, misfit=misfit, stage=choice.end)
+    return replace(setting.plain.model, plant=bent, sd=BENT, misfit=misfit, stage=choice.end)
 
 
 def test_a_run_that_is_followed_has_its_own_numbers() -> None:
@@ -68,5 +67,5 @@ def test_equations_that_are_explained_answer_for_a_run_that_is_not_followed() ->
     assert acting.values["k"] == pytest.approx(40.0, rel=0.01)
     assert found.sd["spring.k"] < 1.0 and found.sd["m"] < 0.1
     assert found.sd["F_sp"] == BENT["F_sp"]  # of which the equations of sliding say nothing
-    unexplained = replace(choice, base=setting.first)
+    unexplained = replace(choice, base=setting.plain.first)
     assert by_equations(unexplained, model(90.0), setting).plant.effects[0].values["k"] == 55.0

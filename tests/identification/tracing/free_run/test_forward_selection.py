@@ -14,10 +14,9 @@ from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.parameters import even
-from identification.log import Rig
 from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting
-from identification.tracing.free_run.contenders import Begun, RunContender, less_load
+from identification.tracing.free_run.contenders import RunContender, less_load
 from identification.tracing.free_run.forward_selection import (
     decisive,
     hidden,
@@ -25,18 +24,15 @@ from identification.tracing.free_run.forward_selection import (
     luck,
     most_left,
     scales_alone,
-    screening,
 )
-from identification.tracing.free_run.trial_structures import Trial
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
+from tests.identification.tracing.settings import MOTOR, setting_of
 
-MOTOR = Rig("motor", force_per_command=K_A)
 
-
-def setting_of(seed: int, width: float) -> tuple[Setting, FittedStructure]:
+def setting_with_play(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     """What the contest needs of a log with that play in its transducer, of its own to change."""
     setting, plain = fitted_setting(seed, width)
     return replace(setting, rng=deepcopy(setting.rng), made=dict(setting.made)), plain
@@ -48,15 +44,15 @@ def fitted_setting(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     start, first = first_stage([one], False)
     rng = np.random.default_rng(0)
     plain = fitted_structure(start, first, (), RecordedLogs((one,), MOTOR, "command"), rng)
-    return Setting([one], [one], "command", MOTOR, built_in(), start, first, plain, rng), plain
+    return setting_of([one], plain, built_in(), rng), plain
 
 
 @pytest.mark.method
 def test_play_shows_in_the_run_alone_and_is_named() -> None:
-    setting, plain = setting_of(4, 4e-4)
+    setting, plain = setting_with_play(4, 4e-4)
     assert plain.misfit > 5.0
     rng = np.random.default_rng(0)
-    choice = choose(setting.start, setting.first, {}, rng, lambda _s, _p: None)
+    choice = choose(setting.plain.start, setting.plain.first, {}, rng, lambda _s, _p: None)
     found, model = judged_forward(choice, plain, setting, lambda _s, _p: None)
     (step,) = found.steps
     assert step.candidate.effect.key == "backlash"
@@ -68,8 +64,8 @@ def test_play_shows_in_the_run_alone_and_is_named() -> None:
 
 @pytest.mark.method
 def test_the_contest_is_held_on_a_stretch_of_each_log(monkeypatch: pytest.MonkeyPatch) -> None:
-    setting, plain = setting_of(4, 4e-4)
-    none = choose(setting.start, setting.first, {}, setting.rng, lambda _s, _p: None)
+    setting, plain = setting_with_play(4, 4e-4)
+    none = choose(setting.plain.start, setting.plain.first, {}, setting.rng, lambda _s, _p: None)
     seen_short: list[list[MotionLog]] = []
 
     def contest(_choice: Choice, _model: FittedStructure, own: Setting, _report: object) -> None:
@@ -85,13 +81,12 @@ def test_the_contest_is_held_on_a_stretch_of_each_log(monkeypatch: pytest.Monkey
 
 @pytest.mark.method
 def test_an_effect_taken_out_of_the_library_is_not_replaced_by_a_helper() -> None:
-    setting, plain = setting_of(4, 4e-4)
+    setting, plain = setting_with_play(4, 4e-4)
     library = {k: e for k, e in built_in().items() if k != "backlash"}
     rng = np.random.default_rng(0)
-    choice = choose(setting.start, setting.first, {}, rng, lambda _s, _p: None)
-    found, model = judged_forward(
-        choice, plain, replace(setting, library=library), lambda _s, _p: None
-    )
+    choice = choose(setting.plain.start, setting.plain.first, {}, rng, lambda _s, _p: None)
+    fewer = replace(setting, plain=replace(setting.plain, library=library))
+    found, model = judged_forward(choice, plain, fewer, lambda _s, _p: None)
     assert not found.steps and model is plain
 
 
@@ -125,38 +120,6 @@ def test_what_is_decisive() -> None:
     assert decisive(100.0, others(90.0)) == pytest.approx(9.9)  # far less than any other
     assert decisive(20.0, others(3.0)) == pytest.approx(1.5)  # another does nearly as well
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
-
-
-@pytest.mark.method
-@pytest.mark.parametrize(
-    ("first", "tried"),
-    [
-        ((1.0, 100.0), ["backlash", "compliance"]),  # followed at once: what is lost then is not
-        ((2.0, 100.0), ["backlash", "spring", "compliance"]),
-    ],
-)
-def test_contenders_are_tried_until_one_is_followed(
-    first: tuple[float, float], tried: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    setting, plain = setting_of(4, 4e-4)
-    asked: list[str] = []
-
-    def screened(one: Begun, _setting: Setting, _enough: float) -> RunContender:
-        asked.append(one.trial.effect.key)
-        misfit = 1.0 if asked == ["backlash"] else 5.0 - len(asked)
-        return RunContender((), one.trial.effect, one.plant, misfit)
-
-    monkeypatch.setattr("identification.tracing.free_run.forward_selection.on_short_logs", screened)
-    begun = [
-        Begun(Trial((), plain.plant, built_in()[key], []), plain.plant, loss, misfit, ())
-        for key, misfit, loss in (
-            ("backlash", *first), ("spring", 10.0, 1.0), ("compliance", 2.0, 50.0),
-        )
-    ]  # fmt: skip
-    found = screening(begun, setting, 8.0, lambda _stage, _share: None)
-    assert asked == tried
-    assert [one.misfit for one in found] == sorted(one.misfit for one in found)
-    assert found[0].effect.key == "backlash"
 
 
 def test_luck_grows_with_what_was_tried() -> None:

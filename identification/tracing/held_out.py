@@ -1,0 +1,163 @@
+"""What was found beside the plain model, on logs that neither the choice nor the fit has seen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.structure_fit import band
+from identification.thresholds import OF_ACCOUNT, WORSE
+from identification.tracing.model_errors import (
+    OnTest,
+    errors_of,
+    lacks,
+    on_test,
+    row_noise,
+    share_left,
+)
+from identification.tracing.parameter_drift import parameter_drift
+from identification.tracing.plain_model import PlainModel
+from identification.tracing.predictive_check import predicts_worse
+from identification.tracing.probability import Evidence, evidence
+from identification.tracing.residuals import missing_force
+from identification.tracing.result import Change, Errors, MissingForce
+from identification.tracing.structure_search import Refinement
+from identification.tracing.verdict import explains_most
+
+AS_LARGE_AS_FRICTION = (
+    "what is left of the force is larger than friction itself, by these logs' noise or by what it"
+    " hides"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """What the plain model and the refined one leave of the test logs, and of the training logs.
+
+    seen: the test logs, recorded as the others; where there are none, the training logs stand for
+    them.
+    """
+
+    plain: PlainModel
+    found: Refinement
+    seen: tuple[MotionLog, ...]
+
+    @property
+    def logs(self) -> tuple[MotionLog, ...]:
+        """The training logs."""
+        return self.plain.rows.logs
+
+    @property
+    def unseen(self) -> tuple[MotionLog, ...]:
+        """The logs that judge."""
+        return self.seen or self.logs
+
+    @cached_property
+    def before(self) -> Mapping[str, Errors]:
+        """Errors of the plain model by "train" and "test"."""
+        slowest = self.found.choice.base[MECHANICAL].slowest
+        model, drive = self.plain.model, self.plain.rows.drive
+        return errors_of(model, slowest, (), self.logs, self.seen, drive)
+
+    @cached_property
+    def after(self) -> Mapping[str, Errors]:
+        """The same of the refined one."""
+        choice, model = self.found.choice, self.found.model
+        slowest, drive = choice.base[MECHANICAL].slowest, self.plain.rows.drive
+        return errors_of(model, slowest, choice.steps, self.logs, self.seen, drive)
+
+    @cached_property
+    def now(self) -> OnTest:
+        """What the refined one leaves of the test logs."""
+        return on_test(self.found.model, self.after["test"], self.unseen, self.plain.rows.drive)
+
+    @property
+    def noise(self) -> Errors:
+        """What the sensors alone leave of the equations."""
+        base = self.found.choice.base
+        return Errors(row_noise(base, MECHANICAL) or 0.0, None, None, row_noise(base, ACTUATOR))
+
+    @property
+    def coulomb(self) -> float:
+        """The larger Coulomb level of the plain model [N]."""
+        friction = self.plain.model.plant.friction
+        return max(friction.F_cp, friction.F_cn)
+
+    @cached_property
+    def share(self) -> float:
+        """Share of what was missing on the test logs, that is left."""
+        model, drive = self.plain.model, self.plain.rows.drive
+        was = self.now
+        if self.found.model is not model:
+            was = on_test(model, self.before["test"], self.unseen, drive)
+        return share_left(was, self.now, self.noise, self.coulomb)
+
+    @cached_property
+    def changed(self) -> tuple[Change, ...]:
+        """Parameters that are others on the test logs."""
+        rig = self.plain.recorded.rig
+        choice, model = self.found.choice, self.found.model
+        return parameter_drift(model, choice.steps, self.seen, rig) if self.seen else ()
+
+    @cached_property
+    def lacking(self) -> bool:
+        """Whether something of account is missing on the training logs."""
+        return lacks(self.found.model, self.after["train"], self.noise)
+
+    @property
+    def hides_friction(self) -> bool:
+        """Whether what is left of the force, however much of it is noise, is larger than friction
+        itself, so that an effect of its size would not show."""
+        left = self.after["test"]
+        if left.force_rms is None or left.force_relative is None:
+            return False
+        return left.force_rms > self.coulomb and left.force_relative > OF_ACCOUNT
+
+    @property
+    def against(self) -> str:
+        """What the test logs hold against the effects found, "" where these explain most of what
+        was missing there and predict neither force nor position worse.
+
+        Of a machine that changed beside more is left, but no more than before.
+        """
+        beside = bool(self.changed) and self.share < 1.0 and not self.lacking
+        if not (explains_most(self.share) or beside):
+            return "more than half of what was missing on the test logs is left"
+        if self.hides_friction:
+            return AS_LARGE_AS_FRICTION
+        was, now = (one["test"].force_rms for one in (self.before, self.after))
+        if was is not None and now is not None and now > WORSE * was:
+            return f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
+        plain, after = self.plain.model, self.found.model
+        if not self.seen or plain.imposed or after.imposed:
+            return ""
+        worse = predicts_worse(plain.plant, after.plant, self.seen, self.plain.rows.drive)
+        if worse is None:
+            return ""
+        return (
+            f"the position of the test logs is predicted worse over {worse.seconds:g} s"
+            f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)"
+        )
+
+    @cached_property
+    def missing(self) -> MissingForce | None:
+        """The force that either model lacks on the test logs."""
+        choice, model = self.found.choice, self.found.model
+        slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(model))
+        return missing_force(self.plain.model, model, self.unseen, slowest)
+
+    @property
+    def evidence(self) -> Evidence:
+        """Of the effects found, by the share of the missing force that they leave: of those that
+        act in stops alone, of which the force while sliding says nothing, by the run's error if
+        that is less."""
+        of_error = float(np.sqrt(self.share))
+        of_force = None if self.missing is None else self.missing.share_left
+        steps = self.found.choice.steps
+        if of_force is None:
+            of_force = of_error
+        elif all(step.candidate.effect.place.in_stops for step in steps):
+            of_force = min(of_force, of_error)
+        return evidence(of_force, len(steps))

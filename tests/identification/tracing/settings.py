@@ -1,0 +1,35 @@
+"""What trials of structures need, of logs and a plain model that a test has made."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.effects._library import Library
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.structure_fit import FittedStructure
+from identification.log import Rig
+from identification.model.estimates import Drive
+from identification.tracing.free_run.backward_elimination import Setting
+from identification.tracing.plain_model import PlainModel
+from identification.tracing.recorded_rows import RecordedRows
+from tests.identification.motor_logs import K_A
+
+MOTOR = Rig("motor", force_per_command=K_A)
+
+
+def setting_of(
+    logs: Sequence[MotionLog], model: FittedStructure, library: Library, rng: np.random.Generator,
+    drive: Drive = "command",
+) -> Setting:  # fmt: skip
+    """The setting of a motor's logs with this plain model."""
+    recorded = RecordedLogs(tuple(logs), MOTOR, drive)
+    rows = RecordedRows(recorded, None, ())
+    plain = PlainModel(rows, model.stage, model.outcomes, model, library, recorded)
+    return Setting(plain, rng, short=tuple(logs))
+
+
+def with_plain(setting: Setting, model: FittedStructure) -> Setting:
+    """The setting with another plain model of the same rows."""
+    return replace(setting, plain=replace(setting.plain, model=model))
