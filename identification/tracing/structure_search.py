@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.fit import finished
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
@@ -30,19 +31,6 @@ INTERVALS = "the last step of the plain model's fit, with its intervals"
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
-    """The effects that the equations choose, or the first of them, and what trying them needs."""
-
-    setting: Setting
-    choice: Choice
-
-    @property
-    def plain(self) -> PlainModel:
-        """The plain model."""
-        return self.setting.plain
-
-
-@dataclass(frozen=True, eq=False)
 class Refinement:
     """The structure that the free run confirms, and its model."""
 
@@ -50,28 +38,30 @@ class Refinement:
     model: FittedStructure
 
 
-def first_effect(plain: PlainModel, rng: np.random.Generator, report: Progress) -> Selection:
-    """The effect that the equations call for first."""
+def first_effect(
+    plain: PlainModel, rng: np.random.Generator, report: Progress
+) -> tuple[Setting, Choice]:
+    """The effect that the equations call for first, and what trying it needs."""
     setting = Setting(plain, rng.spawn(1)[0])
-    choice = choose(plain.start, plain.first, plain.library, rng, report, most=1)
-    return Selection(setting, choice)
+    return setting, choose(plain.start, plain.first, plain.library, rng, report, most=1)
 
 
-def selection(begin: Selection, rng: np.random.Generator, report: Progress) -> Selection:
-    """The effects that the equations call for, one after the other."""
-    plain, begun = begin.plain, begin.choice
-    if not begun.steps or suffices(begun, begin.setting):
-        return begin
-    choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
-    return replace(begin, choice=choice)
+def selection(
+    begun: Choice, setting: Setting, rng: np.random.Generator, report: Progress
+) -> Choice:
+    """The effects that the equations call for beside the first, one after the other."""
+    if not begun.steps or suffices(begun, setting):
+        return begun
+    plain = setting.plain
+    return choose(plain.start, plain.first, plain.library, rng, report, begun)
 
 
-def share_beside(plain: PlainModel, choice: Choice) -> float:
+def share_beside(recorded: RecordedLogs, choice: Choice) -> float:
     """Share of the command's step to the next sample, that shows first beside the effects chosen.
 
     0 where the logs have it already, where no effect was chosen, and without a command.
     """
-    recorded, base, logs = plain.rows.recorded, choice.base, choice.end.logs
+    base, logs = choice.base, choice.end.logs
     of = MECHANICAL if recorded.held else ACTUATOR
     if recorded.share != 0.0 or recorded.imposed or not choice.steps or of not in base:
         return 0.0
@@ -80,10 +70,10 @@ def share_beside(plain: PlainModel, choice: Choice) -> float:
     return share_between(logs, base[of].rows, base[of].slowest)
 
 
-def refinement(chosen: Selection, report: Progress) -> Refinement:
+def refinement(choice: Choice, setting: Setting, report: Progress) -> Refinement:
     """The effects refined on the free run, without those that it does without, with those that
     only it shows."""
-    setting, choice, model = chosen.setting, chosen.choice, chosen.plain.model
+    model = setting.plain.model
     if choice.steps:
         choice, model = fewest(choice, setting)
     report("judging", 0.0)

@@ -5,7 +5,7 @@ Five stages: the logs as rows; the plain model; the effects that the equations c
 and selection); those that the free run confirms, refined; the verdict.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,19 +26,18 @@ from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
-from identification.tracing.free_run.backward_elimination import only
+from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.judgement import NOTHING, Judgement, judgement
 from identification.tracing.lag_beside import follows_with_lag, lag_beside
-from identification.tracing.plain_model import PlainModel, plain_model
+from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.residuals import residuals_of, run_residual
-from identification.tracing.result import Dependence, Left, Trace, TraceVerdict
+from identification.tracing.result import Left, Trace
 from identification.tracing.structure_search import (
     Refinement,
-    Selection,
     first_effect,
     refinement,
     selection,
@@ -64,6 +63,7 @@ BY_FORCE = (
     " in the actuator"
 )
 FOR_NOW = "for now, since the trace ended early"
+REST_FIRST = "first the rest of this trace, which ended early: give it more time"
 
 
 def trace(
@@ -171,10 +171,10 @@ def _traced(
 ) -> Trace:  # fmt: skip
     """The trace of logs on which nothing acts but the applied force and what the library has."""
     begin, settle, choose = rng.spawn(3)
-    chosen = _chosen(train, rig, library, (begin, choose), report, halt)
-    plain = chosen.plain
+    setting, choice = _chosen(train, rig, library, (begin, choose), report, halt)
+    plain = setting.plain
     report("refitting", 0.0)
-    found = refinement(chosen, report)
+    found = refinement(choice, setting, report)
     doubt = ""
     with halt.closing():
         held = HeldOut(plain, found, tuple(map(plain.rows.recorded.given, test)))
@@ -188,7 +188,8 @@ def _traced(
         held = replace(held, plain=plain, found=replace(found, model=plain.model))
     report("telling", 0.0)
     with halt.closing():
-        told = _told(held, judgement(held), halt.not_tried)
+        told = _told(held, judgement(held))
+        told = _for_now(told, held, halt.not_tried) if halt.not_tried else told
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
 
 
@@ -201,41 +202,36 @@ def _slides(log: Log, rig: Rig) -> bool:
 def _chosen(
     train: Sequence[Log], rig: Rig, library: Library,
     rngs: tuple[np.random.Generator, np.random.Generator], report: Progress, halt: Halt,
-) -> Selection:  # fmt: skip
-    """The effects that the equations call for, on logs whose command is known between its samples.
+) -> tuple[Setting, Choice]:  # fmt: skip
+    """The effects that the equations call for, on logs whose command is known between its samples,
+    and what trying them needs.
 
     rngs: of the plain model, which is begun as `fit_plant` begins, and of the choice of effects.
     """
-    _, choose = rngs
-    report("recording", 0.0)
-    first = _first(recorded_rows(train, rig, halt), library, rngs, report)
-    share = share_beside(first.plain, first.choice)
-    if share != 0.0:
-        rows = recorded_rows(train, rig, halt, share)
-        first = _first(rows, library, rngs, report)
-    return selection(first, choose, report)
-
-
-def _first(
-    rows: RecordedRows, library: Library,
-    rngs: tuple[np.random.Generator, np.random.Generator], report: Progress,
-) -> Selection:  # fmt: skip
-    """The plain model of the rows, and the effect that the equations call for first beside it."""
     begin, choose = rngs
-    report("refining", 0.0)
-    plain = plain_model(rows, library, begin)
-    report("tracing", 0.0)
-    return first_effect(plain, choose, report)
+    report("recording", 0.0)
+
+    def first(rows: RecordedRows) -> tuple[Setting, Choice]:
+        """The plain model of the rows, and the effect that they call for first beside it."""
+        report("refining", 0.0)
+        plain = plain_model(rows, library, begin)
+        report("tracing", 0.0)
+        return first_effect(plain, choose, report)
+
+    setting, choice = first(recorded_rows(train, rig, halt))
+    share = share_beside(setting.recorded, choice)
+    if share != 0.0:
+        setting, choice = first(recorded_rows(train, rig, halt, share))
+    return setting, selection(choice, setting, choose, report)
 
 
-def _told(held: HeldOut, judged: Judgement, not_tried: tuple[str, ...]) -> Trace:
+def _told(held: HeldOut, judged: Judgement) -> Trace:
     """All of it as the trace's result."""
     plain, choice, after = held.plain, held.found.choice, held.found.model
     before, rows, terms = plain.model, plain.rows, held.evidence
     left = judged.left if judged.verdict == "unknown" else NOTHING
-    share = 0.0 if judged.complete else held.share
     return Trace(
-        verdict=_so_far(judged.verdict, after, not_tried),
+        verdict=judged.verdict,
         before=held.before,
         after=held.after,
         noise_y=float(np.mean([one.noise.y for one in rows.logs])),
@@ -246,16 +242,15 @@ def _told(held: HeldOut, judged: Judgement, not_tried: tuple[str, ...]) -> Trace
         rivals=rivals_of(choice, held.seen),
         unknown=left,
         drift=judged.drift,
-        next_experiment=_next(judged.verdict, choice, left, not_tried),
-        not_tried=not_tried,
-        parameters_before=_estimates(before, plain, not_tried),
-        parameters_after=_estimates(after, plain, not_tried),
+        next_experiment=next_experiment(judged.verdict, choice, left),
+        parameters_before=parameters_of(before, plain.recorded),
+        parameters_after=parameters_of(after, plain.recorded),
         plant=after.plant,
         residuals=residuals_of(choice),
         run=run_residual(before, after, rows.logs, rows.drive),
-        remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
-        complete=judged.complete and not not_tried,
-        left=Left(share, judged.left.depends_on),
+        remarks=(*rows.remarks, *judged.remarks),
+        complete=judged.complete,
+        left=Left(0.0 if judged.complete else held.share, judged.left.depends_on),
         command_period=rows.recorded.command_period,
         curves=free_curves(choice),
         missing_force=held.missing,
@@ -263,37 +258,32 @@ def _told(held: HeldOut, judged: Judgement, not_tried: tuple[str, ...]) -> Trace
     )
 
 
-def _left_out(not_tried: tuple[str, ...]) -> list[str]:
-    """What is to be said of a trace that was halted."""
-    said = MinorRemark(f"the trace ended early; not tried: {'; '.join(not_tried)}")
-    return [said] if not_tried else []  # the verdict's sentence says it too
+def _for_now(told: Trace, held: HeldOut, not_tried: tuple[str, ...]) -> Trace:
+    """A trace that was halted: what was not looked for may be missing; a null is one for now."""
+    before, after = held.plain.model, held.found.model
+    unsure = told.verdict in ("none", "drift") and after.misfit > COMPLETE
+    rest_first = told.verdict in ("none", "unknown")
+    # The verdict's sentence says it too.
+    early = MinorRemark(f"the trace ended early; not tried: {'; '.join(not_tried)}")
+    return replace(
+        told,
+        verdict="unknown" if unsure else told.verdict,
+        complete=False,
+        next_experiment=REST_FIRST if rest_first else told.next_experiment,
+        not_tried=not_tried,
+        parameters_before=_null_for_now(told.parameters_before, before),
+        parameters_after=_null_for_now(told.parameters_after, after),
+        remarks=(*told.remarks, early),
+    )
 
 
-def _next(
-    verdict: TraceVerdict, choice: Choice, left: Dependence, not_tried: tuple[str, ...]
-) -> str:
-    """The run that would tell more; of a halted trace that knows nothing yet, its rest."""
-    if not_tried and verdict in ("none", "unknown"):
-        return "first the rest of this trace, which ended early: give it more time"
-    return next_experiment(verdict, choice, left)
-
-
-def _estimates(
-    model: FittedStructure, plain: PlainModel, not_tried: tuple[str, ...]
-) -> dict[str, Estimate]:
-    """The parameters of a model; a null of a halted trace is one for now."""
-    found = parameters_of(model, plain.recorded)
-    if not not_tried or model.fit is not None:
+def _null_for_now(
+    found: Mapping[str, Estimate], model: FittedStructure
+) -> Mapping[str, Estimate]:  # fmt: skip
+    """Parameters of a model whose fit may not have come to its end."""
+    if model.fit is not None:
         return found
     return {
         k: e if e.value is not None else replace(e, reason=f"{FOR_NOW}: {e.reason}")
         for k, e in found.items()
     }
-
-
-def _so_far(
-    verdict: TraceVerdict, after: FittedStructure, not_tried: tuple[str, ...]
-) -> TraceVerdict:
-    """The verdict of a trace that may have been halted: what was not looked for may be missing."""
-    unsure = verdict in ("none", "drift") and bool(not_tried) and after.misfit > COMPLETE
-    return "unknown" if unsure else verdict

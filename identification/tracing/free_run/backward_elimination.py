@@ -97,7 +97,7 @@ def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
     Where it is not with any, the fewest beside which no more leave clearly less. Halted, they are
     those tried so far.
     """
-    best: tuple[Choice, FittedStructure] | None = None
+    best, least = (choice, setting.plain.model), np.inf
     for n in range(1, len(choice.steps) + 1):
         part, whole = only(choice, choice.steps[:n]), n == len(choice.steps)
         if not whole and not equations_explained(choice.steps[n].base):
@@ -105,15 +105,15 @@ def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
         model = fitted(part, setting)
         if model.imposed or model.misfit <= followed_up_to(part, setting, whole):
             return part, model
-        if best is None or model.misfit < earned(best[1].misfit):
-            best = part, model
+        if model.misfit < earned(least):
+            best, least = (part, model), model.misfit
         if setting.halt.reached():
             for step in choice.steps[n:]:
                 setting.halt.left_out(
                     f"{step.candidate.effect.key}, called for by the equations, on the free run"
                 )
             break
-    return best or (choice, setting.plain.model)
+    return best
 
 
 def earned(before: float) -> float:
