@@ -12,6 +12,7 @@ from identification.thresholds import OF_ACCOUNT, WORSE
 from identification.tracing.model_errors import (
     OnTest,
     errors_of,
+    follows,
     lacks,
     on_test,
     row_noise,
@@ -69,6 +70,14 @@ class HeldOut:
         return errors_of(model, slowest, choice.steps, self.logs, self.seen, drive)
 
     @cached_property
+    def was(self) -> OnTest:
+        """What the plain model leaves of the test logs."""
+        model = self.plain.model
+        if self.found.model is model:
+            return self.now
+        return on_test(model, self.before["test"], self.unseen, self.plain.rows.drive)
+
+    @cached_property
     def now(self) -> OnTest:
         """What the refined one leaves of the test logs."""
         return on_test(self.found.model, self.after["test"], self.unseen, self.plain.rows.drive)
@@ -88,11 +97,7 @@ class HeldOut:
     @cached_property
     def share(self) -> float:
         """Share of what was missing on the test logs, that is left."""
-        model, drive = self.plain.model, self.plain.rows.drive
-        was = self.now
-        if self.found.model is not model:
-            was = on_test(model, self.before["test"], self.unseen, drive)
-        return share_left(was, self.now, self.noise, self.coulomb)
+        return share_left(self.was, self.now, self.noise, self.coulomb)
 
     @cached_property
     def changed(self) -> tuple[Change, ...]:
@@ -150,12 +155,14 @@ class HeldOut:
 
     @property
     def evidence(self) -> Evidence:
-        """Of the effects found, by the share of the missing force that they leave: of those that
-        act in stops alone, of which the force while sliding says nothing, by the run's error if
-        that is less."""
+        """Of the effects found, by the share of the missing force that they leave: none where the
+        run leaves nothing but noise; of those that act in stops alone, of which the force while
+        sliding says nothing, by the run's error if that is less."""
+        steps = self.found.choice.steps
+        if follows(self.was, self.now):
+            return evidence(0.0, len(steps))
         of_error = float(np.sqrt(self.share))
         of_force = None if self.missing is None else self.missing.share_left
-        steps = self.found.choice.steps
         if of_force is None:
             of_force = of_error
         elif all(step.candidate.effect.place.in_stops for step in steps):
