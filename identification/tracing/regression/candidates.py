@@ -65,22 +65,40 @@ def trial(
 
 @dataclass(frozen=True, eq=False)
 class FirstShape:
-    """An effect at the best of the shapes to begin with: the equations it shows in, `score` of a
-    shape, the shape and what it gains, and where it may be refined."""
+    """An effect at the best of the shapes to begin with: the equations it shows in, where it may be
+    refined, the shape and what it gains there."""
 
     stage: EffectRows
     effect: Effect
     base: Mapping[str, RowFit]
     shown_in: tuple[str, ...]
-    score: Callable[[Values], float]
-    shape: Values
-    gain: float
     bounds: tuple[tuple[float, float], ...]
+    shape: Values
+    gain: float = 0.0
 
     @property
     def by_rounds(self) -> bool:
         """Whether what it does depends on the friction itself, so that this tells little yet."""
         return needs_rounds(self.effect)
+
+    def score(self, shape: Values) -> float:
+        """Criterion with the effect at a shape."""
+        total, found = trial(self.stage, self.effect, shape, self.shown_in)
+        fair = self.by_rounds or admissible(self.effect, with_sizes(self.effect, shape, found))
+        return total if fair else OUT_OF_BOUNDS
+
+    def candidate(self, shape: Values) -> EffectCandidate | None:
+        """The effect at a shape; None where its sizes are none that it may have."""
+        total, found = trial(self.stage, self.effect, shape, self.shown_in)
+        values = with_sizes(self.effect, shape, found)
+        if not admissible(self.effect, values):
+            return None
+        return EffectCandidate(self.effect, values, found, float(self.without - total))
+
+    @property
+    def without(self) -> float:
+        """Criterion without the effect."""
+        return sum(self.base[e].criterion for e in self.shown_in)
 
 
 def first_shape(stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]) -> FirstShape | None:
@@ -97,18 +115,12 @@ def first_shape(stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]) -
         return None
     free = shape_params(effect)
     grids = [shape_grid(effect, p, stage.logs) for p in free]
-
-    def score(shape: Values) -> float:
-        total, found = trial(stage, effect, shape, shown_in)
-        fair = needs_rounds(effect) or admissible(effect, with_sizes(effect, shape, found))
-        return total if fair else OUT_OF_BOUNDS
-
+    bounds = tuple(bounds_of(p, g) for p, g in zip(free, grids, strict=True))
     names = [p.name for p in free]
     starts = [dict(zip(names, map(float, x), strict=True)) for x in product(*grids)]
-    least, best = min(((score(x), x) for x in starts), key=lambda one: one[0])
-    gain = sum(base[e].criterion for e in shown_in) - least
-    bounds = tuple(bounds_of(p, g) for p, g in zip(free, grids, strict=True))
-    return FirstShape(stage, effect, base, shown_in, score, best, float(gain), bounds)
+    begun = FirstShape(stage, effect, base, shown_in, bounds, starts[0])
+    least, best = min(((begun.score(x), x) for x in starts), key=lambda one: one[0])
+    return replace(begun, shape=best, gain=float(begun.without - least))
 
 
 def best_of(
@@ -124,43 +136,19 @@ def refined(start: FirstShape) -> EffectCandidate | None:
 
     Source: variable projection, Golub, Pereyra (1973); the shape by Nelder, Mead (1965).
     """
-    effect, shown_in, own, bounds = start.effect, start.shown_in, start.stage, start.bounds
-    free = shape_params(effect)
+    free = shape_params(start.effect)
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
-
-    def score(shape: Values) -> float:
-        return trial(own, effect, shape, shown_in)[0] if start.by_rounds else start.score(shape)
-
-    best = shaped(free, bounds, start.shape, score)
+    best = shaped(free, start.bounds, start.shape, start.score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
-    if half != best and score(half) < score(best) + PENALTY:
+    if half != best and start.score(half) < start.score(best) + PENALTY:
         best = half  # a harmonic had taken the whole of it
-    total, found = trial(own, effect, best, shown_in)
     for i in range(SUBSTITUTIONS if start.by_rounds else 0):
-        five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
-        own = replace(own, theta_f=five)
+        found = trial(start.stage, start.effect, best, start.shown_in)[1]
+        five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else start.stage.theta
+        start = replace(start, stage=replace(start.stage, theta_f=five))
         if i == 0:  # the plain friction's levels had bent its shape
-            best = shaped(free, bounds, best | defaults, score)
-        total, found = trial(own, effect, best, shown_in)
-    return _candidate(start, best, total, found)
-
-
-def unrefined(start: FirstShape) -> EffectCandidate | None:
-    """The effect at the shape it begins with; None where it cannot stand there."""
-    return _candidate(
-        start, start.shape, *trial(start.stage, start.effect, start.shape, start.shown_in)
-    )
-
-
-def _candidate(
-    start: FirstShape, shape: Values, total: float, found: dict[str, RowFit]
-) -> EffectCandidate | None:
-    """The candidate of this shape; None where its sizes are none that it may have."""
-    values = with_sizes(start.effect, shape, found)
-    if not admissible(start.effect, values):
-        return None
-    gain = sum(start.base[e].criterion for e in start.shown_in) - total
-    return EffectCandidate(start.effect, values, found, float(gain))
+            best = shaped(free, start.bounds, best | defaults, start.score)
+    return start.candidate(best)
 
 
 def shaped(

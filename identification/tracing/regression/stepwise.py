@@ -41,7 +41,6 @@ from identification.tracing.regression.candidates import (
     best_of,
     first_shape,
     refined,
-    unrefined,
 )
 from identification.tracing.regression.significance import by_luck, chance
 
@@ -187,7 +186,7 @@ def all_candidates(
 
         def done(start: FirstShape) -> EffectCandidate | None:
             near = start.by_rounds or start.gain >= least
-            return refined(start) if near else unrefined(start)
+            return refined(start) if near else start.candidate(start.shape)
 
         found: list[EffectCandidate] = []
         for i, candidate in enumerate(pool.map(done, starts)):
