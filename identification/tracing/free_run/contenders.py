@@ -15,7 +15,6 @@ from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.free_run.trial_structures import Trial, seen_in_run
 from identification.tracing.regression.stepwise import Step
@@ -83,10 +82,6 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
 
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
-    """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    logs, drive = setting.logs, setting.drive
-    found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
-    if found.misfit > COMPLETE and even(found.plant):
-        again = refit(found.plant, logs, drive, prior={}, effort="quick")
-        found = again if again.misfit < found.misfit else found
-    return found
+    """The contender refined on the whole logs."""
+    held = even(one.plant)
+    return refit(one.plant, setting.logs, setting.drive, prior=held, effort="near")

@@ -14,9 +14,8 @@ from scipy.stats import chi2
 
 from identification.effects._base import Effect
 from identification.estimation.regression.effect_columns import by_load, equations_of
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
-from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit
@@ -47,7 +46,10 @@ def judged_forward(
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
     if model.imposed or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
-    if model.misfit <= enough(setting, choice.steps) or not hidden(choice):
+    if model.misfit <= enough(setting, choice.steps):
+        return choice, model
+    # Where the equations themselves leave much, what is missing is none that they hardly show.
+    if not equations_explained(choice.base):
         return choice, model
 
     def contested() -> tuple[Choice, FittedStructure] | None:
@@ -55,20 +57,6 @@ def judged_forward(
         return contest(choice, model, replace(setting, short=cut), report)
 
     return setting.halt.tried(RUN_ALONE, contested, None) or (choice, model)
-
-
-def hidden(choice: Choice) -> bool:
-    """Whether what the run lacks may be an effect that the equations hardly show.
-
-    Where they themselves leave much, and no effect explains most of it, none is.
-    """
-    told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    return equations_explained(choice.base) or any(
-        mean_square(one.outcomes[e]) < HALF * mean_square(choice.base[e])
-        for one in choice.tried
-        for e in told
-        if e in one.outcomes
-    )
 
 
 def contest(

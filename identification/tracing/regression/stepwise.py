@@ -10,7 +10,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.effects._library import Library
-from identification.estimation.regression.effect_columns import Values, slow_motion
+from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -212,10 +212,7 @@ def next_step(
     worth = [
         c
         for c in ranked
-        if material(c, scaled, base)
-        and share(c, base) >= 1.0 - EARNS
-        and shows_fast(c, scaled, base)
-        and gives_way(c, base)
+        if material(c, scaled, base) and share(c, base) >= 1.0 - EARNS and gives_way(c, base)
     ]
     if not worth:
         return None
@@ -242,26 +239,6 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
     return tuple(
         c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
     )
-
-
-def shows_fast(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
-    """Whether an effect that acts at any speed gains where the base explains the motion at all.
-
-    In the band the body takes any force, so some effect always fits a few of its rows.
-    """
-    effect = candidate.effect
-    if not effect.place.any_speed or slow_motion(effect):
-        return True
-    gain = 0.0
-    for equation, after in candidate.outcomes.items():
-        before = base[equation]
-        keep = before.rows.speed >= before.slowest
-        if before.robust or not np.any(np.isfinite(before.rows.speed)):
-            gain += before.criterion - after.criterion
-            continue
-        less = np.sum(before.fit.residual[keep] ** 2) - np.sum(after.fit.residual[keep] ** 2)
-        gain += float(less) / stage.scale(equation) + before.rows.lost - after.rows.lost
-    return gain > PENALTY * len(effect.params)
 
 
 def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:
