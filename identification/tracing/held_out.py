@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.structure_fit import band
+from identification.estimation.structure_fit import FittedStructure, band
+from identification.model.estimates import Drive
 from identification.thresholds import OF_ACCOUNT, WORSE
 from identification.tracing.model_errors import (
     OnTest,
@@ -22,9 +23,9 @@ from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.probability import Evidence, evidence
+from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import missing_force
 from identification.tracing.result import Change, Errors, MissingForce
-from identification.tracing.structure_search import Refinement
 from identification.tracing.verdict import explains_most
 
 AS_LARGE_AS_FRICTION = (
@@ -42,8 +43,14 @@ class HeldOut:
     """
 
     plain: PlainModel
-    found: Refinement
+    choice: Choice
+    model: FittedStructure
     seen: tuple[MotionLog, ...]
+
+    @property
+    def drive(self) -> Drive:
+        """What drives the runs."""
+        return self.plain.rows.drive
 
     @property
     def logs(self) -> tuple[MotionLog, ...]:
@@ -58,34 +65,33 @@ class HeldOut:
     @cached_property
     def before(self) -> Mapping[str, Errors]:
         """Errors of the plain model by "train" and "test"."""
-        slowest = self.found.choice.base[MECHANICAL].slowest
-        model, drive = self.plain.model, self.plain.rows.drive
-        return errors_of(model, slowest, (), self.logs, self.seen, drive)
+        slowest = self.choice.base[MECHANICAL].slowest
+        return errors_of(self.plain.model, slowest, (), self.logs, self.seen, self.drive)
 
     @cached_property
     def after(self) -> Mapping[str, Errors]:
         """The same of the refined one."""
-        choice, model = self.found.choice, self.found.model
-        slowest, drive = choice.base[MECHANICAL].slowest, self.plain.rows.drive
-        return errors_of(model, slowest, choice.steps, self.logs, self.seen, drive)
+        slowest = self.choice.base[MECHANICAL].slowest
+        steps, logs = self.choice.steps, self.logs
+        return errors_of(self.model, slowest, steps, logs, self.seen, self.drive)
 
     @cached_property
     def was(self) -> OnTest:
         """What the plain model leaves of the test logs."""
-        model = self.plain.model
-        if self.found.model is model:
+        plain = self.plain.model
+        if self.model is plain:
             return self.now
-        return on_test(model, self.before["test"], self.unseen, self.plain.rows.drive)
+        return on_test(plain, self.before["test"], self.unseen, self.drive)
 
     @cached_property
     def now(self) -> OnTest:
         """What the refined one leaves of the test logs."""
-        return on_test(self.found.model, self.after["test"], self.unseen, self.plain.rows.drive)
+        return on_test(self.model, self.after["test"], self.unseen, self.drive)
 
     @property
     def noise(self) -> Errors:
         """What the sensors alone leave of the equations."""
-        base = self.found.choice.base
+        base = self.choice.base
         return Errors(row_noise(base, MECHANICAL) or 0.0, None, None, row_noise(base, ACTUATOR))
 
     @property
@@ -103,13 +109,12 @@ class HeldOut:
     def changed(self) -> tuple[Change, ...]:
         """Parameters that are others on the test logs."""
         rig = self.plain.recorded.rig
-        choice, model = self.found.choice, self.found.model
-        return parameter_drift(model, choice.steps, self.seen, rig) if self.seen else ()
+        return parameter_drift(self.model, self.choice.steps, self.seen, rig) if self.seen else ()
 
     @cached_property
     def lacking(self) -> bool:
         """Whether something of account is missing on the training logs."""
-        return lacks(self.found.model, self.after["train"], self.noise)
+        return lacks(self.model, self.after["train"], self.noise)
 
     @property
     def hides_friction(self) -> bool:
@@ -135,10 +140,10 @@ class HeldOut:
         was, now = (one["test"].force_rms for one in (self.before, self.after))
         if was is not None and now is not None and now > WORSE * was:
             return f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
-        plain, after = self.plain.model, self.found.model
-        if not self.seen or plain.imposed or after.imposed:
+        plain = self.plain.model
+        if not self.seen or plain.imposed or self.model.imposed:
             return ""
-        worse = predicts_worse(plain.plant, after.plant, self.seen, self.plain.rows.drive)
+        worse = predicts_worse(plain.plant, self.model.plant, self.seen, self.drive)
         if worse is None:
             return ""
         return (
@@ -149,16 +154,16 @@ class HeldOut:
     @cached_property
     def missing(self) -> MissingForce | None:
         """The force that either model lacks on the test logs."""
-        choice, model = self.found.choice, self.found.model
-        slowest = max(choice.base[MECHANICAL].slowest, choice.start.band, band(model))
-        return missing_force(self.plain.model, model, self.unseen, slowest)
+        own = self.choice.base[MECHANICAL].slowest
+        slowest = max(own, self.choice.start.band, band(self.model))
+        return missing_force(self.plain.model, self.model, self.unseen, slowest)
 
     @property
     def evidence(self) -> Evidence:
         """Of the effects found, by the share of the missing force that they leave: none where the
         run leaves nothing but noise; of those that act in stops alone, of which the force while
         sliding says nothing, by the run's error if that is less."""
-        steps = self.found.choice.steps
+        steps = self.choice.steps
         if follows(self.was, self.now):
             return evidence(0.0, len(steps))
         of_error = float(np.sqrt(self.share))

@@ -1,63 +1,80 @@
 """Verdict: what is left on the test logs and on those of the fit, and what is to be said of it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from identification.log import Rig
 from identification.remarks import MinorRemark
 from identification.thresholds import ASTRAY
+from identification.tracing.free_curve import free_curves
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.held_out import AS_LARGE_AS_FRICTION, HeldOut
 from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import predicted
 from identification.tracing.probability import is_probable, probability
 from identification.tracing.remaining_structure import strongest
-from identification.tracing.result import Change, Dependence, TraceVerdict
-from identification.tracing.verdict import verdict_of
+from identification.tracing.residuals import residuals_of, run_residual
+from identification.tracing.result import Dependence, Left, Trace
+from identification.tracing.verdict import (
+    found_effect,
+    next_experiment,
+    parameters_of,
+    rivals_of,
+    verdict_of,
+)
 
 NOTHING = Dependence((), 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Judgement:
-    """The verdict, on what the rest depends, what changed, and whether nothing is missing."""
-
-    verdict: TraceVerdict
-    left: Dependence
-    drift: tuple[Change, ...]
-    remarks: tuple[str, ...]
-    complete: bool
-
-
-def judgement(held: HeldOut) -> Judgement:
+def judgement(held: HeldOut) -> Trace:
     """What is to be said of a refined structure whose effects, if any, are proved by the held-out
     logs."""
-    choice, model, plain = held.found.choice, held.found.model, held.plain
-    rig, changed = plain.recorded.rig, held.changed
-    left = NOTHING
-    if held.lacking:
-        left = strongest(choice, model, held.logs, plain.rows.drive)
+    plain, choice, after, changed = held.plain, held.choice, held.model, held.changed
+    before, rows, terms = plain.model, plain.rows, held.evidence
+    left = strongest(choice, after, held.logs, held.drive) if held.lacking else NOTHING
     doubts = [*_doubts(held)]
     known = not doubts and (bool(choice.steps) or not held.lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
-    if held.lacking and held.seen and not (doubts or choice.steps or model.imposed):
-        told = plain.model.plant.friction if model.fit is None else model.fit.friction
+    if held.lacking and held.seen and not (doubts or choice.steps or after.imposed):
+        told = before.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(
-            plain.model.plant, told, held.logs, held.seen, plain.rows.drive, rig
+            before.plant, told, held.logs, held.seen, held.drive, plain.recorded.rig
         )
         if levels:
             verdict, changed, doubts = "drift", levels, [how]
-    return Judgement(
-        verdict, left, changed, (*_remarks(held, left, rig), *doubts),
-        complete=verdict != "unknown" and predicted(held.now, held.noise),
-    )  # fmt: skip
+    complete = verdict != "unknown" and predicted(held.now, held.noise)
+    unknown = left if verdict == "unknown" else NOTHING
+    return Trace(
+        verdict=verdict,
+        before=held.before,
+        after=held.after,
+        noise_y=float(np.mean([one.noise.y for one in rows.logs])),
+        noise_F=float(np.mean([one.noise.F for one in rows.logs])),
+        noise_force=held.noise.force_rms or 0.0,
+        noise_actuator=held.noise.actuator_rms,
+        effects=tuple(found_effect(s, after, terms) for s in choice.steps),
+        rivals=rivals_of(choice, held.seen),
+        unknown=unknown,
+        drift=changed,
+        next_experiment=next_experiment(verdict, choice, unknown),
+        parameters_before=parameters_of(before, plain.recorded),
+        parameters_after=parameters_of(after, plain.recorded),
+        plant=after.plant,
+        residuals=residuals_of(choice),
+        run=run_residual(before, after, rows.logs, rows.drive),
+        remarks=(*rows.remarks, *_remarks(held, left), *doubts),
+        complete=complete,
+        left=Left(0.0 if complete else held.share, left.depends_on),
+        command_period=rows.recorded.command_period,
+        curves=free_curves(choice),
+        missing_force=held.missing,
+        evidence=terms if choice.steps else (),
+    )
 
 
 def _doubts(held: HeldOut) -> Iterator[str]:
     """Why nothing is known, though effects may explain what was missing."""
-    steps, sure = held.found.choice.steps, probability(held.evidence)
+    steps, sure = held.choice.steps, probability(held.evidence)
     if steps and not is_probable(sure):
         names = " and ".join(step.candidate.effect.key for step in steps)
         yield (
@@ -68,14 +85,14 @@ def _doubts(held: HeldOut) -> Iterator[str]:
         yield AS_LARGE_AS_FRICTION
 
 
-def _remarks(held: HeldOut, left: Dependence, rig: Rig) -> Iterator[str]:
+def _remarks(held: HeldOut, left: Dependence) -> Iterator[str]:
     """What whoever reads the trace has to know of it."""
-    model = held.found.model
+    model = held.model
     if model.imposed and model.stage.imposed:
         yield "the rig forces the motion, no inertia shows: errors are those of the force alone"
     elif model.imposed:
         yield "inertia does not show beside what is left, so errors are those of the force alone"
-    elif held.found.choice.steps and model.misfit > ASTRAY:
+    elif held.choice.steps and model.misfit > ASTRAY:
         yield (
             f"the free run still leaves {np.sqrt(model.misfit):.0f} times the position's noise:"
             " band and stick limits are not to be trusted, or more is missing"
@@ -88,7 +105,7 @@ def _remarks(held: HeldOut, left: Dependence, rig: Rig) -> Iterator[str]:
     if not model.imposed and driven_only(held.logs):
         motor = (
             " nor a dead zone of the command be distinguishable from friction"
-            if rig.kind == "motor"
+            if held.plain.recorded.held
             else ""
         )
         yield (

@@ -1,6 +1,6 @@
 """Selection and refinement: effects that the equations call for, and that the run confirms."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,14 +28,6 @@ from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
 
 INTERVALS = "the last step of the plain model's fit, with its intervals"
-
-
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """The structure that the free run confirms, and its model."""
-
-    choice: Choice
-    model: FittedStructure
 
 
 def first_effect(
@@ -70,15 +62,17 @@ def share_beside(recorded: RecordedLogs, choice: Choice) -> float:
     return share_between(logs, base[of].rows, base[of].slowest)
 
 
-def refinement(choice: Choice, setting: Setting, report: Progress) -> Refinement:
+def refinement(
+    choice: Choice, setting: Setting, report: Progress
+) -> tuple[Choice, FittedStructure]:
     """The effects refined on the free run, without those that it does without, with those that
-    only it shows."""
+    only it shows; and the model."""
     model = setting.plain.model
     if choice.steps:
         choice, model = fewest(choice, setting)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    return Refinement(choice, by_equations(choice, model, setting))
+    return choice, by_equations(choice, model, setting)
 
 
 def by_equations(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:

@@ -25,19 +25,16 @@ from identification.progress import Halt, KeepGoing, Progress, quiet, without_en
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
-from identification.tracing.free_curve import free_curves
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
-from identification.tracing.judgement import NOTHING, Judgement, judgement
+from identification.tracing.judgement import judgement
 from identification.tracing.lag_beside import follows_with_lag, lag_beside
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
-from identification.tracing.residuals import residuals_of, run_residual
-from identification.tracing.result import Left, Trace
+from identification.tracing.result import Trace
 from identification.tracing.structure_search import (
-    Refinement,
     first_effect,
     refinement,
     selection,
@@ -45,12 +42,6 @@ from identification.tracing.structure_search import (
     share_beside,
 )
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
-from identification.tracing.verdict import (
-    found_effect,
-    next_experiment,
-    parameters_of,
-    rivals_of,
-)
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
 MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing can be tested"
@@ -174,21 +165,21 @@ def _traced(
     setting, choice = _chosen(train, rig, library, (begin, choose), report, halt)
     plain = setting.plain
     report("refitting", 0.0)
-    found = refinement(choice, setting, report)
+    choice, model = refinement(choice, setting, report)
     doubt = ""
     with halt.closing():
-        held = HeldOut(plain, found, tuple(map(plain.rows.recorded.given, test)))
-        if found.choice.steps and (against := held.against):
-            names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
+        held = HeldOut(plain, choice, model, tuple(map(plain.rows.recorded.given, test)))
+        if choice.steps and (against := held.against):
+            names = " and ".join(step.candidate.effect.key for step in choice.steps)
             doubt = f"the equations call for {names}, but with it {against}: not named"
-            found = Refinement(only(found.choice, ()), plain.model)
+            choice = only(choice, ())
     report("settling", 0.0)
-    if not found.choice.steps:
+    if not choice.steps:
         plain = settled_plain(plain, settle, report)
-        held = replace(held, plain=plain, found=replace(found, model=plain.model))
+        held = HeldOut(plain, choice, plain.model, held.seen)
     report("telling", 0.0)
     with halt.closing():
-        told = _told(held, judgement(held))
+        told = judgement(held)
         told = _for_now(told, held, halt.not_tried) if halt.not_tried else told
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
 
@@ -225,42 +216,9 @@ def _chosen(
     return setting, selection(choice, setting, choose, report)
 
 
-def _told(held: HeldOut, judged: Judgement) -> Trace:
-    """All of it as the trace's result."""
-    plain, choice, after = held.plain, held.found.choice, held.found.model
-    before, rows, terms = plain.model, plain.rows, held.evidence
-    left = judged.left if judged.verdict == "unknown" else NOTHING
-    return Trace(
-        verdict=judged.verdict,
-        before=held.before,
-        after=held.after,
-        noise_y=float(np.mean([one.noise.y for one in rows.logs])),
-        noise_F=float(np.mean([one.noise.F for one in rows.logs])),
-        noise_force=held.noise.force_rms or 0.0,
-        noise_actuator=held.noise.actuator_rms,
-        effects=tuple(found_effect(s, after, terms) for s in choice.steps),
-        rivals=rivals_of(choice, held.seen),
-        unknown=left,
-        drift=judged.drift,
-        next_experiment=next_experiment(judged.verdict, choice, left),
-        parameters_before=parameters_of(before, plain.recorded),
-        parameters_after=parameters_of(after, plain.recorded),
-        plant=after.plant,
-        residuals=residuals_of(choice),
-        run=run_residual(before, after, rows.logs, rows.drive),
-        remarks=(*rows.remarks, *judged.remarks),
-        complete=judged.complete,
-        left=Left(0.0 if judged.complete else held.share, judged.left.depends_on),
-        command_period=rows.recorded.command_period,
-        curves=free_curves(choice),
-        missing_force=held.missing,
-        evidence=terms if choice.steps else (),
-    )
-
-
 def _for_now(told: Trace, held: HeldOut, not_tried: tuple[str, ...]) -> Trace:
     """A trace that was halted: what was not looked for may be missing; a null is one for now."""
-    before, after = held.plain.model, held.found.model
+    before, after = held.plain.model, held.model
     unsure = told.verdict in ("none", "drift") and after.misfit > COMPLETE
     rest_first = told.verdict in ("none", "unknown")
     # The verdict's sentence says it too.

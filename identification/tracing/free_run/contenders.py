@@ -15,10 +15,12 @@ from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.free_run.trial_structures import Trial, seen_in_run
 from identification.tracing.regression.stepwise import Step
 
+LARGER = 3  # starts of a play, from the best up
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 
 
@@ -33,8 +35,8 @@ class RunContender:
 
 
 def contender(trial: Trial, setting: Setting) -> RunContender | None:
-    """The effect from the best of its starts, after a first search refined a little on the short
-    logs; None where no plant can have it there."""
+    """The effect from the best of its starts, refined a little on the short logs; None where no
+    plant can have it there."""
     plants = []
     for values in trial.values:
         try:
@@ -49,8 +51,15 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
         errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        first = _first(plants[int(np.argmin(costs))], trial.effect, setting)
-        found = refit(first, setting.short, setting.drive, prior=even(first), effort="quick")
+        at = int(np.argmin(costs))
+        found = _near(plants[at], trial.effect, setting)
+        if trial.effect.place.shows and len(trial.effect.params) == 1:
+            # The plain parameters are bent to do without it: a larger size may be the better start.
+            for other in plants[at + 1 : at + LARGER]:
+                if found.misfit <= COMPLETE:
+                    break
+                again = _near(other, trial.effect, setting)
+                found = min(found, again, key=lambda one: one.misfit)
     except UserError:  # two effects of a kind that a plant takes one of
         return None
     return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
@@ -69,6 +78,12 @@ def less_load(base: Plant, acting: Acting) -> Plant:
     nine = base.friction.array.copy()
     nine[SCALED] *= load_share(base.friction, acting)
     return replace(base, friction=Karnopp.from_array(nine))
+
+
+def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
+    """The plant after a first search refined a little on the short logs."""
+    first = _first(plant, effect, setting)
+    return refit(first, setting.short, setting.drive, prior=even(first), effort="quick")
 
 
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
