@@ -144,28 +144,28 @@ def _report(report: Progress, turn: int, part: float) -> None:
 def polished(
     stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
 ) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
-    """Every effect that is in columns at its best beside the others.
+    """Every effect that is in columns at its best beside the others; those not needed any more go.
 
-    Source: the exchange of stepwise regression, Efroymson (1960).
+    Source: the backward part of stepwise regression, Efroymson (1960).
     """
     scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
-    at_best = {step.candidate.effect.key: step.candidate.values for step in steps}
+    best = {step.candidate.effect.key: step.candidate for step in steps}
+
+    def kept(but: str = "") -> tuple[tuple[Effect, Values], ...]:
+        """The effects in columns that have not gone, but one."""
+        keys = [e.key for e, _ in stage.chosen if e.key in best and e.key != but]
+        return tuple((best[key].effect, best[key].values) for key in keys)
+
     for effect, _ in stage.chosen[:-1]:
-        others = tuple((e, at_best[e.key]) for e, _ in stage.chosen if e.key != effect.key)
-        without = replace(stage, chosen=others, scales=scales)
+        without = replace(stage, chosen=kept(effect.key), scales=scales)
         candidate = best_of(without, effect, base_fits(without))
-        if candidate is not None:
-            at_best[effect.key] = candidate.values
-    renewed = tuple((effect, at_best[effect.key]) for effect, _ in stage.chosen)
-    stage, found = settled_fits(replace(stage, chosen=renewed, scales={}))
-    return (
-        stage,
-        found,
-        [
-            replace(s, candidate=replace(s.candidate, values=at_best[s.candidate.effect.key]))
-            for s in steps
-        ],
-    )
+        if candidate is None or merit(candidate) <= 0:
+            del best[effect.key]
+        else:
+            best[effect.key] = replace(best[effect.key], values=candidate.values)
+    after, found = settled_fits(replace(stage, chosen=kept(), scales={}))
+    left = [s for s in steps if s.candidate.effect.key in best]
+    return after, found, [replace(s, candidate=best[s.candidate.effect.key]) for s in left]
 
 
 def all_candidates(
