@@ -97,6 +97,10 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
 
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
-    """The contender refined on the whole logs."""
-    held = even(one.plant)
-    return refit(one.plant, setting.logs, setting.drive, prior=held, effort="near")
+    """The contender refined on the whole logs; its asymmetries free where it falls short."""
+    logs, drive = setting.logs, setting.drive
+    found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
+    if found.misfit > COMPLETE and even(found.plant):
+        again = refit(found.plant, logs, drive, prior={}, effort="quick")
+        found = again if again.misfit < found.misfit else found
+    return found
