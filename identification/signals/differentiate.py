@@ -23,7 +23,7 @@ CUTOFF_MARGIN = 2.0
 # Share of the samples at which it stands, and levels at which it does
 RESTED, LEVELS_AT_REST = 0.05, 8
 MOST_STEPS = 1e8  # in the range of a position that is counted
-SAME_LEVEL = 1e-10  # of the range, rounding that makes no other level
+SAME_LEVEL = 100.0  # units in the last place of a usual value: rounding makes no other level
 WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
 FILTER_SETTLED = 8.0
@@ -84,6 +84,11 @@ def spectrum(y: Array, h: float) -> Spectrum:
     return Spectrum(float(np.sqrt(floor / 2.0)), min(CUTOFF_MARGIN * cut, 0.4) / h)
 
 
+def is_long_enough(y: Array) -> bool:
+    """Whether a position has the samples that its noise needs."""
+    return len(y) >= MIN_SAMPLES
+
+
 def resolution(x: Array) -> float:
     """Step of a signal that takes whole multiples of one only (an encoder's), else 0.
 
@@ -103,7 +108,8 @@ def _step_of(levels: Array) -> float:
     if len(levels) < 2:
         return 0.0
     span = float(levels[-1] - levels[0])
-    levels = levels[np.diff(levels, prepend=-np.inf) > SAME_LEVEL * span]
+    same = SAME_LEVEL * np.spacing(np.median(np.abs(levels)))
+    levels = levels[np.diff(levels, prepend=-np.inf) > same]
     count = span / float(np.min(np.diff(levels)))
     if count > MOST_STEPS:
         return 0.0

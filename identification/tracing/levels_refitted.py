@@ -19,7 +19,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant, units_of
-from identification.signals.differentiate import MIN_SAMPLES
+from identification.signals.differentiate import is_long_enough
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
 from identification.thresholds import EARNS, TWICE
@@ -45,11 +45,11 @@ def levels_refitted(
     of the old ones. Source: Nelder, Mead (1965)
     for the search; the rule is ours: `README.md`, (9).
     """
-    usual = _rms(plant, [one.log for one in train if len(one.log) >= MIN_SAMPLES], drive)
-    tests = [one.log for one in seen if BEGIN * len(one.log) >= MIN_SAMPLES]
+    usual = _rms(plant, [one.log for one in train if is_long_enough(one.log["y"])], drive)
+    tests = [one.log for one in seen if is_long_enough(_begin(one.log)["y"])]
     if not tests:
         return NO_CHANGE
-    begins = [log.part(0, round(BEGIN * len(log))) for log in tests]
+    begins = [_begin(log) for log in tests]
     if not follows_worse(_rms(plant, tests, drive, BEGIN), usual):
         return NO_CHANGE
     moved = _fitted(plant, begins, drive)
@@ -57,7 +57,8 @@ def levels_refitted(
     if not explains_the_change(was, now, usual):
         return NO_CHANGE
     sd = np.abs(_fitted(plant, tests, drive) - moved)  # by what the rest of the logs changes
-    if not np.any(np.abs(moved) > NORMAL_95 * sd):
+    half = NORMAL_95 * sd
+    if np.all((moved - half) * (moved + half) <= 0.0):
         return NO_CHANGE
     unit = units_of(rig.motion, rig.command_unit)["F_cp"]
     levels = zip(("F_cp", "F_cn"), (reported.F_cp, reported.F_cn), moved, sd, strict=True)
@@ -66,6 +67,11 @@ def levels_refitted(
         f" their rest within {now:.3g} {LENGTH[rig.motion]} rms in place of {was:.3g}"
     )
     return tuple(Change(n, unit, x, x + float(d), float(s)) for n, x, d, s in levels), said
+
+
+def _begin(log: Log) -> Log:
+    """The part of a test log on which the levels are fitted."""
+    return log.part(0, round(BEGIN * len(log)))
 
 
 def follows_worse(error: float, usual: float) -> bool:

@@ -49,7 +49,7 @@ ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
 )
-BY_FORCE = (
+TRACED_BY_FORCE = (
     "traced by the measured force: what the command leaves unknown lies between it and the force,"
     " in the actuator"
 )
@@ -128,7 +128,7 @@ def _by_force(
     if again.verdict == "unknown":
         return told
     like = " and ".join(one.effect.key for one in told.effects)
-    said = f"{BY_FORCE}, which acts like {like}" if like else BY_FORCE
+    said = f"{TRACED_BY_FORCE}, which acts like {like}" if like else TRACED_BY_FORCE
     return replace(again, remarks=(*again.remarks, said))
 
 

@@ -64,6 +64,8 @@ def test_rounding_of_the_last_digit_makes_no_new_level() -> None:
     counts = 1e-5 * np.rint(1e3 * np.sin(np.linspace(0.0, 20.0, 4000)))
     shaken = counts * (1.0 + 1e-15 * np.random.default_rng(1).standard_normal(4000))
     assert resolution(shaken) == pytest.approx(resolution(counts), rel=1e-6)
+    # Nor does one absurd value make all the others one.
+    assert resolution(np.append(np.random.default_rng(2).standard_normal(100), 1e300)) == 0.0
 
 
 def test_cutoff_falls_as_the_noise_rises() -> None:
