@@ -30,6 +30,7 @@ from design.servo_kernels import (
     Law,
     Memory,
     friction_force,
+    profiled,
 )
 from design.servo_loop import SERVO_ROWS, plain_servo_kernel, servo_kernel
 from identification.arrays import Array
@@ -219,6 +220,20 @@ def simulate_servo(
             " check the controller's gains and the effects' parameters"
         )
     return ServoRun(t, loop.reference, y, v, F, measured, F + f_noise, u, modes, *inside)
+
+
+def moved_reference(servo: Servo, reference: Array, h: float) -> Array:
+    """The reference [m], (n,) every h [s], as the servo moves it: at most at its speed and with its
+    acceleration; the servo takes it as it is."""
+    law = servo_law(servo, h)
+    held = servo_memory(servo, law, float(reference[0]), 0.0).held
+    out = np.array(reference, dtype=np.float64)
+    for i, r in enumerate(out.tolist()):
+        if servo.acceleration is not None:
+            out[i] = profiled(law.rate, law.acceleration, held, r)
+        elif i:
+            out[i] = out[i - 1] + min(max(r - out[i - 1], -law.rate), law.rate)
+    return out
 
 
 def _without_load(plant: Plant, load: SecondMass) -> Plant:

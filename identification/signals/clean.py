@@ -359,6 +359,12 @@ def _row_numbers(t: Array, h: float) -> IntArray | None:
     return rows if uneven <= _EVEN_BUT_FOR_LOST * period else None
 
 
+def rows_lost(t: Array, h: float) -> int:
+    """How many rows a clock t (n,) [s] of this period has lost, if it is even but for them."""
+    rows = _row_numbers(t, h) if len(t) > 1 and h > 0.0 else None
+    return 0 if rows is None else int(rows[-1]) + 1 - len(t)
+
+
 def _with_lost_rows(log: Log, rows: IntArray) -> Log:
     """The log on an even clock, each lost row between its neighbours: of a position on the cubic
     spline through them all, in whole counts of an encoder; of what may jump on the straight

@@ -158,7 +158,8 @@ class Trace:
     effects named that are a function of a logged signal. surroundings: what acts beside the applied
     force, which is part of the plain model: errors and parameters are of logs without it.
     missing_force: None where no body slides. evidence: terms of `probability`, where effects are
-    named.
+    named. actuator_like: where the command leaves unknown what the measured force does not, the
+    effects that this acts like: it lies in the actuator, and all else here is by the force.
     """
 
     verdict: TraceVerdict
@@ -187,6 +188,7 @@ class Trace:
     surroundings: Surroundings = NO_SURROUNDINGS
     missing_force: MissingForce | None = None
     evidence: tuple[float, ...] = ()
+    actuator_like: tuple[str, ...] | None = None
 
     @property
     def missing(self) -> tuple[float, float] | None:

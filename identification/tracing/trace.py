@@ -49,10 +49,6 @@ ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
 )
-TRACED_BY_FORCE = (
-    "traced by the measured force: what the command leaves unknown lies between it and the force,"
-    " in the actuator"
-)
 FOR_NOW = "for now, since the trace ended early"
 REST_FIRST = "first the rest of this trace, which ended early: give it more time"
 
@@ -127,9 +123,7 @@ def _by_force(
         return told
     if again.verdict == "unknown":
         return told
-    like = " and ".join(one.effect.key for one in told.effects)
-    said = f"{TRACED_BY_FORCE}, which acts like {like}" if like else TRACED_BY_FORCE
-    return replace(again, remarks=(*again.remarks, said))
+    return replace(again, actuator_like=tuple(one.effect.key for one in told.effects))
 
 
 def _without_command(log: Log) -> Log:

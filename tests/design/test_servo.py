@@ -19,6 +19,7 @@ from design.servo import (
     FrictionCompensator,
     Servo,
     ServoRun,
+    moved_reference,
     simulate_servo,
 )
 from identification.arrays import Array
@@ -235,3 +236,17 @@ def test_a_command_without_a_force_loop_closes_the_linear_loop() -> None:
     assert np.max(np.abs(found.y - lfilter(k * B, P, r))) < 1e-6
     with pytest.raises(BadModel, match="without a force loop"):
         Servo(gain, PI, direct=True)
+
+
+@pytest.mark.parametrize("acceleration", [None, 4.0])
+def test_a_reference_as_it_is_moved_makes_the_same_run(acceleration: float | None) -> None:
+    """Within the servo's speed and acceleration, and taken by the servo as it is."""
+    servo = Servo(PD, PI, rate=0.2, acceleration=acceleration)
+    slow = moved_reference(servo, step(), H)
+    speed = np.diff(slow) / H
+    assert np.max(np.abs(speed)) < 0.2 + 1e-9 and slow[-1] == pytest.approx(0.05, abs=1e-9)
+    if acceleration is not None:
+        assert np.max(np.abs(np.diff(speed))) / H < acceleration * (1.0 + 1e-6)
+    by_step, by_path = (simulate_servo(PLANT, servo, r, H) for r in (step(), slow))
+    assert np.max(np.abs(by_step.y - by_path.y)) < 1e-4
+    assert np.array_equal(moved_reference(Servo(PD, PI), step(), H), step())

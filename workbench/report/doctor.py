@@ -123,6 +123,8 @@ def _plain(found: Examined, text: str) -> str:
 
 def _clock(clock: Clock) -> str:
     even = "even" if clock.jitter < 1e-3 else f"jitters by {clock.jitter:.1%} of a period"
+    if clock.lost:
+        even = f"even but for {clock.lost} rows that are lost"
     rate = f"{1.0 / clock.h:.4g} Hz" if clock.h > 0.0 else "no rate"
     gaps = "no gaps"
     if clock.gaps:

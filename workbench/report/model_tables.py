@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from identification.effects._base import Param
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
-from identification.thresholds import OF_ACCOUNT
+from identification.thresholds import ADEQUATE, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
@@ -174,6 +174,8 @@ def _found(model: Model, shows: bool) -> str:
     if model.resonance is not None:
         hertz = number(used(model.resonance["frequency"]), 4)
         return f"{text} Two masses with a spring between them swing at {hertz} Hz."
+    if all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE:
+        return f"{text} The equation of motion leaves nothing but noise; no free run follows."
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 

@@ -38,6 +38,12 @@ def trace_sentence(traced: Traced) -> str:
     """The verdict in one or two plain sentences, how much of friction the model lacks, and whether
     it is a verdict for the time being."""
     found, said = traced.trace, _verdict_sentence(traced)
+    if found.actuator_like is not None:
+        like = " and ".join(map(words, found.actuator_like))
+        said += (
+            " That is by the measured force; between it and the command something is missing"
+            + (f", which acts like {like}." if like else ": the actuator is not linear.")
+        )
     if found.missing is not None:
         said += f" Force missing: {before_and_after(found)}."
     if found.not_tried:

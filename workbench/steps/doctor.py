@@ -18,7 +18,7 @@ from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_time
-from identification.signals.clean import LONGEST_GAP, even_clock, limits, prepare, repair
+from identification.signals.clean import LONGEST_GAP, even_clock, limits, prepare, repair, rows_lost
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
@@ -42,7 +42,7 @@ SURE_LAG = 0.01  # share of the equation that a lag explains beyond none, to be 
 @dataclass(frozen=True)
 class Clock:
     """Rows, duration and period [s], jitter (of a period, rms, gaps apart), gaps and the longest
-    [s]."""
+    [s]; lost: rows that an even clock has lost."""
 
     rows: int
     duration: float
@@ -50,6 +50,7 @@ class Clock:
     jitter: float
     gaps: int
     longest_gap: float
+    lost: int
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,8 @@ def _clock_of(t: Array) -> Clock:
     jitter = float(np.std(usual)) / h if h > 0.0 and len(usual) else 0.0
     gaps = step[step > LONGEST_GAP * h] if h > 0.0 else step[:0]
     longest = float(np.max(gaps)) if len(gaps) else 0.0
-    return Clock(len(t), float(t[-1] - t[0]), h, jitter, len(gaps), longest)
+    lost = rows_lost(t, h) if len(step) and len(step) == len(t) - 1 else 0
+    return Clock(len(t), float(t[-1] - t[0]), h, jitter, len(gaps), longest, lost)
 
 
 def _sensor(name: str, x: Array) -> SensorState:

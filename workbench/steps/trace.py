@@ -193,6 +193,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
                 "explained": found.unknown.explained,
             },
             "complete": found.complete,
+            "actuator_like": found.actuator_like,
             "missing_of_friction": dict(
                 zip(("before", "after"), found.missing or (None, None), strict=True)
             ),

@@ -24,7 +24,7 @@ from workbench.documents.model import Model
 from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import bench_of
-from workbench.steps.experiment.plan import experiment
+from workbench.steps.experiment.plan import _remarks, experiment
 from workbench.steps.experiment.planned import (
     Experiment,
     Wanted,
@@ -188,6 +188,13 @@ def test_a_trace_that_leaves_nothing_open_is_refused(tmp_path: Path) -> None:
     path.write_text("{}")
     with pytest.raises(BadModel, match="trace/1"):
         read_rivals(path, controlled(), built_in())
+
+
+def test_what_is_promised_of_an_assumed_band_is_told() -> None:
+    fast = replace(controlled().log[0], speed=1e3)  # of which any band is next to none
+    bare = replace(controlled(), log=(fast,))
+    assert any("the logs show no band" in one for one in _remarks(bare, 0, 1.0))
+    assert not any("the logs show no band" in one for one in _remarks(controlled(), 0, 1.0))
 
 
 def test_a_band_next_to_none_is_taken_for_one_that_no_log_told() -> None:

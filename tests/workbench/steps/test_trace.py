@@ -54,7 +54,7 @@ CONTRACT = {
 BESIDE = {
     "bad_samples", "complete", "curves", "left", "not_tried", "remarks", "parameters", "card",
     "log", "test_log", "versions", "gravity", "constant_force", "lag", "resonance",
-    "missing_of_friction",
+    "missing_of_friction", "actuator_like",
 }  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
@@ -195,6 +195,18 @@ def test_an_effect_that_is_not_all_is_told_with_its_share_and_the_rest() -> None
     said = trace_sentence(traced(alone, tested=False))
     assert "It explains 70 % of what was missing on the stretches left out" in said
     assert "the rest depends on none of the signals" in said
+
+
+@pytest.mark.parametrize(
+    ("like", "said"),
+    [((), "the actuator is not linear."), (("leakage",), "which acts like leakage.")],
+)
+def test_what_lies_in_the_actuator_is_told_beside_the_verdict(
+    like: tuple[str, ...], said: str
+) -> None:
+    found = replace(trace_of("none"), actuator_like=like)
+    assert said in trace_sentence(traced(found))
+    assert "actuator" not in trace_sentence(traced(trace_of("none")))
 
 
 def test_signals_that_no_log_has_are_said_in_words() -> None:

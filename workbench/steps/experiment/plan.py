@@ -12,6 +12,7 @@ from design.experiment.limits import MotionLimits, Peaks, peaks
 from design.experiment.precision import evaluated, precision
 from design.experiment.search import best_run
 from design.experiment.separation import pairs_of, separation
+from design.servo import moved_reference
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel, NotIdentifiable, UserError
@@ -27,7 +28,7 @@ from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.closed_loop import effects_left_out
-from workbench.steps.drawn import drawn_plants, in_loop
+from workbench.steps.drawn import drawn_plants, in_loop, lost_bands
 from workbench.steps.experiment.machines import Bench, asked_of, bench_of
 from workbench.steps.experiment.planned import (
     Experiment,
@@ -107,7 +108,9 @@ def experiment(
         seed=wanted.seed,
         remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
         versions=versions(),
-        r=r[:: max(1, round(bench.loop.law.h / bench.loop.h))],  # where the controller samples
+        r=moved_reference(bench.loop.servo, r, bench.loop.h)[
+            :: max(1, round(bench.loop.law.h / bench.loop.h))  # where the controller samples
+        ],
         runs=tuple(bench.run(one, r) for one in plants[: 1 + SHOWN_PLANTS]),
     )
 
@@ -147,6 +150,11 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
     if model.assumed:
         names = ", ".join(model.assumed)
         out.append(f"{names}: not identifiable; tried within a third of the assumed values")
+    if bands := lost_bands(model):
+        out.append(
+            f"{', '.join(bands)}: the logs show no band; a usual one is assumed, and what is"
+            " promised of it holds if the machine has one"
+        )
     if not model.fit.adequate:
         out.append(
             "the model leaves more than noise of its logs: the prediction holds for a machine"

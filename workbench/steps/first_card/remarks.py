@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from identification.signals.clean import rows_lost
 from identification.signals.relations import lead
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.roles import Roles
@@ -64,6 +65,9 @@ def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
     steps = np.diff(columns.clock.values) * second
     uneven = float(np.std(steps[steps < 3.0 * h]) / h)
     even = "an even clock" if uneven < 1e-3 else f"a clock that jitters by {uneven:.1%}"
+    lost = rows_lost(second * columns.clock.values, h)
+    if uneven >= 1e-3 and lost:
+        even = f"an even clock, {lost} of whose rows are lost"
     yield f"{len(columns.clock.values)} rows every {h:.4g} s, {even}"
     gaps = int(np.sum(steps > 5.0 * h))
     if gaps:
