@@ -123,7 +123,9 @@ def _by_force(
         return told
     if again.verdict == "unknown":
         return told
-    return replace(again, actuator_like=tuple(one.effect.key for one in told.effects))
+    known = {one.effect.key for one in again.effects}
+    like = (one.effect.key for one in told.effects if one.effect.key not in known)
+    return replace(again, actuator_like=tuple(like))
 
 
 def _without_command(log: Log) -> Log:
