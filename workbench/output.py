@@ -232,12 +232,11 @@ def _width(verbose: bool) -> int | None:
 
 @contextmanager
 def progress(label: str, total: float | None = None) -> Iterator[Bar]:
-    """A bar on standard error; mute without a terminal, with --json, and in a notebook, where its
-    traces would stay.
+    """A bar on standard error; mute without a terminal and with --json.
 
     total: what the advances add up to; None shows that something goes on.
     """
-    if is_given(JSON) or "ipykernel" in sys.modules or not sys.stderr.isatty():
+    if is_given(JSON) or not sys.stderr.isatty():  # a notebook's is none
         yield Bar()
         return
     from rich.console import Console
