@@ -190,6 +190,16 @@ def test_a_trace_that_leaves_nothing_open_is_refused(tmp_path: Path) -> None:
         read_rivals(path, controlled(), built_in())
 
 
+def test_a_motor_whose_force_is_noisy_logs_another_command_than_it_got() -> None:
+    model = controlled()
+    bench = bench_of(replace(model, fit=replace(model.fit, noise_F=0.3)), None)
+    run = bench.run(model.simulated, np.zeros(2000))
+    logged = bench.log(run, rng=np.random.default_rng(0))
+    assert np.std(logged["F"] - K_A * run.u) == pytest.approx(0.3, rel=0.1)
+    assert np.allclose(logged["F"], K_A * logged["u"])
+    assert np.array_equal(bench.log(run)["u"], run.u)
+
+
 def test_what_is_promised_of_an_assumed_band_is_told() -> None:
     fast = replace(controlled().log[0], speed=1e3)  # of which any band is next to none
     bare = replace(controlled(), log=(fast,))

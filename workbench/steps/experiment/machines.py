@@ -56,13 +56,18 @@ class Bench:
         """The loop on a plant along r [m], (n,) every loop.h; with the sensors' noise by rng."""
         return run_plant(self.model, plant, self.loop, r, noise_of(self.model, len(r), rng))
 
-    def log(self, run: LoopRun, name: str = "experiment") -> Log:
-        """What the machine logs of a run."""
-        drive = self.model.simulated.actuator
-        F = drive.k_a * run.u if isinstance(drive, Motor) else run.F_measured
+    def log(
+        self, run: LoopRun, name: str = "experiment", rng: np.random.Generator | None = None
+    ) -> Log:
+        """What the machine logs of a run; by rng, a motor's command with the noise of its force,
+        which the motor was not given."""
+        drive, u = self.model.simulated.actuator, run.u
+        if isinstance(drive, Motor) and rng is not None:
+            u = u + self.model.fit.noise_F / drive.k_a * rng.standard_normal(len(u))
+        F = drive.k_a * u if isinstance(drive, Motor) else run.F_measured
         signals = {"t": run.t, "r": run.r, "y": run.y_measured, "F": F}
         if drive is not None and self.by_command:
-            signals["u"] = run.u
+            signals["u"] = u
         made = chambers(self.model.rig)
         return Log(name, signals | {key: np.asarray(of(run.F)) for key, of in made.items()})
 

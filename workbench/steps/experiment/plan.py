@@ -16,13 +16,13 @@ from design.servo import moved_reference
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel, NotIdentifiable, UserError
-from identification.estimation.settling import settled
+from identification.estimation.fit import fit_plant
 from identification.estimation.windowed_run.parameters import names_of, values_of
 from identification.experiment.information import Information, unknowns
 from identification.experiment.structures import discriminated, sought
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
-from identification.progress import KeepGoing, Progress, quiet
+from identification.progress import KeepGoing, Progress
 from workbench.cards.effect_values import known_effect
 from workbench.documents.design import Design
 from workbench.documents.model import Model
@@ -177,15 +177,17 @@ def promised(
 ) -> tuple[Promised, ...]:
     """Half the 95 % intervals that a fit of the run is to give, the median over these plants.
 
-    Each plant runs with the sensors' noise, and the fit converges to it as it would on a log.
+    Each plant runs with the sensors' noise, and its log is fitted as any other is.
     """
     found: list[Mapping[str, Estimate]] = []
     for i, plant in enumerate(plants):
         report("what it promises", i / len(plants))
-        (noise,) = rng.spawn(1)
+        sensors, force = rng.spawn(2)
         try:
-            recorded = bench.recorded(bench.log(bench.run(plant, r, noise)))
-            fit = settled(bench.fitted(plant), recorded, 1.0, quiet)
+            log = bench.log(bench.run(plant, r, sensors), rng=force)
+            drive = None if bench.model.rig.kind == "motor" else bench.drive
+            own = bench.fitted(plant)
+            fit = fit_plant([log], force, rig=bench.model.rig, drive=drive, prior=own)
         except UserError:
             continue
         found.append(fit.estimates)
