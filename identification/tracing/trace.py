@@ -121,7 +121,7 @@ def _by_force(
         again = _traced(alone[0], alone[1], rig, library, rng, report, halt)
     except NotIdentifiable:
         return told
-    if again.verdict == "unknown":
+    if again.verdict not in ("none", "effect"):
         return told
     known = {one.effect.key for one in again.effects}
     like = (one.effect.key for one in told.effects if one.effect.key not in known)
