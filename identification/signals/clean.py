@@ -1,22 +1,21 @@
-"""Stages Log -> Log: missing samples, spikes, an even clock; and F_e (7).
+"""Stages Log -> Log: missing samples, spikes; and F_e (7).
 
 `prepare` runs them in order and says in `remarks`, and sample by sample in `bad`, what it changed.
 A run of missing values is never invented: the log is cut there.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
+from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
-from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
-from identification.signals.differentiate import resolution
+from identification.signals.check import check_time
+from identification.signals.even_clock import LONGEST_GAP, even_clock, in_counts, is_even
 from identification.signals.frozen import frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
@@ -28,11 +27,6 @@ LONGEST_REPAIR = 3
 So it is at any of a command: what a controller gave is not what lies between two other samples.
 """
 
-LONGEST_GAP = 5.0
-"""Sampling periods between two samples above which a log is cut in two."""
-
-_EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
-_EVEN_BUT_FOR_LOST = 0.01  # part of a period, of a clock of which rows are lost
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
 _TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
 _LARGE = 0.05  # of a signal's range, from which a spike is no small one
@@ -81,7 +75,7 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     if filled:
         share = float(np.mean(np.concatenate(filled)))
         text = f"{log.name}: {share:.2g} of its rows are lost, interpolated"
-    if any(one.done == "cut out" for one in bad) and all(_is_even(run["t"]) for run in runs):
+    if any(one.done == "cut out" for one in bad) and all(is_even(run["t"]) for run in runs):
         text = f"{log.name}: cut where samples are bad"
     said = [text]
     if len(runs) > 1 or lost > LONGEST_GAP * log.h:
@@ -264,14 +258,8 @@ def _bridged(t: Array, values: Array, bad: Mask) -> Array:
     """Values (n,) with the bad ones on the line between their neighbours, in whole counts of a
     sensor that counts."""
     good, out = values[~bad], values.copy()
-    out[bad] = _in_counts(np.interp(t[bad], t[~bad], good), good)
+    out[bad] = in_counts(np.interp(t[bad], t[~bad], good), good)
     return out
-
-
-def _in_counts(values: Array, logged: Array) -> Array:
-    """Values on the whole counts of the logged ones, as they are where these count nothing."""
-    count = resolution(logged)
-    return logged[0] + count * np.rint((values - logged[0]) / count) if count else values
 
 
 def _shown(name: str, rotary: bool) -> tuple[float, str]:
@@ -302,112 +290,6 @@ def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mas
             f"{first_row + int(starts[0])}, at most {_MANY:.0%} are interpolated; check the sensor"
         )
     return long
-
-
-def even_clock(log: Log) -> tuple[Log, ...]:
-    """The log as runs on an even clock, cut at gaps longer than `LONGEST_GAP` periods.
-
-    A run that is even to 1e-3 of its period is passed on as it is, bit for bit; one that is but for
-    lost rows gets these between their neighbours, and any other is resampled at the log's median
-    period. The command `u` and two-valued signals are held (the
-    last value at the middle of the new period); the rest follows a piecewise cubic that keeps
-    monotone stretches monotone, so that a step neither rings nor spreads over more than one
-    sample. Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
-    """
-    t, h = log["t"], log.h
-    cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
-    borders = [0, *(int(cut) for cut in cuts), len(log)]
-    runs = []
-    for start, stop in pairwise(borders):
-        if stop - start < 2:
-            continue
-        run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
-        if not _is_even(run["t"]):
-            rows = _row_numbers(run["t"], h)
-            run = _resample(run, h) if rows is None else _with_lost_rows(run, rows)
-        if len(run) >= SHORTEST_LOG:
-            runs.append(run)
-    if not runs:
-        raise BadLog(
-            f"{log.name}: {len(cuts)} gaps leave no run of {SHORTEST_LOG} samples at {h:.4g} s; "
-            "log without gaps"
-        )
-    return tuple(runs)
-
-
-def _is_even(t: Array) -> bool:
-    grid = np.linspace(t[0], t[-1], len(t))
-    return bool(np.max(np.abs(t - grid)) <= _EVEN * (t[-1] - t[0]) / (len(t) - 1))
-
-
-def _resample(log: Log, h: float) -> Log:
-    t = log["t"]
-    grid = t[0] + h * np.arange(int(np.floor((t[-1] - t[0]) / h + 1e-6)) + 1)
-    others = {name: values for name, values in log.signals.items() if name != "t"}
-    signals = {name: at_times(name, t, values, grid, h) for name, values in others.items()}
-    return Log(log.name, {"t": grid, **signals})
-
-
-def _row_numbers(t: Array, h: float) -> IntArray | None:
-    """Row of each sample (n,) on an even clock of which rows are lost; None on another clock."""
-    steps = np.rint(np.diff(t) / h).astype(np.int64)
-    if np.min(steps) < 1:
-        return None
-    rows = np.concatenate([[0], np.cumsum(steps)])
-    period = (t[-1] - t[0]) / rows[-1]
-    uneven = np.max(np.abs(t - t[0] - period * rows))
-    return rows if uneven <= _EVEN_BUT_FOR_LOST * period else None
-
-
-def rows_lost(t: Array, h: float) -> int:
-    """How many rows a clock t (n,) [s] of this period has lost, if it is even but for them."""
-    rows = _row_numbers(t, h) if len(t) > 1 and h > 0.0 else None
-    return 0 if rows is None else int(rows[-1]) + 1 - len(t)
-
-
-def _with_lost_rows(log: Log, rows: IntArray) -> Log:
-    """The log on an even clock, each lost row between its neighbours: of a position on the cubic
-    spline through them all, in whole counts of an encoder; of what may jump on the straight
-    line."""
-    from scipy.interpolate import make_interp_spline
-
-    t, lost = log["t"], np.ones(rows[-1] + 1, dtype=bool)
-    lost[rows] = False
-    grid = t[0] + (t[-1] - t[0]) / rows[-1] * np.arange(len(lost))
-    signals = {"t": grid}
-    for name, values in log.signals.items():
-        if name == "t":
-            continue
-        whole = np.empty(len(lost))
-        whole[rows] = values
-        if name == "y":
-            between = make_interp_spline(rows, values, 3)(np.flatnonzero(lost))
-            whole[lost] = _in_counts(between, values)
-        elif _two_valued(values):
-            whole[lost] = values[np.searchsorted(rows, np.flatnonzero(lost)) - 1]
-        else:
-            whole[lost] = np.interp(np.flatnonzero(lost), rows, values)
-        signals[name] = whole
-    return Log(log.name, signals, lost)
-
-
-def _two_valued(values: Array) -> bool:
-    return bool(np.all((values == values.min()) | (values == values.max())))
-
-
-def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array:
-    """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`.
-
-    The command `u` and a signal of two values are held (the last value at the middle of the new
-    period), any other follows a piecewise cubic. Before the first and after the last sample their
-    values stand.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    if name == "u" or _two_valued(values):
-        held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
-        return values[np.maximum(held, 0)]
-    return np.asarray(PchipInterpolator(t, values)(np.clip(grid, t[0], t[-1])))
 
 
 def applied_force(log: Log, rig: Rig) -> Array | None:

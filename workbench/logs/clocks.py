@@ -10,7 +10,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.remarks import MinorRemark
-from identification.signals.clean import LONGEST_GAP, at_times
+from identification.signals.even_clock import LONGEST_GAP, at_times
 from workbench.cards.headers import read_header
 from workbench.logs.table import RawColumn, Table
 

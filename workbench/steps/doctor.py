@@ -18,8 +18,9 @@ from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_time
-from identification.signals.clean import LONGEST_GAP, even_clock, limits, prepare, repair, rows_lost
+from identification.signals.clean import limits, prepare, repair
 from identification.signals.differentiate import Motion, low_pass, resolution
+from identification.signals.even_clock import LONGEST_GAP, even_clock, rows_lost
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
 from identification.signals.renewal import renewed

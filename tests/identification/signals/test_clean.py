@@ -9,8 +9,9 @@ from identification.arrays import Array
 from identification.errors import BadLog, BadSpecification
 from identification.log import Log, Rig
 from identification.signals.check import work_share
-from identification.signals.clean import applied_force, check, even_clock, prepare, repair
+from identification.signals.clean import applied_force, check, prepare, repair
 from identification.signals.differentiate import resolution
+from identification.signals.even_clock import even_clock
 from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 
 RIG = Rig(kind="force", stroke=(-0.2, 0.2))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from identification.signals.clean import rows_lost
+from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.roles import Roles
