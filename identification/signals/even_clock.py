@@ -22,17 +22,16 @@ def even_clock(log: Log) -> tuple[Log, ...]:
 
     A run that is even to 1e-3 of its period is passed on as it is, bit for bit; one that is but for
     lost rows gets these between their neighbours, and any other is resampled at the log's median
-    period. The command `u` and two-valued signals are held (the
-    last value at the middle of the new period); the rest follows a piecewise cubic that keeps
-    monotone stretches monotone, so that a step neither rings nor spreads over more than one
-    sample. Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
+    period. Of such a one the command `u` and two-valued signals are held (the last value at the
+    middle of the new period); the rest follows a piecewise cubic that keeps monotone stretches
+    monotone, so that a step neither rings nor spreads over more than one sample. Runs under
+    `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
     """
     t, h = log["t"], log.h
-    cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
-    borders = [0, *(int(cut) for cut in cuts), len(log)]
+    borders = _borders(t, h)
     runs = []
     for start, stop in pairwise(borders):
-        if stop - start < 2:
+        if t[stop - 1] - t[start] < (SHORTEST_LOG - 2) * h:
             continue
         run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
         if not is_even(run["t"]):
@@ -42,10 +41,16 @@ def even_clock(log: Log) -> tuple[Log, ...]:
             runs.append(run)
     if not runs:
         raise BadLog(
-            f"{log.name}: {len(cuts)} gaps leave no run of {SHORTEST_LOG} samples at {h:.4g} s; "
-            "log without gaps"
+            f"{log.name}: {len(borders) - 2} gaps leave no run of {SHORTEST_LOG} samples at"
+            f" {h:.4g} s; log without gaps"
         )
     return tuple(runs)
+
+
+def _borders(t: Array, h: float) -> list[int]:
+    """First samples of the pieces between gaps, and the end."""
+    cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
+    return [0, *cuts.tolist(), len(t)]
 
 
 def is_even(t: Array) -> bool:
@@ -74,9 +79,13 @@ def _row_numbers(t: Array, h: float) -> IntArray | None:
 
 
 def rows_lost(t: Array, h: float) -> int:
-    """How many rows a clock t (n,) [s] of this period has lost, if it is even but for them."""
-    rows = _row_numbers(t, h) if len(t) > 1 and h > 0.0 else None
-    return 0 if rows is None else int(rows[-1]) + 1 - len(t)
+    """How many rows a clock t (n,) [s] of this period has lost, where it is even but for them; not
+    in its gaps."""
+    if not (h > 0.0 and np.all(np.isfinite(t))):
+        return 0
+    pieces = [t[a:b] for a, b in pairwise(_borders(t, h)) if b - a > 1]
+    every = [_row_numbers(piece, h) for piece in pieces]
+    return sum(int(rows[-1]) + 1 - len(rows) for rows in every if rows is not None)
 
 
 def _with_lost_rows(log: Log, rows: IntArray) -> Log:

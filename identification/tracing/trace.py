@@ -86,7 +86,8 @@ def trace(
         if not beside.orders:
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
-    if told.verdict == "unknown" and _commanded(train, rig) and not halt.reached():
+    by_command = rig.kind != "motor" and told.plant.actuator is not None
+    if told.verdict == "unknown" and by_command and not halt.reached():
         told = _by_force(told, train, test, rig, library, rng, report, halt)
     beside, told = _with_lag(beside, told, recorded_as, rig, library, rng, report, halt)
     if still:
@@ -103,11 +104,6 @@ def trace(
         return told
     around = replace(beside, resonance=resonance)
     return replace(told, surroundings=around, missing_force=None)  # which is of one body
-
-
-def _commanded(logs: Sequence[Log], rig: Rig) -> bool:
-    """Whether a valve's command is logged, from which the force of an actuator follows."""
-    return rig.kind != "motor" and all("u" in log for log in logs)
 
 
 def _by_force(

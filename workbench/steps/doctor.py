@@ -220,8 +220,7 @@ def _clock_of(t: Array) -> Clock:
     jitter = float(np.std(usual)) / h if h > 0.0 and len(usual) else 0.0
     gaps = step[step > LONGEST_GAP * h] if h > 0.0 else step[:0]
     longest = float(np.max(gaps)) if len(gaps) else 0.0
-    lost = rows_lost(t, h) if len(step) and len(step) == len(t) - 1 else 0
-    return Clock(len(t), float(t[-1] - t[0]), h, jitter, len(gaps), longest, lost)
+    return Clock(len(t), float(t[-1] - t[0]), h, jitter, len(gaps), longest, rows_lost(t, h))
 
 
 def _sensor(name: str, x: Array) -> SensorState:

@@ -11,7 +11,7 @@ from identification.log import Log, Rig
 from identification.signals.check import work_share
 from identification.signals.clean import applied_force, check, prepare, repair
 from identification.signals.differentiate import resolution
-from identification.signals.even_clock import even_clock
+from identification.signals.even_clock import even_clock, rows_lost
 from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 
 RIG = Rig(kind="force", stroke=(-0.2, 0.2))
@@ -87,6 +87,18 @@ def test_a_clock_that_jitters_has_lost_no_rows() -> None:
     signals["t"] = signals["t"] + 1e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, 400)
     (run,) = even_clock(Log("run", signals))
     assert run.lost is None
+
+
+def test_rows_are_lost_between_gaps_and_not_in_them() -> None:
+    """A piece of three rows, one of them lost beside it, is no run, and no fault."""
+    whole = moved(1200)
+    kept = np.ones(1200, dtype=bool)
+    kept[500:600] = kept[603:700] = kept[601] = kept[50] = False
+    log = Log("run", {k: x[kept] for k, x in whole.items()})
+    assert [len(run) for run in even_clock(log)] == [500, 500]
+    assert rows_lost(log["t"], log.h) == 2
+    assert rows_lost(np.where(kept[kept], np.nan, log["t"]), log.h) == 0
+    assert rows_lost(np.array([0.0]), 0.0) == 0
 
 
 def test_the_share_of_lost_rows_is_told_and_follows_the_log() -> None:
