@@ -31,6 +31,15 @@ _NOISE_LIKE = 0.3  # share of samples at which the second difference of noise ch
 # Times the card's limit that a command may reach: noise and an amplifier's reserve stay within it,
 # a slip of unit (mV for V, % for a share) does not.
 _BEYOND_LIMIT = 1.5
+# What gives a rig's force, and what to turn where its sign is wrong.
+_OF_KIND = {
+    "force": ("F", "give the column of F or of y gain = -1"),
+    "motor": ("u", "turn the sign of force_per_command, or give the column of y gain = -1"),
+    "electro-pneumatic": (
+        "p_p and p_n",
+        "exchange the columns of p_p and p_n, or give that of y gain = -1",
+    ),
+}
 JUMPS_ALIKE = 0.3  # spread of jumps that count as of one size, as those of a counter do
 
 
@@ -58,7 +67,7 @@ def _check_moved(log: Log, rig: Rig, first_row: int) -> None:
     _check_stuck(log, first_row)
     # Jumps spoil the work too; where it is right without them, they are what is wrong.
     if "F" in log and not (found and (work_share(y, log["F"]) or 0.0) > _TRUE):
-        _check_work(log)
+        _check_work(log, rig)
     if found:
         raise BadLog(_jumping(log, rig, found, first_row))
 
@@ -212,21 +221,22 @@ def _check_stuck(log: Log, first_row: int) -> None:
     )
 
 
-def _check_work(log: Log) -> None:
+def _check_work(log: Log, rig: Rig) -> None:
     work = work_share(log["y"], log["F"])
     if work is None or work > _SWAPPED:
         return
     found = f"{log.name}: the applied force takes out {-work:.0%} of the work it exchanges"
     roughness = _path(log["F"]) / max(_path(log["y"]), 1e-12)
     if roughness < (1.0 if work < _WRONG_SIGN else _MUCH_SMOOTHER):
+        own = _OF_KIND[rig.kind][0]
         raise BadLog(
-            f"{found} and F is smoother than y, so force and position look swapped; "
-            "exchange the columns of F and y in the card"
+            f"{found} and the force is smoother than y, so force and position look swapped; "
+            f"exchange the columns of {own} and y in the card"
         )
     if work < _WRONG_SIGN:
         raise BadLog(
-            f"{found}, which friction can only consume, so F or y has the wrong sign; give its "
-            "column gain = -1, or check which chamber is which"
+            f"{found}, which friction can only consume: a force or position of the wrong sign;"
+            f" {_OF_KIND[rig.kind][1]}"
         )
 
 

@@ -1,7 +1,7 @@
 """Stages Log -> Log: missing samples, spikes; and F_e (7).
 
 `prepare` runs them in order and says in `remarks`, and sample by sample in `bad`, what it changed.
-A run of missing values is never invented: the log is cut there.
+A longer run of missing values is never invented: the log is cut there.
 """
 
 from dataclasses import dataclass
@@ -22,15 +22,13 @@ from identification.signals.offsets import unwrapped, without_jumps
 from identification.signals.steps import beside_gaps, small_spikes, white_noise
 
 LONGEST_REPAIR = 3
-"""Missing samples in a row that are interpolated; at a longer run the log is cut.
-
-So it is at any of a command: what a controller gave is not what lies between two other samples.
-"""
+"""Missing samples in a row that are put back, by interpolation or as lost rows; at a longer run
+the log is cut."""
 
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
 _TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
 _LARGE = 0.05  # of a signal's range, from which a spike is no small one
-_MOST_CUT = 0.1  # share of a log that may be cut out
+_MOST_CUT = 0.1  # share of a log that may be left out
 _SHORTEST_CUT = 6  # samples that are cut out at least, so that the gap is one
 _SMALL = ("y", "p_p", "p_n")  # what no machine changes for a sample or two
 _LEVELS = 10  # values that a command takes at least where its limits are looked for
@@ -74,7 +72,7 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     filled = [run.lost for run in runs if run.lost is not None]
     if filled:
         share = float(np.mean(np.concatenate(filled)))
-        text = f"{log.name}: {share:.2g} of its rows are lost, interpolated"
+        text = f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated"
     if any(one.done == "cut out" for one in bad) and all(is_even(run["t"]) for run in runs):
         text = f"{log.name}: cut where samples are bad"
     said = [text]
@@ -96,15 +94,16 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     """The log without bad samples, and what they were.
 
     Isolated missing samples (NaN or infinite) and spikes are filled by linear interpolation in
-    time; where more than `LONGEST_REPAIR` are missing in a row or a value stands still, the rows
-    are left out; a position that jumps or wraps goes on from where it was.
+    time; where a command or more than 1 % of a signal is missing, the rows count as lost, as those
+    at an end of the log; where more than `LONGEST_REPAIR` are missing in a row or a value stands
+    still, the log is cut; a position that jumps or wraps goes on from where it was.
 
     first_row: the file's row of the first sample, for the messages; rotary: positions are angles.
-    Raises BadLog where samples are missing at an end of the log, where a column misses more than
-    1 % or has spikes in more, or where a tenth of the log would have to be left out.
+    Raises BadLog where a tenth of the log would have to be left out, or a column has spikes in more
+    than 1 %.
     """
     check_time(log, first_row)
-    (log, said, bad_ones), away = _without_missing(log, first_row)
+    (log, said, bad_ones), lost, away = _without_missing(log, first_row)
     remarks, bad = list(said), list(bad_ones)
     if "y" in log:
         log, found = unwrapped(log, rotary)
@@ -116,7 +115,7 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
             still = frozen(log[name], at_limits=name == "u")
             bad += _found(log, name, "frozen", still, "cut out")
             away |= still
-    log = _left_out(log, away, first_row)
+    log = _left_out(log, lost, away, first_row)
     for name in _SPIKING:
         if name in log:
             log, said, spiked = _without_spikes(log, name, first_row, rotary)
@@ -130,26 +129,63 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     return Repaired(log, (*remarks, *lines(told)), tuple(bad))
 
 
-def _without_missing(log: Log, first_row: int) -> tuple[Repaired, Mask]:
-    """The log with its missing samples filled, and which rows are nevertheless to be left out."""
-    away: Mask = np.zeros(len(log), dtype=bool)
-    remarks, bad = list[str](), list[BadSamples]()
+def _without_ends(log: Log, first_row: int) -> tuple[Repaired, int]:
+    """The log from its first to its last row without a missing sample, and the row of the first.
+
+    Raises BadLog where more than a tenth of a signal is missing.
+    """
+    known: Mask = np.ones(len(log), dtype=bool)
+    for name, values in log.signals.items():
+        missing = ~np.isfinite(values)
+        if missing.mean() > _MOST_CUT:
+            raise BadLog(
+                f"{log.name}: signal {name!r} is NaN or infinite in {missing.mean():.0%} of the"
+                f" rows, first in row {first_row + int(np.argmax(missing))}, at most"
+                f" {_MOST_CUT:.0%} are left out; check the sensor"
+            )
+        known &= ~missing
+    rows = np.flatnonzero(known)
+    if len(rows) in (0, len(log)) or (rows[0], rows[-1]) == (0, len(log) - 1):
+        return Repaired(log, ()), first_row
+    ends = len(log) - 1 - int(rows[-1] - rows[0])
+    remark = f"{log.name}: {ends} rows at the log's ends, in which a signal is missing, left out"
+    return Repaired(log.part(int(rows[0]), int(rows[-1]) + 1), (remark,)), first_row + int(rows[0])
+
+
+def _without_missing(log: Log, first_row: int) -> tuple[Repaired, Mask, Mask]:
+    """The log with its missing samples filled, and which rows are to be left out none the less: as
+    lost ones, and where the log is to be cut."""
+    (log, said, _), first_row = _without_ends(log, first_row)
+    lost: Mask = np.zeros(len(log), dtype=bool)
+    away = lost.copy()
+    remarks, bad = list(said), list[BadSamples]()
     for name, values in log.signals.items():
         missing = ~np.isfinite(values)
         if not np.any(missing):
             continue
-        what = f"{log.name}: signal {name!r}"
-        long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
+        long = _long_runs(missing)
         isolated = missing & ~long
         away |= long
         filled = _bridged(log["t"], values, missing)
-        if np.any(isolated):
-            count = int(isolated.sum())
+        count = int(isolated.sum())
+        if count and (name == "u" or isolated.mean() > _MANY):
+            lost |= isolated
+            remarks.append(f"{log.name}: {count} rows without a value of {name!r} left out")
+        elif count:
             remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
             bad += _found(log, name, "missing", isolated, "interpolated")
         bad += _found(log, name, "missing", long, "cut out")
         log = log.with_signals(**{name: filled})
-    return Repaired(log, tuple(remarks), tuple(bad)), away
+    return Repaired(log, tuple(remarks), tuple(bad)), lost, away
+
+
+def _long_runs(missing: Mask) -> Mask:
+    """Where more than `LONGEST_REPAIR` samples in a row are missing, (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], missing.astype(np.int8), [0]))))
+    long = np.zeros_like(missing)
+    for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
+        long[a:b] = b - a > LONGEST_REPAIR
+    return long
 
 
 def _commanded(log: Log) -> bool:
@@ -161,18 +197,20 @@ def _commanded(log: Log) -> bool:
     return bool(u[largest] != 0.0 and np.allclose(F, u * (F[largest] / u[largest]), rtol=1e-9))
 
 
-def _left_out(log: Log, away: Mask, first_row: int) -> Log:
-    """The log without these rows, and without their neighbours where they are few."""
-    if not np.any(away):
+def _left_out(log: Log, lost: Mask, away: Mask, first_row: int) -> Log:
+    """The log without these rows; where it is to be cut (away), without their neighbours too where
+    they are few."""
+    if not np.any(lost | away):
         return log
     wide = np.convolve(away, np.ones(_SHORTEST_CUT // 2 + 1), mode="same") > 0.5
-    if wide.mean() > _MOST_CUT:
+    if (wide | lost).mean() > _MOST_CUT:
+        faulty = lost | away
         raise BadLog(
-            f"{log.name}: in {away.mean():.0%} of the rows, first in row"
-            f" {first_row + int(np.argmax(away))}, a signal is missing or stands still; at most"
-            f" {_MOST_CUT:.0%} are cut out; check the sensor and its cable"
+            f"{log.name}: in {faulty.mean():.0%} of the rows, first in row"
+            f" {first_row + int(np.argmax(faulty))}, a signal is missing or stands still; at most"
+            f" {_MOST_CUT:.0%} are left out; check the sensor and its cable"
         )
-    return Log(log.name, {key: x[~wide] for key, x in log.signals.items()})
+    return Log(log.name, {key: x[~(wide | lost)] for key, x in log.signals.items()})
 
 
 def _found(
@@ -271,25 +309,6 @@ def _shown(name: str, rotary: bool) -> tuple[float, str]:
         )
         return (turning if rotary else linear)[name]
     return 1e-5, "bar"
-
-
-def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mask:
-    """Where more than so many are missing in a row, (n,); BadLog where too many are."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], missing.astype(np.int8), [0]))))
-    starts, stops = edges[0::2], edges[1::2]
-    if missing[0] or missing[-1]:
-        where = first_row if missing[0] else first_row + len(missing) - 1
-        raise BadLog(f"{what} is NaN or infinite in row {where}, an end of the log; cut it off")
-    long = np.zeros_like(missing)
-    for a, b in zip(starts.tolist(), stops.tolist(), strict=True):
-        long[a:b] = b - a > repaired
-    isolated = missing & ~long
-    if isolated.mean() > _MANY or missing.mean() > _MOST_CUT:
-        raise BadLog(
-            f"{what} is NaN or infinite in {missing.mean():.0%} of the rows, first in row "
-            f"{first_row + int(starts[0])}, at most {_MANY:.0%} are interpolated; check the sensor"
-        )
-    return long
 
 
 def applied_force(log: Log, rig: Rig) -> Array | None:

@@ -127,11 +127,13 @@ def _with_named(
     equation leaves without them and with them.
 
     `explained` and `probability` are of all of them together. Each stood out of 0 by so many
-    deviations that chance would not, so its p-value is at most the level asked for.
+    deviations that chance would not, so its p-value is at most the level asked for. An order has
+    no other rival than chance: nothing else repeats a whole number of times in a turn.
     """
     without, with_them = left["test"]
     known, share = surrounding_estimates(around), (with_them / without) ** 2
-    sure = probability(evidence(with_them / without, len(named)))
+    late = named[0].key == DELAY
+    sure = probability(evidence(with_them / without, 1)) if late else 1.0 - CHANCE_LEVEL
     found = tuple(
         FoundEffect(
             one.effect,

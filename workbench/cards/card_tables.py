@@ -182,7 +182,10 @@ class RigSection(CardTable):
         if self.kind == "velocity" and "u" in signals and signals["u"].written_gain is None:
             return signals["u"].unit.strip() or "1"  # as it is: no force is made of it
         if "u" in signals:
-            return command_unit(signals["u"].unit, signals["u"].written_gain, self.motion)
+            u = signals["u"]
+            found = command_unit(u.unit, u.written_gain, self.motion)
+            column_scale(u.unit, u.written_gain, "u", self.motion, found)  # or says what to write
+            return found
         return "V" if self.control_limit is None else force_unit(self.motion)
 
 

@@ -93,7 +93,7 @@ _SURE_SUFFIX = 2
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]\s*(.*)$")
 _INDEX = re.compile(r"\w\[\d+\]$")
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
-_IN = re.compile(r"^(.+)\s+in\s+(\S+)$")
+_IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
 
 _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they contain others
@@ -203,6 +203,8 @@ def written_unit(text: str) -> WrittenUnit | None:
         return _UNITS["mpa"]
     if found == "mN":
         return _UNITS["mn"]
+    if found.startswith("% "):  # of what: "% of rated torque"
+        return _UNITS["%"]
     found = found.replace("μ", "µ").casefold().replace("μ", "µ")
     return _UNITS.get(found) or _UNITS.get(found.replace(" ", ""))
 
@@ -224,7 +226,8 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         return " ".join(parts[:-2]), found, False
     if (suffix := _SUFFIX.match(text)) and (found := written_unit(suffix[2])):
         parted = any(sign in text for sign in ",;:")
-        return suffix[1], found, not parted and len(suffix[2]) < _SURE_SUFFIX
+        letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
+        return suffix[1], found, not parted and letter
     return text, None, False
 
 

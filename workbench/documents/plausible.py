@@ -60,6 +60,7 @@ ROTARY: Mapping[str, Size] = {
     "mass": Size(1e-11, 1e6, "kg m^2"),
     "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
 }
+LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
 _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
 
@@ -149,7 +150,11 @@ def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str
     if value == 0.0 or size.low <= value <= size.high:
         return None
     middle = np.sqrt(size.low * size.high)
-    other = min(_slips(size), key=lambda slip: abs(np.log(value * slip[0] / middle)), default=None)
+
+    def off(slip: tuple[float, str, int]) -> float:
+        return float(abs(np.log(value * slip[0] / middle))) + LESS_USUAL * slip[2]
+
+    other = min(_slips(size), key=off, default=None)
     hint = "check the units in the card"
     if other and size.low <= value * other[0] <= size.high:
         hint = f"{other[1]} would make it {value * other[0]:.4g} {size.unit}; check the unit"
@@ -159,13 +164,14 @@ def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str
     )
 
 
-def _slips(size: Size) -> Iterator[tuple[float, str]]:
-    """Factors that a slip of unit takes out of a value, either way round, and their names."""
+def _slips(size: Size) -> Iterator[tuple[float, str, int]]:
+    """Factors that a slip of unit takes out of a value, either way round, their names, and how many
+    are more usual."""
     unit = size.unit.split("/s")[0]
-    for factor, name in size.slips:
-        yield factor, f"{name} in place of {unit}"
-    for factor, name in size.slips:
-        yield 1.0 / factor, f"{unit} in place of {name}"
+    for rank, (factor, name) in enumerate(size.slips):
+        yield factor, f"{name} in place of {unit}", rank
+    for rank, (factor, name) in enumerate(size.slips):
+        yield 1.0 / factor, f"{unit} in place of {name}", rank + 1
 
 
 def _extremes(values: Sequence[float]) -> tuple[float, float]:

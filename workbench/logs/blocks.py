@@ -70,14 +70,19 @@ def blocks_of(text: str) -> list[Block]:
     return found if len(found) >= FEWEST_BLOCKS else []
 
 
+def are_runs(blocks: Sequence[Block]) -> bool:
+    """Whether the blocks have one header: then they are runs, and not variables."""
+    heads = {tuple(_heads(one)) for one in blocks}
+    return len(heads) == 1 and heads != {()} and any(one.width > PAIR for one in blocks)
+
+
 def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
     """The columns of the blocks, a group each: its clock, and its variables.
 
-    Raises BadLog where the blocks are of the same names: then they are runs, not variables.
+    Raises BadLog where the blocks are of the same names, and not of the same columns.
     """
     called = [_own_names(blocks, k) for k in range(len(blocks))]
-    wide = any(one.width > PAIR for one in blocks)
-    if len(set(called)) < len(called) or (wide and len({tuple(_heads(x)) for x in blocks}) == 1):
+    if len(set(called)) < len(called):
         raise BadLog(
             f"{path}: holds {len(blocks)} tables one below the other, of the same columns (rows"
             f" again from line {blocks[1].first + 1}): several runs, it seems; give each a file"

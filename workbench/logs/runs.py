@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from identification.arrays import Array, frozen
 from identification.errors import BadCard, BadLog
 from identification.log import Log
+from identification.signals.bad_samples import BadSamples
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.signals.renewal import renewed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
@@ -20,6 +22,7 @@ from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
+from workbench.logs.faulty_rows import at_rows, numbers_in, sound_rows, stretches
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
@@ -35,7 +38,7 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw, first_row, _ = _signals_of(_table(path, card), path, card)
+    raw, first_row = read_signals(path, card)
     log = with_force(_repaired(raw, first_row, path, card).log, path, card)
     check(log, card.rig(path.name), first_row)
     return log
@@ -43,25 +46,40 @@ def read_log(path: Path, card: Card) -> Log:
 
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
-    return runs_of(_table(path, card), path, card)
+    return runs_of(table_of(path, card), path, card)
 
 
 def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     """As `read_runs`, of a table; path: what the run and the messages are called by."""
-    log, first_row, read = _signals_of(table, path, card)
+    log, first_row, remarks = _signals_of(table, path, card)
+    parts = stretches(log["t"])
+    if len(parts) == 1:
+        made = prepared(log, first_row, path, card)
+        return replace(made, remarks=tuple(dict.fromkeys((*remarks, *made.remarks))))
+    said = [*remarks, f"{log.name}: its clock begins again: {len(parts)} runs"]
+    runs, bad = list[Log](), list[BadSamples]()
+    for number, rows in enumerate(parts, 1):
+        part = Log(f"{log.name} (run {number})", at_rows(log.signals, rows))
+        made = prepared(part, first_row + rows.start, path, card)
+        runs, bad, said = [*runs, *made.runs], [*bad, *made.bad], [*said, *made.remarks]
+    return Prepared(tuple(runs), tuple(said), tuple(bad), made.period)
+
+
+def prepared(log: Log, first_row: int, path: Path, card: Card) -> Prepared:
+    """The runs on an even clock of one log as it stands in a file from this row on."""
     fresh = renewed(log)
-    period, read = log.h if fresh.remarks else None, (*read, *fresh.remarks)
+    period, read = log.h if fresh.remarks else None, fresh.remarks
     repaired = _repaired(fresh.log, first_row, path, card)
     del log, fresh  # of a long log a gigabyte
     rig = card.rig(path.name)
     if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
-    prepared = prepare(with_force(thin.log, path, card), rig, first_row)
-    remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
-    bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
+    made = prepare(with_force(thin.log, path, card), rig, first_row)
+    remarks = (*read, *repaired.remarks, *thin.remarks, *made.remarks)
+    bad = (*repaired.bad, *made.bad)  # a command's limits are seen twice
     remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    return Prepared(prepared.runs, remarks, bad, period or repaired.log.h)
+    return Prepared(made.runs, remarks, bad, period or repaired.log.h)
 
 
 def _repaired(log: Log, first_row: int, path: Path, card: Card) -> Repaired:
@@ -85,11 +103,20 @@ def with_force(log: Log, path: Path, card: Card) -> Log:
 
 
 def read_signals(path: Path, card: Card) -> tuple[Log, int]:
-    """The card's signals in SI as they stand in the file, and the number of the first row."""
-    return _signals_of(_table(path, card), path, card)[:2]
+    """The card's signals in SI as they stand in the file, and the number of the first row; of
+    several runs the longest."""
+    return longest_run(table_of(path, card), path, card)
 
 
-def _table(path: Path, card: Card) -> Table:
+def longest_run(table: Table, path: Path, card: Card) -> tuple[Log, int]:
+    """As `read_signals`, of a table."""
+    log, first_row, _ = _signals_of(table, path, card)
+    rows = max(stretches(log["t"]), key=lambda one: one.stop - one.start)
+    return Log(log.name, at_rows(log.signals, rows)), first_row + rows.start
+
+
+def table_of(path: Path, card: Card) -> Table:
+    """The file as the card says that it is laid out; raises BadCard where it names no signals."""
     if not card.signals:
         raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
     return read_table(path, card.file)
@@ -99,61 +126,71 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
     """The card's signals in SI as they stand in the table, on the clock of `t`, the number of their
     first row, and what was done to them."""
     signals, groups = dict[str, Array](), dict[str, str]()
+    called, remarks = shown_name(path), list(table.remarks)
     for name, spec in card.signals.items():
         number = table.number(spec.column, f"{path}, signals.{name}")
-        signals[name] = _signal(table, number, name, card, path)
+        signals[name], said = _signal(table, number, name, card, path)
+        remarks += said
         _refuse_absurd(signals[name], name, path, table.first_row)
         if table.groups:
             groups[name] = table.groups[number]
     if not groups:
-        return Log(shown_name(path), _same_length(signals, path)), table.first_row, ()
+        whole = _same_length(signals, path)
+        rows, said = sound_rows(whole["t"], list(whole.values()))
+        whole = whole if np.all(rows) else at_rows(whole, rows)
+        told = tuple(f"{called}: {one}" for one in (*remarks, *said))
+        return Log(called, whole), table.first_row, told
 
     def clock(group: str) -> Array:
         number = table.clocks.get(group)
         if number is None:
             wanted = table.names[table.number(card.signals["t"].column, f"{path}, signals.t")]
             number = table.number(f"{group}/{wanted}", f"{path}, the clock of group {group!r}")
-        return _signal(table, number, "t", card, path)
+        return _signal(table, number, "t", card, path)[0]
 
-    found = on_one_clock(signals, groups, clock, shown_name(path))
-    log = Log(shown_name(path), _same_length(found.signals, path))
-    return log, table.first_row + found.first, found.remarks
+    found = on_one_clock(signals, groups, clock, called)
+    log = Log(called, _same_length(found.signals, path))
+    told = tuple(f"{called}: {one}" for one in remarks)
+    return log, table.first_row + found.first, (*told, *found.remarks)
 
 
-def _signal(table: Table, number: int, name: str, card: Card, path: Path) -> Array:
-    """A column of the table in SI, as the signal `name` of the card."""
+def _signal(
+    table: Table, number: int, name: str, card: Card, path: Path
+) -> tuple[Array, tuple[str, ...]]:
+    """A column of the table in SI, as the signal `name` of the card, and what was done to it."""
     spec = card.signals[name]
     raw = table.fetch(number)
     where = f"{path}: column {spec.column!r}"
     numbers = seconds(raw, where, table.first_row) if name == "t" else None
+    said = tuple[str, ...]()
     if numbers is None:
-        numbers = _numbers(raw, where, table.first_row)
+        numbers, said = _numbers(raw, where, table.first_row)
     elif spec.unit != "s":
         raise BadLog(
             f"{where} holds times of day, dates or durations, which are read in seconds; write"
             f' unit = "s" for signals.t, not {spec.unit!r}'
         )
     with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
-        return frozen(_to_si(numbers, name, spec, card, path))
+        return frozen(_to_si(numbers, name, spec, card, path)), said
 
 
-def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:
-    """Raw values as float64; raises BadLog naming the row of the first that is no number."""
-    if raw.dtype.kind in "fiub":
-        return np.asarray(raw, dtype=np.float64)
-    if raw.dtype.kind not in "OUS":
+def _numbers(raw: NDArray[Any], where: str, first_row: int) -> tuple[Array, tuple[str, ...]]:
+    """Raw values as float64, text in a few cells as missing, and what is said of it; raises BadLog
+    naming the row of the first that is no number where they are many."""
+    if raw.dtype.kind not in "fiubOUS":
         what = "dates" if raw.dtype.kind in "Mm" else f"of type {raw.dtype}"
         raise BadLog(f"{where} is {what}, numbers needed; log numbers (time in seconds)")
-    out = np.empty(len(raw))
-    for k, value in enumerate(raw):
-        try:
-            out[k] = number_of(value)
-        except (TypeError, ValueError):
-            shown = " ".join(repr(text_of(value)).split())[:40]
-            row = f"{where}, row {first_row + k}"
-            advice = _advice(raw, k)
-            raise BadLog(f"{row}: {shown} is not a number; {advice}") from None
-    return out
+    found = numbers_in(raw)
+    count = int(np.sum(found.is_text))
+    if not count:
+        return found.values, ()
+    row, shown = int(np.argmax(found.is_text)), repr(found.first_text)[:40]
+    if found.few:
+        cells = f"{count} cells that hold text" if count > 1 else "a cell that holds text"
+        column = where.rpartition(": ")[2]
+        return found.values, (f"{column}: {cells} ({shown}, row {first_row + row}) left out",)
+    advice = _advice(raw, row)
+    raise BadLog(f"{where}, row {first_row + row}: {shown} is not a number; {advice}")
 
 
 def _advice(raw: NDArray[Any], k: int) -> str:

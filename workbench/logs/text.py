@@ -14,8 +14,9 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
-from workbench.logs.blocks import Block, block_table, blocks_of, decimal_of
+from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
 from workbench.logs.clocks import clock_groups
+from workbench.logs.faulty_rows import are_few
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.table import Table
 
@@ -62,7 +63,7 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     if found is None:
         found = _first_line_layout(path, lines, fields, spec)
     names = found.names or tuple(str(k) for k in range(len(fields[found.data])))
-    body = _body(text, start + found.data, spec, marks)
+    body = _without_again(_body(text, start + found.data, spec, marks), lines[: found.data])
     if not body.strip():
         raise BadLog(
             f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
@@ -71,8 +72,9 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     first_row = start + found.data + 1
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
-    columns = _parse(path, content, marks, len(names), first_row)
-    table = Table(names, columns, first_row, bool(found.names), found.groups)
+    columns, remarks = _parse(path, content, marks, len(names), first_row)
+    headed = bool(found.names)
+    table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
     if found.groups or not found.names:
         return table
     return _grouped(table, fields[found.data : found.data + _COMPARED], marks)
@@ -85,7 +87,8 @@ def holds_blocks(path: Path, spec: FileSpec) -> bool:
 
 def _blocks(text: str, spec: FileSpec) -> list[Block]:
     """The blocks of a text of which the card does not say where its table begins."""
-    return blocks_of(text) if not spec.skip_rows and spec.header is None else []
+    found = blocks_of(text) if not spec.skip_rows and spec.header is None else []
+    return [] if are_runs(found) else found
 
 
 def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Table:
@@ -243,65 +246,93 @@ def _body(text: str, start: int, spec: FileSpec, marks: _Marks) -> str:
     return body
 
 
-def _parse(
-    path: Path, content: bytes, marks: _Marks, width: int, first_row: int
-) -> Callable[[int], NDArray[Any]]:
-    import pyarrow as pa
-    from pyarrow import csv as arrow
+def _without_again(body: str, header: Sequence[str]) -> str:
+    """The rows' text without the header where a logger that was started anew has written it once
+    more."""
+    again = {line.strip() for line in header if line.strip() and f"\n{line.strip()}" in body}
+    if not again:
+        return body
+    return "\n".join(line for line in body.splitlines() if line.strip() not in again)
 
-    wrong: list[tuple[int, int]] = []
 
-    def note(row: Any) -> str:
-        wrong.append((int(row.number or 0), int(row.actual_columns)))
-        return "skip"
+class _Parsed:
+    """Columns of a text, read by Arrow; rows of another number of fields are left out."""
 
-    names = [str(k) for k in range(width)]
-    parse = arrow.ParseOptions(delimiter=marks.delimiter, invalid_row_handler=note)
-    read = arrow.ReadOptions(column_names=names, use_threads=False)
+    def __init__(self, content: bytes, marks: _Marks, width: int) -> None:
+        self.content, self.marks, self.width = content, marks, width
+        self.wrong: list[tuple[int, int]] = []  # row and its fields, of the last reading
 
-    def load(kind: Any, wanted: list[str]) -> Any:
+    def load(self, kind: Any, wanted: list[str]) -> Any:
+        """These columns as one kind; raises ArrowInvalid where a cell is not of it."""
+        import pyarrow as pa
+        from pyarrow import csv as arrow
+
+        def note(row: Any) -> str:
+            wrong.append((int(row.number or 0), int(row.actual_columns)))
+            return "skip"
+
+        wrong = self.wrong = []
+        names = [str(k) for k in range(self.width)]
+        parse = arrow.ParseOptions(delimiter=self.marks.delimiter, invalid_row_handler=note)
+        read = arrow.ReadOptions(column_names=names, use_threads=False)
         convert = arrow.ConvertOptions(
             column_types=dict.fromkeys(wanted, kind),
-            decimal_point=marks.decimal,
+            decimal_point=self.marks.decimal,
             include_columns=wanted,
         )
-        found = arrow.read_csv(pa.BufferReader(content), read, parse, convert)
-        if wrong:
-            row, fields = wrong[0]
-            more = f" ({len(wrong)} such rows)" if len(wrong) > 1 else ""
-            advice = "correct or remove it"
-            if len(wrong) > MANY and fields == width + 1:
-                advice = "the header has one name too few for the rows; add it"
-            elif len(wrong) > MANY and fields > width and marks.delimiter == ",":
-                advice = "if the numbers have decimal commas, export with ';' between the columns"
-            raise BadLog(
-                f"{path}: row {first_row + row - 1} has {fields} fields, {width} needed{more};"
-                f" {advice}"
-            )
-        return found
+        return arrow.read_csv(pa.BufferReader(self.content), read, parse, convert)
 
+    def refused(self, path: Path, first_row: int, rows: int) -> str:
+        """What is said of rows left out; raises BadLog where they are too many for a message of the
+        logger or a row cut off."""
+        if not self.wrong:
+            return ""
+        (row, fields), count = self.wrong[0], len(self.wrong)
+        said = f"row {first_row + row - 1} has {fields} fields, {self.width} needed"
+        more = f" ({count} such rows)" if count > 1 else ""
+        if are_few(count, rows):
+            return f"{said}{more}: left out"
+        advice = "correct or remove it"
+        if count > MANY and fields == self.width + 1:
+            advice = "the header has one name too few for the rows; add it"
+        elif count > MANY and fields > self.width and self.marks.delimiter == ",":
+            advice = "if the numbers have decimal commas, export with ';' between the columns"
+        raise BadLog(f"{path}: {said}{more}; {advice}")
+
+
+def _parse(
+    path: Path, content: bytes, marks: _Marks, width: int, first_row: int
+) -> tuple[Callable[[int], NDArray[Any]], tuple[str, ...]]:
+    """What reads a column, and what is said of rows left out."""
+    import pyarrow as pa
+
+    parsed, names = _Parsed(content, marks, width), [str(k) for k in range(width)]
     try:
-        numbers = load(pa.float64(), names)
+        numbers = parsed.load(pa.float64(), names)
     except pa.ArrowInvalid:  # some hold text: the others are read at once all the same
         plain = [names[k] for k in _plain(content, marks, width)]
         try:
-            numbers = load(pa.float64(), plain) if plain else None
+            numbers = parsed.load(pa.float64(), plain) if plain else None
         except pa.ArrowInvalid:
             numbers = None
+    whole = numbers
+    if whole is None:
+        whole = parsed.load(pa.string(), names[:1])
+    said = parsed.refused(path, first_row, len(whole) + len(parsed.wrong))
     numeric = set() if numbers is None else set(numbers.column_names)
 
     def fetch(number: int) -> NDArray[Any]:
         if numbers is not None and names[number] in numeric:
             return np.asarray(numbers.column(names[number]).to_numpy())
         try:
-            return np.asarray(load(pa.float64(), [names[number]]).column(0).to_numpy())
+            return np.asarray(parsed.load(pa.float64(), [names[number]]).column(0).to_numpy())
         except pa.ArrowInvalid:
-            column = load(pa.string(), [names[number]]).column(0).to_pylist()
+            column = parsed.load(pa.string(), [names[number]]).column(0).to_pylist()
         if marks.decimal == ",":
             column = [None if value is None else value.replace(",", ".") for value in column]
         return np.asarray(column, dtype=object)
 
-    return fetch
+    return fetch, (said,) if said else ()
 
 
 def _plain(content: bytes, marks: _Marks, width: int) -> list[int]:

@@ -17,8 +17,9 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header, written_unit
 from workbench.files import refuse_larger
+from workbench.logs.faulty_rows import numbers_in
 from workbench.logs.layout import is_number
-from workbench.logs.table import Table, number_of, text_of
+from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, find_format, head_of, read_table
 from workbench.logs.text import TEXT_BYTES, first_lines, holds_blocks
 from workbench.logs.times import seconds
@@ -165,7 +166,8 @@ def read_unknown(path: Path) -> UnknownLog:
     same = [one for one in found if longest - ONE_ROW <= len(one.values) <= longest]
     shortest = min((len(one.values) for one in same), default=0)
     same = [replace(one, values=one.values[:shortest]) for one in same]
-    return UnknownLog(path, spec, tuple(same), tuple(scalars), (said,) if said else ())
+    notes = tuple(one for one in (said, *table.remarks) if one)
+    return UnknownLog(path, spec, tuple(same), tuple(scalars), notes)
 
 
 def _plain_names(table: Table, form: Format) -> tuple[str, ...]:
@@ -190,25 +192,19 @@ def _too_short(path: Path, found: str) -> str:
 
 
 def _numbers(table: Table, number: int) -> tuple[Array, str]:
-    """A column as numbers; the reason where it is none."""
+    """A column as numbers, text in a few cells as missing; the reason where it is none."""
     raw = np.asarray(table.fetch(number))
     if raw.ndim != 1:
         return np.zeros(0), "no column"
-    if raw.dtype.kind in "fiub":
-        return np.asarray(raw, dtype=np.float64), ""
-    out = np.full(len(raw), np.nan)
     if raw.dtype.kind in "Mm":
-        return out, "dates, not numbers"
-    cells = raw.tolist()
-    try:
-        for k, cell in enumerate(cells):
-            out[k] = number_of(cell)
-    except (TypeError, ValueError):
-        text = str(text_of(cell)).strip()
-        alone = len(set(cells)) == 1 and not text.isalnum()
-        shown = repr(text[:20])
-        return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
-    return out, ""
+        return np.full(len(raw), np.nan), "dates, not numbers"
+    found = numbers_in(raw)
+    if not np.any(found.is_text) or found.few:
+        return found.values, ""
+    text = found.first_text
+    alone = len(set(raw.tolist())) == 1 and not text.isalnum()
+    shown = repr(text[:20])
+    return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
 
 
 def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:

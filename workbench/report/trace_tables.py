@@ -86,12 +86,14 @@ def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row
 
 
 def effect_lines(found: Trace) -> list[str]:
-    """Equation, source and worth of every effect."""
-    return [
-        f"{words(e.effect.key)}: {e.effect.equation}; {e.effect.place.gives}. {_worth(e)}."
-        f" Source: {e.effect.source}."
-        for e in found.effects
-    ]
+    """Equation, source and worth of every effect, once for those of the same."""
+    said = dict[str, list[str]]()
+    for e in found.effects:
+        line = (
+            f"{e.effect.equation}; {e.effect.place.gives}. {_worth(e)}. Source: {e.effect.source}."
+        )
+        said.setdefault(line, []).append(words(e.effect.key))
+    return [f"{', '.join(names)}: {line}" for line, names in said.items()]
 
 
 def _worth(e: FoundEffect) -> str:

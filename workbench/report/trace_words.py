@@ -68,10 +68,7 @@ def share_of_friction(part: float, of: LatentForces) -> str:
 
 def _verdict_sentence(traced: Traced) -> str:
     found = traced.trace
-    names = "; and ".join(
-        f"{words(e.effect.key)} – {e.effect.meaning} (probability {chance(e.probability)})"
-        for e in found.effects
-    )
+    names = "; and ".join(_named(found))
     error, errors = reported_error(traced) if found.effects else None, ""
     if error is not None:
         noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
@@ -104,6 +101,24 @@ def _verdict_sentence(traced: Traced) -> str:
             return f"Unknown: what is left {left}, and no effect of the library explains it."
         case _:
             return f"Unknown: {unexplained(traced)}"
+
+
+def _named(found: Trace) -> list[str]:
+    """The effects, each with what it is and its probability; orders of a turn as the one cogging
+    that they are."""
+    orders = found.surroundings.orders
+    of_a_turn = {one.key for one in found.surroundings.cogging} if len(orders) > 1 else set[str]()
+    out, told = list[str](), False
+    for e in found.effects:
+        name, meaning = words(e.effect.key), e.effect.meaning
+        if e.effect.key in of_a_turn:
+            if told:
+                continue
+            told, name = True, "cogging"
+            *most, last = (str(one.order) for one in orders)
+            meaning = f"torques {', '.join(most)} and {last} times in a turn (magnets, teeth)"
+        out.append(f"{name} – {meaning} (probability {chance(e.probability)})")
+    return out
 
 
 def chance(probability: float) -> str:

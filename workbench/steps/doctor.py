@@ -18,18 +18,16 @@ from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_time
-from identification.signals.clean import limits, prepare, repair
+from identification.signals.clean import limits
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.even_clock import LONGEST_GAP, even_clock, rows_lost
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
-from identification.signals.renewal import renewed
-from identification.signals.thin import thinned
 from workbench.cards.card import Card
 from workbench.cards.units import conversion
 from workbench.documents.model import Identifiable
 from workbench.documents.plausible import log_remarks
-from workbench.logs.runs import read_signals, with_force
+from workbench.logs.runs import longest_run, runs_of, table_of, with_force
 from workbench.steps.hardly_identifiable import hardly_identifiable
 from workbench.steps.identifiable_by_log import RunsIdentifiability, Ways, identifiability_of_runs
 
@@ -137,19 +135,17 @@ def checked_log(path: Path, card: Card) -> CheckedLog:
     A log that `identify` would refuse is looked at as far as it goes. Raises BadLog or BadCard
     where the file cannot be read at all.
     """
-    raw, first_row = read_signals(path, card)
+    table = table_of(path, card)
+    raw, _ = longest_run(table, path, card)
     rig = card.rig(path.name)
     clock, refused = _clock_of(raw["t"]), ""
     bad, remarks = list[BadSamples](), list[str]()
     runs: tuple[Log, ...]
     try:
-        fresh = renewed(raw)
-        repaired = repair(fresh.log, first_row, rotary=rig.motion == "rotary")
-        bad += repaired.bad
-        slower = thinned(repaired.log)
-        prepared = prepare(with_force(slower.log, path, card), rig, first_row)
-        runs = prepared.runs
-        remarks += [*fresh.remarks, *slower.remarks, *prepared.remarks]
+        made = runs_of(table, path, card)
+        bad += made.bad
+        runs = made.runs
+        remarks += made.remarks
     except BadLog as error:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)

@@ -106,7 +106,7 @@ def test_the_share_of_lost_rows_is_told_and_follows_the_log() -> None:
     log = sliding_log(n=1000)
     log = Log("run", {k: x[kept] for k, x in log.signals.items()})
     prepared = prepare(log, Rig("force"))
-    assert any("0.1 of its rows are lost" in one for one in prepared.remarks)
+    assert any("10 % of its rows are lost" in one for one in prepared.remarks)
     lost = prepared.runs[0].part(0, 100).with_signals(F=np.zeros(100)).lost
     assert lost is not None and np.count_nonzero(lost) == 10
 
@@ -176,23 +176,39 @@ def test_isolated_nan_is_filled_and_remarked() -> None:
     assert remarks == ("run: 3 isolated missing samples of 'y' interpolated",)
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        ([0], "row 2, an end of the log"),
-        ([1999], "row 2001, an end of the log"),
-        (range(10, 1900, 20), "in 5% of the rows, first in row 12"),
-    ],
-)
-def test_missing_ends_and_too_many_are_refused_with_their_row(
-    rows: list[int], message: str
-) -> None:
+@pytest.mark.parametrize("rows", [[0], [1999], range(7), [0, 1, 1998, 1999]])
+def test_rows_without_a_value_at_the_ends_are_left_out(rows: list[int]) -> None:
     log = sliding_log()
     for bad in (np.nan, np.inf):
         F = log["F"].copy()
         F[list(rows)] = bad
-        with pytest.raises(BadLog, match=message):
-            repair(log.with_signals(F=F), first_row=2)
+        repaired, remarks, found = repair(log.with_signals(F=F), first_row=2)
+        kept = np.setdiff1d(np.arange(2000), rows)
+        np.testing.assert_array_equal(repaired["t"], log["t"][kept])
+        assert f"{len(rows)} rows at the log's ends" in remarks[0]
+        assert not found
+
+
+@pytest.mark.parametrize(("name", "every"), [("F", 20), ("y", 20), ("u", 100)])
+def test_rows_without_a_value_count_as_lost(name: str, every: int) -> None:
+    """A command that is missing, or more than a hundredth of another signal."""
+    log = sliding_log().with_signals(u=sliding_log()["F"])
+    x = log[name].copy()
+    x[10:1900:every] = np.nan
+    made = prepare(log.with_signals(**{name: x}), RIG)
+    (run,) = made.runs
+    assert run.lost is not None
+    np.testing.assert_array_equal(np.flatnonzero(run.lost), np.arange(10, 1900, every))
+    assert f"{len(range(10, 1900, every))} rows without a value of '{name}'" in made.remarks[0]
+    np.testing.assert_allclose(run["y"], log["y"], atol=1e-4)
+
+
+def test_too_many_missing_samples_are_refused_with_their_row() -> None:
+    log = sliding_log()
+    F = log["F"].copy()
+    F[10:1900:8] = np.nan
+    with pytest.raises(BadLog, match="in 12% of the rows, first in row 12"):
+        repair(log.with_signals(F=F), first_row=2)
 
 
 def test_time_that_goes_back_or_repeats_is_refused_with_its_row() -> None:
@@ -332,22 +348,12 @@ def test_a_run_of_missing_samples_cuts_the_log() -> None:
     assert (found.first, found.last) == pytest.approx((7.0, 7.19))
 
 
-def test_any_missing_command_cuts_the_log() -> None:
-    """What a controller gave is not what lies between two other samples."""
-    log = sliding_log()
-    u = log["F"].copy()
-    u[700] = np.nan
-    made = prepare(log.with_signals(u=u), RIG)
-    assert len(made.runs) == 2
-    assert made.bad[0].done == "cut out"
-
-
 def test_a_tenth_of_a_log_is_not_cut_out() -> None:
     log = sliding_log()
     F = log["F"].copy()
     for first in range(100, 1900, 100):
         F[first : first + 9] = np.nan
-    with pytest.raises(BadLog, match=r"at most 10% are cut out|is NaN or infinite in"):
+    with pytest.raises(BadLog, match=r"at most 10% are left out|is NaN or infinite in"):
         repair(log.with_signals(F=F))
 
 

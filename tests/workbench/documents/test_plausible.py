@@ -56,6 +56,7 @@ def test_a_sound_log_has_no_remark() -> None:
         ({"t": 1e3}, "t", "ms in place of s would make it 0.001 s"),
         ({"t": 1e-3}, "t", "s in place of ms would make it 0.001 s"),
         ({"y": 1e3}, "y", "mm in place of m would make it 0.1 m"),
+        ({"y": 1.5e3}, "y", "mm in place of m would make it 0.15 m"),
         ({"y": 1e-6}, "y", "m in place of um would make it 0.1 m"),
         ({"F": 1e6}, "F", "mN in place of N would make it 6e+04 N"),
         ({"p": 1e-5}, "p_p", "bar in place of Pa would make it 4e+05 Pa"),

@@ -32,12 +32,13 @@ def refusal(path: Path, text: str = CARD) -> str:
     return messages[0]
 
 
-def edited(folder: Path, row: int, change: Callable[[list[str]], list[str]]) -> Path:
-    """A sound CSV with the fields of one line (counted from 1 as in the file) changed."""
+def edited(folder: Path, row: int, change: Callable[[list[str]], list[str]], rows: int = 1) -> Path:
+    """A sound CSV with the fields of some lines (counted from 1 as in the file) changed."""
     path = folder / "a.csv"
     write_csv(path, signals())
     lines = path.read_text("utf-8").splitlines()
-    lines[row - 1] = ",".join(change(lines[row - 1].split(",")))
+    for k in range(row - 1, row - 1 + 2 * rows, 2):
+        lines[k] = ",".join(change(lines[k].split(",")))
     path.write_text("\n".join(lines), "utf-8")
     return path
 
@@ -81,9 +82,20 @@ def test_wrong_unit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["n/e", "1.2.3", "0x10", "12:30", "OFF"])
-def test_text_in_a_number_names_row_and_column(tmp_path: Path, text: str) -> None:
-    message = refusal(edited(tmp_path, 57, lambda f: [f[0], text, f[2]]))
+def test_text_in_numbers_names_row_and_column(tmp_path: Path, text: str) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [f[0], text, f[2]], rows=5))
     assert f"column 'y', row 57: '{text}' is not a number" in message
+
+
+def test_text_in_one_cell_is_a_missing_sample(tmp_path: Path) -> None:
+    path = edited(tmp_path, 57, lambda f: [f[0], "#VALUE!", f[2]])
+    found = read_runs(path, card(tmp_path, CARD))
+    assert found.remarks[0] == (
+        "a.csv: column 'y': a cell that holds text ('#VALUE!', row 57) left out"
+    )
+    (run,) = found.runs
+    assert len(run) == 400
+    np.testing.assert_allclose(run["y"], signals()["y"], atol=1e-3)
 
 
 def test_a_column_of_text(tmp_path: Path) -> None:
@@ -96,9 +108,49 @@ def test_a_column_of_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fields", [1, 2, 4])
-def test_row_of_another_length(tmp_path: Path, fields: int) -> None:
-    message = refusal(edited(tmp_path, 57, lambda f: [*f, "9"][:fields]))
-    assert f"row 57 has {fields} fields, 3 needed" in message
+def test_rows_of_another_length(tmp_path: Path, fields: int) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [*f, "9"][:fields], rows=5))
+    assert f"row 57 has {fields} fields, 3 needed (5 such rows)" in message
+
+
+@pytest.mark.parametrize("fields", [1, 2, 4])
+def test_one_row_of_another_length_is_left_out(tmp_path: Path, fields: int) -> None:
+    path = edited(tmp_path, 57, lambda f: [*f, "9"][:fields])
+    found = read_runs(path, card(tmp_path, CARD))
+    assert found.remarks[0] == f"a.csv: row 57 has {fields} fields, 3 needed: left out"
+    (run,) = found.runs
+    assert run.lost is not None
+    assert np.flatnonzero(run.lost).tolist() == [55]
+    np.testing.assert_allclose(run["y"], signals()["y"], atol=1e-3)
+
+
+def test_a_last_row_that_is_cut_off_is_left_out(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    path.write_text(path.read_text("utf-8").rstrip().rpartition(",")[0], "utf-8")
+    found = read_runs(path, card(tmp_path, CARD))
+    assert found.remarks == ("a.csv: row 401 has 2 fields, 3 needed: left out",)
+    assert len(found.runs[0]) == 399
+
+
+def test_a_logger_that_was_started_anew_gives_two_runs(tmp_path: Path) -> None:
+    """Its header stands in the middle of the file, and its clock begins again."""
+    path = with_columns(tmp_path)
+    once = path.read_text("utf-8")
+    path.write_text(once + once, "utf-8")
+    found = read_runs(path, card(tmp_path, CARD))
+    assert found.remarks == ("a.csv: its clock begins again: 2 runs",)
+    assert [run.name for run in found.runs] == ["a.csv (run 1)", "a.csv (run 2)"]
+    for run in found.runs:
+        np.testing.assert_allclose(run["y"], signals()["y"], rtol=1e-12)
+
+
+def test_a_row_that_is_there_twice_counts_once(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    lines = path.read_text("utf-8").splitlines()
+    path.write_text("\n".join([lines[0], *(x for line in lines[1:] for x in (line, line))]))
+    found = read_runs(path, card(tmp_path, CARD))
+    assert found.remarks == ("a.csv: 400 rows that repeat the row before left out",)
+    np.testing.assert_allclose(found.runs[0]["y"], signals()["y"], rtol=1e-12)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", ""])
@@ -280,7 +332,7 @@ def test_lines_before_a_header_that_cannot_be_found_say_what_to_skip(tmp_path: P
 
 @pytest.mark.parametrize("text", ["00:00:01.002", "2024-01-01 00:00", "2024/01/01"])
 def test_times_as_dates_or_clocks(tmp_path: Path, text: str) -> None:
-    message = refusal(edited(tmp_path, 57, lambda f: [text, *f[1:]]))
+    message = refusal(edited(tmp_path, 57, lambda f: [text, *f[1:]], rows=5))
     assert "log times in seconds, not as dates or clock times" in message
 
 

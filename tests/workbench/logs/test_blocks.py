@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.logs.blocks import blocks_of
 from workbench.logs.tables import read_table
@@ -46,13 +45,13 @@ def test_each_block_is_a_variable(
     assert found["Axis.Cur"].values[10] == -12.5
 
 
-def test_runs_one_below_the_other_are_refused_as_that(tmp_path: Path) -> None:
+def test_runs_one_below_the_other_are_one_table(tmp_path: Path) -> None:
+    """Where each has the header; its clock then begins again (`faulty_rows`)."""
     run = ["t;y;F", *(f"{k};{0.1 * k};{k % 7}" for k in range(ROWS))]
     path = tmp_path / "runs.csv"
     path.write_text("\n".join([*run, "", *run]), "utf-8")
-    with pytest.raises(BadLog, match=r"2 tables one below the other.*several runs") as refused:
-        read_table(path, FileSpec())
-    assert "\n" not in str(refused.value)
+    table = read_table(path, FileSpec())
+    np.testing.assert_array_equal(table.column("t", "runs"), 2 * list(range(ROWS)))
 
 
 def test_one_table_is_no_block() -> None:

@@ -120,7 +120,7 @@ def test_a_header_below_a_preamble(tmp_path: Path, above: str, units: str) -> No
 
 def test_a_bad_field_is_told_with_its_line_in_the_file(tmp_path: Path) -> None:
     rows = [";".join(row) for row in zip(*columns().values(), strict=True)]
-    rows[50] = "500;OFF;1"
+    rows[50:60] = ["500;OFF;1"] * 10
     head = PREAMBLES["key and value"] + "t;ActPos;Force\n" + UNITS["plain"]
     (tmp_path / "a.csv").write_text(head + "\n".join(rows), "utf-8")
     with pytest.raises(BadLog, match="column 'ActPos', row 58: 'OFF' is not a number"):

@@ -13,6 +13,7 @@ from identification.signals.differentiate import Motion, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
 from workbench.cards.headers import Header, read_header
+from workbench.logs.faulty_rows import sound_rows, stretches
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
@@ -138,7 +139,8 @@ def columns_of(log: UnknownLog) -> Columns:
         values = raw.values if register is None else register.values
         read.append(Column(raw, header, values, values, register))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
-    usable = [one for one in read if one.raw.number not in left_out]
+    usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
+    log = replace(log, notes=(*log.notes, *said))
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
     step = float(np.median(np.diff(clock.values)))
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
@@ -149,6 +151,25 @@ def columns_of(log: UnknownLog) -> Columns:
     distinct, twice = _without_doubles(signals)
     own = tuple(_with_axes(distinct))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, ...]]:
+    """The columns at the rows of one run, where a time among them goes up but for rows without a
+    time, rows written twice, or a logger that was started anew; and what is said of it."""
+    if not any(map(_ticks, columns)):
+        for one in columns:
+            if "time" not in one.header.means:
+                continue
+            rows, said = sound_rows(one.values, [other.values for other in columns])
+            runs = stretches(one.values[rows])
+            longest = max(runs, key=lambda run: run.stop - run.start)
+            at = np.flatnonzero(rows)[longest]
+            if len(at) < len(one.values) and _ticks(replace(one, values=one.values[at])):
+                if len(runs) > 1:
+                    said = (*said, f"the clock begins again: {len(runs)} runs, of which this is"
+                                   " what the longest shows")  # fmt: skip
+                return [replace(c, values=c.values[at], x=c.values[at]) for c in columns], said
+    return list(columns), ()
 
 
 def _unusable(one: Column) -> str:
@@ -232,10 +253,6 @@ def _wrong_with_clock(t: Array) -> str:
     row = int(wrong[0]) + 2 if len(wrong) else 2
     if np.mean(step == 0.0) > OFTEN_REPEATED:
         return f"repeats its times (data row {row}): they are coarser than the rows"
-    back = np.flatnonzero(step < 0.0)
-    if len(back) == len(wrong) > 0 and len(wrong) < MOST_UNEVEN * len(t):
-        runs = len(back) + 1
-        return f"begins again at data row {row}: {runs} runs in one file, to be split there"
     return f"does not go up evenly (see data row {row})"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
 from workbench.steps.first_card.columns import Columns
+from workbench.steps.first_card.pairs import ONE_SIGNAL
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
@@ -49,10 +50,12 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
 
 
 def behind_reference(roles: Roles) -> float | None:
-    """Samples of the columns by which the position follows its reference; None without one."""
+    """Samples of the columns by which the position follows its reference; None where it follows
+    none."""
     if "r" not in roles.columns:
         return None
-    return lead(roles.columns["r"].x, roles.columns["y"].x).samples
+    found = lead(roles.columns["r"].x, roles.columns["y"].x)
+    return found.samples if abs(found.likeness) >= ONE_SIGNAL else None
 
 
 def are_exchanged(behind: float) -> bool:

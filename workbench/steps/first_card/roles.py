@@ -17,12 +17,13 @@ from identification.log import RigKind
 from identification.signals.relations import (
     GIVES_SIGN,
     ForceLaw,
+    Lead,
     actuator_share,
     force_law,
     force_laws,
 )
 from workbench.steps.first_card.columns import Column
-from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
+from workbench.steps.first_card.pairs import MOST_CONSTANT, ONE_SIGNAL, Pairs, Seen
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
@@ -51,6 +52,7 @@ MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 FRICTION_GIVES_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
+HARDLY_ITS_LAW = 0.05  # the same of columns that are rather no position and force of one body
 MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
 WORK_GIVES_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
 COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
@@ -357,7 +359,7 @@ def _signs(best: _Choice) -> dict[str, Sign]:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]
     if "r" in best.others:
-        found = seen.lead(seen.pairs.signals.index(best.others["r"]))
+        found = _lead_of(best)
         out["r"] = -1.0 if found.likeness < -SURELY_TURNED else 1.0
     if "F" in best.others:
         law = force_law(seen.motion, seen.y.x, best.others["F"].x)
@@ -368,9 +370,12 @@ def _signs(best: _Choice) -> dict[str, Sign]:
 def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
     """How far the best choice is ahead of the best that gives each signal another column.
 
-    No role is sure whose header says nothing of it.
+    No role is sure whose header says nothing of it, or of columns that do not move as a body that
+    is driven, or a reference that nothing follows.
     """
     out = {}
+    law = best.way.law
+    moves = law.share > HARDLY_ITS_LAW or abs(law.work) > WORK_GIVES_SIGN
     for role, column in best.columns.items():
         rivals = [one.score for one in choices if one.columns.get(role) is not column]
         ahead = best.score - max(rivals, default=-np.inf)
@@ -378,8 +383,15 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
-        out[role] = odds if named else min(odds, SURE - 1.0)
+        follows = role != "r" or abs(_lead_of(best).likeness) >= ONE_SIGNAL
+        out[role] = odds if named and moves and follows else min(odds, SURE - 1.0)
     return out
+
+
+def _lead_of(best: _Choice) -> Lead:
+    """By how much the position is behind its reference."""
+    seen = best.way.seen
+    return seen.lead(seen.pairs.signals.index(best.others["r"]))
 
 
 def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
@@ -395,7 +407,7 @@ def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
 
 def _reasons(best: _Choice) -> dict[str, str]:
     """In words why each column has its role."""
-    law, seen = best.way.law, best.way.seen
+    law = best.way.law
     of = f"{law.share:.0%} of it is inertia and friction"
     work = f", and friction takes {abs(law.work):.0%} of its work" if abs(law.work) > 0.1 else ""
     out = {name: f"{of} along the position{work}" for name in best.way.columns}
@@ -406,8 +418,13 @@ def _reasons(best: _Choice) -> dict[str, str]:
         "two pressures drive it" if two else "a force drives it"
     )
     if "r" in best.others:
-        found = seen.lead(seen.pairs.signals.index(best.others["r"]))
-        out["r"] = f"the position follows it ({found.likeness:.0%} alike)"
+        found = _lead_of(best)
+        follows = abs(found.likeness) >= ONE_SIGNAL
+        out["r"] = (
+            f"the position follows it ({found.likeness:.0%} alike)"
+            if follows
+            else "its header says so; the position does not follow it"
+        )
     if "u" in best.others:
         out["u"] = "the force's change follows it"
     if "v" in best.others:
