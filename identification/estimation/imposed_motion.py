@@ -51,6 +51,8 @@ WHY_NOT = {
     "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
     "F_v": "constant friction predicts as much of these logs; add runs at other speeds to"
     " identify viscous friction",
+    "F_c": "viscous friction alone predicts as much of these logs; add slow motion to identify"
+    " Coulomb friction",
     "stick": "no free run was fitted (see the notes), and it is not in the force equation;"
     " log the body driven by a force, from rest",
 }
@@ -221,7 +223,7 @@ def _estimates(
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
     sizes = zip(fit.used, fit.theta.tolist(), strict=True)
     values = {FIVE[i]: x for i, x in sizes if i != 0 or fit.share >= INERTIA_SHARE}
-    known = _of_sliding(values, fit.sd, ways_of(data), fastest, recorded)
+    known = _of_sliding(values, fit.sd, fastest, recorded)
     return _reasoned(known, nine, fit.share, recorded)
 
 
@@ -235,18 +237,17 @@ def imposed_estimates(
     """
     raw = zip(FIVE, theta.tolist(), strict=True)
     values = {n: float(getattr(plant.friction, n)) if x > 0.0 else x for n, x in raw if n in sd}
-    up = np.concatenate([one.up for one in recorded.logs])
-    sliding = (int(np.count_nonzero(up)), int(np.count_nonzero(~up)))
     fastest = float(max(np.max(one.speed, initial=0.0) for one in recorded.logs))
-    known = _of_sliding(values, sd, sliding, fastest, recorded)
+    known = _of_sliding(values, sd, fastest, recorded)
     return _reasoned(known, plant.friction.array, None, recorded)
 
 
 def _of_sliding(
-    values: Mapping[str, float], sd: Mapping[str, float], sliding: tuple[int, int], fastest: float,
-    recorded: RecordedLogs,
-) -> Mapping[str, Estimate]:  # fmt: skip
-    """Estimates of parameters that need no more than sliding; so many rows in each direction."""
+    values: Mapping[str, float], sd: Mapping[str, float], fastest: float, recorded: RecordedLogs
+) -> Mapping[str, Estimate]:
+    """Estimates of parameters that need no more than sliding, by the samples in which it shows."""
+    d = np.concatenate([one.signals["d"] for one in recorded.logs])
+    sliding = (int(np.count_nonzero(d > 0)), int(np.count_nonzero(d < 0)))
     events = Events((0, 0), (0, 0), sliding, (fastest, fastest))
     return estimates(values, sd, events, recorded.rig, recorded.name)
 
@@ -280,7 +281,7 @@ def _reasoned(
                 one = replace(one, reason=why, assumed=float(value))
             out[key] = one
             continue
-        kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
+        kind = key if key == "m" else "stick" if key.startswith(("dv", "F_s")) else key[:3]
         reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
     return out

@@ -9,19 +9,21 @@ Along the measured motion f is known, so y, v, d are a linear Gaussian chain of 
 Where the body rests, or its direction is not significant, friction takes whatever is applied: no
 force is seen there, and the band is as wide as d may be. Where a rig prescribes the motion the
 force is measured instead, and d is what it leaves of the equation. sigma and tau are those of
-largest likelihood. Sources: latent force models, Alvarez, Luengo, Lawrence, IEEE TPAMI 35 (2013)
-2693; Sarkka, Solin, Applied Stochastic Differential Equations (2019), ch. 10, 12; of bodies with
-friction, Marino, Cicirello, arXiv 2303.03858.
+largest likelihood, and so is the white noise of what is measured, where it is more than the log
+shows of it by itself: a clock that jitters, or a drive that filters what it reports, makes errors
+from sample to sample that are no force. Sources: latent force models, Alvarez, Luengo, Lawrence,
+IEEE TPAMI 35 (2013) 2693; Sarkka, Solin, Applied Stochastic Differential Equations (2019), ch. 10,
+12; of bodies with friction, Marino, Cicirello, arXiv 2303.03858.
 """
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.regression.equation_rows import MotionLog
@@ -38,6 +40,9 @@ LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # of the largest force, that sigma may be
 LEAST_NOISE_F = 1e-6  # of the largest force, to which any force is uncertain
 SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
 CLOSE_ENOUGH = 0.02  # of log sigma
+WHITE_NOISES = (1.5, 3.0, 6.0, 15.0, 40.0, 120.0)  # times the noise, that R may be
+WHITE_GAINS = 5.0  # nats, by which more noise has to be the likelier
+NATS_95 = 1.353  # nats below the largest likelihood: one-sided 95 % of chi-square over two
 FORCE, VELOCITY = 2, 1  # states beside the position
 
 
@@ -59,10 +64,16 @@ class LatentForce:
 
 @dataclass(frozen=True, eq=False)
 class LatentForces:
-    """The latent forces of several logs under one sigma [N] and one memory tau [s]."""
+    """The latent forces of several logs under one sigma [N] and one memory tau [s].
+
+    most [N]: the largest sigma that these logs do not rule out (95 %); rougher: times the noise
+    that the logs show, the standard deviation of what is measured.
+    """
 
     sigma: float
     tau: float
+    most: float
+    rougher: float
     logs: tuple[LatentForce, ...]
 
     @property
@@ -86,9 +97,11 @@ class LatentForces:
         return (float(np.mean(force**2)), float(np.mean(sd**2))) if len(force) else (0.0, 0.0)
 
     def share(self, level: float) -> float | None:
-        """`rms` as a share of a Coulomb level [N]; None where no body slides, or nothing rubs."""
+        """`rms` as a share of a Coulomb level [N], where it is a bound the most that these logs do
+        not rule out; None where no body slides, or nothing rubs."""
         slides = any(np.any(one.slides) for one in self.logs)
-        return self.rms / level if slides and rubs(level, self.rms) else None
+        size = max(self.rms, self.most) if self.is_a_bound else self.rms
+        return size / level if slides and rubs(level, self.rms) else None
 
     @property
     def log_likelihood(self) -> float:
@@ -99,6 +112,15 @@ class LatentForces:
 def rubs(level: float, left: float) -> bool:
     """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
     return level > AS_GOOD_AS_NONE * left
+
+
+class _Least(NamedTuple):
+    """The least cost [nats], and where it is."""
+
+    cost: float
+    sigma: float
+    tau: float
+    rougher: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,43 +149,61 @@ class _Known:
         P0[at] = sigma**2
         return Chain(A, Q, A_free, Q_free, of.c, of.x0, P0)
 
-    def log_density(self, sigma: float, tau: float) -> Array:
+    def log_density(self, sigma: float, tau: float, rougher: float = 1.0) -> Array:
         """Of each sample measured while the body slides, given those before it, (n,)."""
-        found = log_densities(self.z, self.R, self.seen, self.free, self.chain(sigma, tau))
+        R = self.R * rougher**2
+        found = log_densities(self.z, R, self.seen, self.free, self.chain(sigma, tau))
         return np.where(self.slides, found, 0.0)
 
-    def latent(self, sigma: float, tau: float) -> LatentForce:
+    def latent(self, sigma: float, tau: float, rougher: float) -> LatentForce:
         """d of this log."""
-        chain = self.chain(sigma, tau)
-        force, sd = smoothed(self.z, self.R, self.seen, self.free, chain, self.at)
+        chain, R = self.chain(sigma, tau), self.R * rougher**2
+        force, sd = smoothed(self.z, R, self.seen, self.free, chain, self.at)
         t, y = (np.asarray(self.one.log[name]) for name in ("t", "y"))
-        return LatentForce(t, y, force, sd, self.slides, self.log_density(sigma, tau))
+        return LatentForce(t, y, force, sd, self.slides, self.log_density(sigma, tau, rougher))
 
 
-def latent_forces(plant: Plant, logs: Sequence[MotionLog], slowest: float) -> LatentForces:
+def latent_forces(
+    plant: Plant, logs: Sequence[MotionLog], slowest: float, rougher: float | None = None
+) -> LatentForces:
     """What a plant lacks on each of the logs, sigma and tau those of largest likelihood on them.
 
-    slowest [m/s]: speed up to which friction is not that of sliding. Equation (1).
+    slowest [m/s]: speed up to which friction is not that of sliding; rougher: that of the same
+    logs, where a better plant has shown it. Equation (1); the bound by the likelihood ratio, Wilks,
+    Ann. Math. Stat. 9 (1938) 60.
     """
     known = [_known(plant, one, slowest) for one in logs]
     scale = max(_largest(plant, one.log) for one in logs)
     shortest = FEWEST_IN_MEMORY * max(one.log.h for one in logs)
     memories = [tau for tau in MEMORIES if tau > shortest] or [shortest]
+    bounds = float(np.log(LEAST_SIGMA * scale)), float(np.log(MOST_SIGMA * scale))
 
-    def best(tau: float) -> tuple[float, float]:
-        def cost(log_sigma: float) -> float:
-            sigma = float(np.exp(log_sigma))
-            return -float(sum(np.sum(one.log_density(sigma, tau)) for one in known))
+    def cost(sigma: float, tau: float, rougher: float) -> float:
+        return -float(sum(np.sum(one.log_density(sigma, tau, rougher)) for one in known))
 
-        bounds = float(np.log(LEAST_SIGMA * scale)), float(np.log(MOST_SIGMA * scale))
+    def least(tau: float, rougher: float) -> _Least:
+        """The sigma of largest likelihood at these."""
         found: Any = minimize_scalar(
-            cost, bounds=bounds, method="bounded", options={"xatol": CLOSE_ENOUGH}
-        )
-        return float(found.fun), float(np.exp(found.x))
+            lambda x: cost(float(np.exp(x)), tau, rougher), bounds=bounds, method="bounded",
+            options={"xatol": CLOSE_ENOUGH},
+        )  # fmt: skip
+        return _Least(float(found.fun), float(np.exp(found.x)), tau, rougher)
 
     with ThreadPoolExecutor(2) as pool:
-        (_, sigma), tau = min(zip(pool.map(best, memories), memories, strict=True))
-    return LatentForces(sigma, tau, tuple(one.latent(sigma, tau) for one in known))
+        best = min(pool.map(lambda tau: least(tau, rougher or 1.0), memories))
+        if rougher is None:
+            other = min(pool.map(lambda more: least(best.tau, more), WHITE_NOISES))
+            if other.cost < best.cost - WHITE_GAINS:
+                best = min(pool.map(lambda tau: least(tau, other.rougher), memories))
+
+    def beyond(x: float) -> float:
+        return cost(float(np.exp(x)), best.tau, best.rougher) - best.cost - NATS_95
+
+    low = float(np.log(best.sigma))
+    out = beyond(low) < 0.0 < beyond(bounds[1])
+    most = float(np.exp(brentq(beyond, low, bounds[1], xtol=CLOSE_ENOUGH) if out else bounds[1]))
+    found = (one.latent(best.sigma, best.tau, best.rougher) for one in known)
+    return LatentForces(best.sigma, best.tau, most, best.rougher, tuple(found))
 
 
 def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:

@@ -139,7 +139,7 @@ def log_densities(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chai
     none, nothing = np.zeros((0, N)), np.zeros((0, N, N))
     filter_kernel(z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.x0, of.P0,
                   none, nothing, e, S)  # fmt: skip
-    out = np.zeros(len(z))
+    out, S = np.zeros(len(z)), np.maximum(S, R)  # which rounding may take below the noise
     out[seen] = -0.5 * (np.log(2.0 * np.pi * S[seen]) + e[seen] ** 2 / S[seen])
     return out
 

@@ -17,6 +17,7 @@ from identification.estimation.regression.row_fit import RowFit
 from identification.estimation.regression.weighted_rows import OVERLAP, Rows, stacked
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.log import Rig
+from identification.model.estimates import NORMAL_95
 from identification.model.plant import units_of
 from identification.thresholds import BEYOND_CHANCE, MATERIAL, OF_ACCOUNT
 from identification.tracing.model_errors import seen_by
@@ -69,6 +70,7 @@ def changes(
 
     One is freed at a time, the one that lowers the error most, as long as it lowers it by a
     material share and significantly: parameters that a short log cannot separate do not all change.
+    One that differs by less than the error of both logs together has not.
     blur (k,): square sum that noise makes of each whitened column. Source: Fuller (1987), moments
     less those of the noise.
     """
@@ -106,8 +108,18 @@ def changes(
         return []
     inverse = np.linalg.pinv(gram[np.ix_(free, free)])
     sd = np.sqrt(np.diag(inverse) * noise * OVERLAP)
+    half = NORMAL_95 * np.hypot(sd, _own_sd(mine, own)[free])  # of the change's interval
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))
-        for i, s in zip(free, sd, strict=True)
-        if abs(best[i] - theta[i]) > MATERIAL * abs(theta[i])
+        for i, s, least in zip(free, sd, half, strict=True)
+        if abs(best[i] - theta[i]) > max(MATERIAL * abs(theta[i]), least)
     ]
+
+
+def _own_sd(mine: RowFit, noise: float) -> Array:
+    """Deviations (k,) of the parameters on the logs of their fit; noise: mean square left there."""
+    keep = mine.rows.speed >= mine.slowest
+    A = (mine.rows.X / mine.rows.sd[:, np.newaxis])[keep]
+    size = np.sqrt(np.maximum(np.sum(A**2, axis=0), 1e-300))
+    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-10, hermitian=True)
+    return np.asarray(np.sqrt(np.diag(inverse) * max(noise, 1.0) * OVERLAP) / size)

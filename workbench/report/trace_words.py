@@ -15,6 +15,7 @@ from workbench.steps.trace import Traced
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
 CERTAIN = 0.99  # probability above which digits say nothing
+FOLLOWS_NOT = 10.0  # times the position's noise, from which a free run follows no log
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -188,9 +189,15 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
         return "Nothing is missing."
     if left <= NOISE * found.noise_force:
         where = "" if found.noise_actuator is not None else " in the equation of motion"
+        off = found.after["test"].position_rms
+        astray = (
+            f" Its free run does not follow: in 2 s it is {length(off, rotary)} off (rms)."
+            if off is not None and off > FOLLOWS_NOT * found.noise_y
+            else ""
+        )
         return (
             f"Nothing is missing{where}: the model leaves {force(left, rotary)} of force, the"
-            f" sensors' noise alone {noise}."
+            f" sensors' noise alone {noise}.{astray}"
         )
     return (
         f"No effect is missing that these logs show: what is left ({force(left, rotary)}, sensors'"
@@ -256,7 +263,13 @@ def then_of(traced: Traced) -> list[str]:
         them = "the effect" if len(found.effects) == 1 else "the effects"
         out.append(f"{design} on the model with {them} in it")
     elif found.verdict == "none":
-        out.append(f"{design}; the model is as good as these logs can make it")
+        left = found.after["test"].force_rms
+        good = left is not None and left <= NOISE * found.noise_force
+        out.append(
+            f"{design}; the model is as good as these logs can make it"
+            if good
+            else f"{design}; what is left is more than noise, so check it on the machine with care"
+        )
     if found.verdict == "unknown" and found.unknown.depends_on:
         out.append(
             "if you know what it is, write it as an effect of your own: `workbench effects check"

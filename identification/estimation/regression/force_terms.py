@@ -23,10 +23,10 @@ from identification.estimation.regression.weighted_rows import (
 from identification.model.estimates import NORMAL_95
 from identification.thresholds import WORSE
 
-# Columns of viscous friction that may stand beside the others
-SPEED_COLUMNS = ((), (3,), (4,), (3, 4))
+# Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
+FRICTION_COLUMNS = ((1, 2), (1, 2, 3), (1, 2, 4), (3, 4), (1, 2, 3, 4))
 COLUMN_SETS = tuple(
-    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in SPEED_COLUMNS), key=len)
+    sorted(((*mass, *friction) for friction in FRICTION_COLUMNS for mass in ((), (0,))), key=len)
 )
 
 
@@ -62,7 +62,7 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours."""
     every = [fitted(data, used) for used in COLUMN_SETS]
-    fits = [one for one in every if _may_be(one)]
+    fits = [one for one in every if _may_be(one) and (1 in one.used or _rubs(every[-1]))]
     rows = stacked(data)
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
@@ -75,8 +75,16 @@ def _may_be(fit: ForceFit) -> bool:
     the Coulomb level beside it open."""
     found, sd = dict(zip((FIVE[i] for i in fit.used), fit.theta, strict=True)), fit.sd
     shown = [(level, v) for level, v in (("F_cp", "F_vp"), ("F_cn", "F_vn")) if v in found]
-    known = all(abs(found[v]) > NORMAL_95 * sd[v] and found[level] >= 0.0 for level, v in shown)
+    known = all(
+        abs(found[v]) > NORMAL_95 * sd[v] and found.get(level, 0.0) >= 0.0 for level, v in shown
+    )
     return known and not found.get("m", 1.0) < 0.0
+
+
+def _rubs(whole: ForceFit) -> bool:
+    """Whether no Coulomb level is significantly below 0 in the fit of all columns."""
+    found, sd = dict(zip((FIVE[i] for i in whole.used), whole.theta, strict=True)), whole.sd
+    return all(found[level] >= -NORMAL_95 * sd[level] for level in ("F_cp", "F_cn"))
 
 
 def predicts_as_much(left: float, least: float) -> bool:
