@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from identification.errors import NotIdentifiable
 from identification.estimation.imposed_motion import (
@@ -30,12 +31,17 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.progress import Halted, Progress
+from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
 
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
+)
+STOPS_WHY = MinorRemark(
+    "mass and sliding friction are those of the equation of motion, since the command is noisy;"
+    " stick limits and bands those of the run"
 )
 LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
@@ -98,6 +104,8 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     left = None if fit.effects else left_by(fit.friction, recorded)
     if left is None:
         return fit
+    if fit.adequate and recorded.held and any(one.walks(recorded.drive) for one in recorded.logs):
+        return _unless_unexplained(_with_stops(fit, recorded), left)
     surer = left.surer
     if fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
@@ -108,6 +116,32 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
     return _unless_unexplained(fit, left)
+
+
+def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
+    """A motor's mass and sliding friction by the equation of motion, and by the run what that does
+    not show: stick limits and bands.
+
+    Of a noisy command the equation has white errors, the run their integral over a window: weighed
+    sample by sample it is the less exact and biased. Source: equation error against output error,
+    Ljung, System Identification (1999), 7.3.
+    """
+    other = _by_equation(recorded, LESS_ERROR_WHY)
+    if other is None or _identified(other) < _identified(fit):
+        return fit
+    five = {name: getattr(other.friction, name) for name in FIVE}
+    stops = [name for name in fit.free if name not in FIVE]
+    at = [fit.free.index(name) for name in stops]
+    return replace(
+        fit,
+        friction=replace(fit.friction, **five),
+        estimates={**fit.estimates, **{name: other.estimates[name] for name in FIVE}},
+        free=(*other.free, *stops),
+        covariance=block_diag(other.covariance, fit.covariance[np.ix_(at, at)]),
+        left=other.left,
+        falling=other.falling,
+        remarks=(*fit.remarks, STOPS_WHY),
+    )
 
 
 def by_equation_if_surer(p: Karnopp, recorded: RecordedLogs) -> KarnoppFit | None:

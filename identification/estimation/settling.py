@@ -16,8 +16,10 @@ from identification.estimation.estimates import (
     effect_estimates,
     estimates,
     events_of,
+    reported_estimate,
 )
 from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.breakaway import risen_to
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.residual_drift import drift_size, widening
 from identification.estimation.windowed_run.parameters import even, names_of, values_of
@@ -35,7 +37,7 @@ from identification.estimation.windowed_run.windows import (
     window_run,
 )
 from identification.log import Log
-from identification.model.estimates import Drive, Estimate, KarnoppFit, LogFit
+from identification.model.estimates import NORMAL_95, Drive, Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
 from identification.progress import Progress
@@ -52,6 +54,10 @@ BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3)
 # the coverage on seeds 5000 to 5004 of benchmarks/nine_parameters.py.
 WALLS = 1.2
 
+NO_REST_WHY = (
+    "{}: no rest that ends is seen in it, and the force changes between its samples; log starts"
+    " from rest, at the rate of the drive's loop"
+)
 RESIDUAL_DRIFT_SAID = (
     "the run drifts slowly from the log (by {:.3g} deviations in all), less than the noise at any"
     " sample: a sample of the command may be wrong, or the body was touched; intervals are widened"
@@ -90,6 +96,7 @@ def settled(
     sd = dict(zip(near.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     own = {n: x for n, x in zip(near.names, values.tolist(), strict=True) if "." not in n}
     found = estimates(own, sd, events, recorded.rig, recorded.name)
+    found |= _of_both(found, plant, recorded)
     return KarnoppFit(
         friction=plant.friction,
         actuator=plant.actuator,
@@ -210,7 +217,31 @@ def structure_estimates(
     most = _as_large_as_can_be(plant, names, values, events)
     known = dict(zip(names, values.tolist(), strict=True))
     own = {n: sd.get(n, 0.0) or x for n, x in zip(names, most.tolist(), strict=True)}
-    return estimates(known, own, events, recorded.rig, recorded.name)
+    found = estimates(known, own, events, recorded.rig, recorded.name)
+    return found | _of_both(found, plant, recorded)
+
+
+def _of_both(
+    found: Mapping[str, Estimate], plant: Plant, recorded: RecordedLogs
+) -> dict[str, Estimate]:
+    """The stick limits of a motor, each with an interval that holds both the run's and that of the
+    force at its breakaways: they err to either side where the force changes between samples."""
+    if not (recorded.held and any(one.walks(recorded.drive) for one in recorded.logs)):
+        return {}
+    risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
+    for name in ("F_sp", "F_sn"):
+        one = found.get(name)
+        if one is None or one.value is None or one.low is None or one.high is None:
+            continue
+        if name not in risen:
+            out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
+            continue
+        other = risen[name]
+        low = min(one.low, other.value - NORMAL_95 * other.sd)
+        high = max(one.high, other.value + NORMAL_95 * other.sd)
+        sd = 0.5 * (high - low) / NORMAL_95
+        out[name] = reported_estimate(one.value, one.unit, sd, interval=(low, high))
+    return out
 
 
 def force_of(logs: Sequence[Log]) -> float:

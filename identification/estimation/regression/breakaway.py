@@ -2,8 +2,13 @@
 
 The motion after a breakaway gives its instant within a fraction of a sample, and with it the force
 at which the body let go: from sliding friction and band, found before, and one number a breakaway.
+
+A drive's loop is often faster than its log. The peak of its force, at which a body lets go, is then
+in no sample: a run by the logged force finds the stick limit too low. What the force had risen to
+when the motion was seen (`risen_to`) errs to the other side, by what it rises in a sample or two.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -13,14 +18,18 @@ from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.standstill import (
     MEAN,
+    ONSET,
     RATE,
     Breakaways,
     rest_stretches,
 )
 from identification.log import Log
 from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.model.size import Size
 from identification.signals.sampling import samples
 from identification.simulation.free_run import released
+from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 
 SAMPLES_BEFORE, SAMPLES_AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
 EXACT_POSITION = 1e-12  # m or rad: a position without noise
@@ -28,6 +37,8 @@ GRID = 25  # limits tried between the smallest and the largest force around the 
 NARROWED = 2  # times that the grid is drawn around its best
 MOVED = 20.0  # times the position's noise that a body goes on to move, or it was no breakaway
 LOST = 1e4  # square in noise units, beyond which one sample is as far off as another
+SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose force is a line
+FEWEST_ON_LINE = 4
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
@@ -100,3 +111,52 @@ def _costs(
     y = released(nine, part["F"], one.log.h, hold=one.held, level=level, at=begin)
     r = (y - part["y"]) / max(one.noise.y, EXACT_POSITION)
     return np.asarray(np.mean(np.minimum(np.nan_to_num(r**2, nan=LOST), LOST), axis=1))
+
+
+def risen_to(logs: Sequence[MotionLog], plant: Plant) -> dict[str, Size]:
+    """F_sp and F_sn [N] by the force at the instants from which motion is seen after a rest,
+    however short; none of a direction without such.
+
+    The force is a line through its samples at rest, less noisy than any of them, but for the last,
+    in which the body may have let go; with what the plant's effects push. Each counts by its
+    deviation: that of the line, and what it rises by in a sample. Source: weighted mean and its
+    spread, Aitken (1936); the rest is ours: `README.md`, (6).
+    """
+    found = np.array([event for one in logs for event in _rises(one, plant)]).reshape(-1, 3)
+    out: dict[str, Size] = {}
+    for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
+        force, sd = found[found[:, 0] == way, 1:].T
+        if len(force):
+            weight = 1.0 / sd**2
+            mean = float(np.average(force, weights=weight))
+            spread = float(np.mean(((force - mean) / sd) ** 2))
+            out[name] = Size(way * mean, float(np.sqrt(max(spread, 1.0) / np.sum(weight))))
+    return out
+
+
+def _rises(one: MotionLog, plant: Plant) -> list[tuple[float, float, float]]:
+    """Of each rest that ends: the way that the body then goes, force that way [N], deviation."""
+    log = of_body(with_motor_force(one.log, plant), plant)
+    y, h, none = np.asarray(log["y"]), log.h, np.zeros(len(log))
+    force = np.asarray(log["F"]) - opposing_force(log, plant, y, none, none)
+    out = list[tuple[float, float, float]]()
+    for low, high in rest_stretches(one, SHORT_REST):
+        if high + SHORT_REST >= len(y):
+            continue
+        way = float(np.sign(one.signals["d"][high]))
+        gone = way * (y[low : high + SHORT_REST] - float(np.median(y[low:high])))
+        seen = np.flatnonzero(gone[(high - low) // 2 :] > ONSET * max(one.noise.y, EXACT_POSITION))
+        if not len(seen):
+            continue
+        first = low + (high - low) // 2 + int(seen[0])
+        at = np.arange(max(low, first - samples(LINE, h)), first - 1)
+        if len(at) < FEWEST_ON_LINE:
+            continue
+        X = np.column_stack([np.ones(len(at)), at - at[-1]])
+        line, *_ = np.linalg.lstsq(X, way * force[at], rcond=None)
+        left = way * force[at] - X @ line
+        noise = max(float(np.sqrt(left @ left / (len(at) - 2))), one.noise.F)
+        sd = float(np.hypot(noise * np.sqrt(np.linalg.inv(X.T @ X)[0, 0]), line[1]))
+        if line[1] > 0.0:
+            out.append((way, float(line[0] + 1.5 * line[1]), sd))
+    return out

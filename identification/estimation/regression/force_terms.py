@@ -24,6 +24,7 @@ from identification.model.estimates import NORMAL_95
 from identification.thresholds import WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
+LEVEL_COLUMNS = (1, 2)
 FRICTION_COLUMNS = ((1, 2), (1, 2, 3), (1, 2, 4), (3, 4), (1, 2, 3, 4))
 COLUMN_SETS = tuple(
     sorted(((*mass, *friction) for friction in FRICTION_COLUMNS for mass in ((), (0,))), key=len)
@@ -60,13 +61,21 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
-    cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours."""
+    cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
+    the levels err by what viscous friction moves them that is significant and left out."""
     every = [fitted(data, used) for used in COLUMN_SETS]
     fits = [one for one in every if _may_be(one) and (1 in one.used or _rubs(every[-1]))]
     rows = stacked(data)
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
-    return replace(best, share=every[-1].share)
+    fuller = [one for one in fits if set(one.used) > set(best.used)]
+    moved = np.zeros(len(best.used))
+    for other in fuller:
+        off = [other.theta[other.used.index(column)] for column in best.used] - best.theta
+        moved = np.maximum(moved, np.abs(off))
+    moved = np.where(np.isin(best.used, LEVEL_COLUMNS), moved, 0.0)
+    covariance = best.covariance + np.diag(moved**2)
+    return replace(best, covariance=covariance, share=every[-1].share)
 
 
 def _may_be(fit: ForceFit) -> bool:

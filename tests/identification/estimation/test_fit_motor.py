@@ -8,6 +8,8 @@ from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
+from tests.identification.motor_logs import K_A as STROKES_K_A
+from tests.identification.motor_logs import NINE, made
 
 SERVO = Karnopp(0.62, 4.1, 5.2, 22.0, 17.0, 0.02, -0.015, 6.3, -7.9)
 K_A, H = 6.4, 2e-3
@@ -33,3 +35,26 @@ def test_a_motor_that_begins_in_full_motion_is_found(seed: int) -> None:
     assert fit.adequate
     assert fit.chi_square == pytest.approx(1.0, abs=0.2)
     assert np.max(np.abs(fit.friction.array / SERVO.array - 1.0)) < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_noisy_command_neither_bends_sliding_friction_nor_narrows_the_stick_limits(
+    seed: int,
+) -> None:
+    """Mass and sliding friction are the equation's; an interval of a stick limit holds the run's
+    and what the force had risen to."""
+    log = made(seed)
+    noise = 0.4 * np.random.default_rng(seed).standard_normal(len(log))
+    noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / STROKES_K_A)
+    fit = fit_plant(
+        [noisy], np.random.default_rng(0), rig=Rig("motor", force_per_command=STROKES_K_A)
+    )
+    for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn"):
+        one = fit.estimates[name]
+        assert one.value is not None and one.sd is not None
+        assert abs(one.value - getattr(NINE, name)) < 3.0 * one.sd
+    for name in ("F_sp", "F_sn"):
+        one = fit.estimates[name]
+        if one.low is not None and one.high is not None:
+            assert one.low < getattr(NINE, name) < one.high

@@ -100,3 +100,25 @@ def test_a_body_that_rests_or_is_driven_by_nothing_has_a_latent_force_all_the_sa
 def test_a_wrong_plant_is_no_fault(change: dict[str, float]) -> None:
     found = of_motor(made(1), replace(plant(), friction=replace(NINE, **change)))
     assert np.isfinite(found.rms) and np.isfinite(found.log_likelihood)
+
+
+def test_a_position_noisier_in_motion_is_no_missing_force() -> None:
+    """What a clock that jitters makes of it: errors from sample to sample, and none at rest."""
+    log = made(1)
+    v = np.gradient(np.asarray(log["y"]), log.h)
+    jitter = 2e-4 * np.random.default_rng(5).standard_normal(len(log))
+    one = seen(log.with_signals(y=log["y"] + v * jitter))
+    plain = replace(one, noise=replace(one.noise, y=1e-5, jitter=0.0))
+    found = latent_forces(plant(), [plain], SLOWEST)
+    assert found.rougher > 1.0
+    assert found.rms < 0.02 * LEVEL
+    assert latent_forces(plant(), [plain], SLOWEST, 1.0).rms > 2.0 * found.rms
+
+
+def test_the_bound_of_a_force_that_does_not_show_is_one_that_would() -> None:
+    log, found = made(1), of_motor(made(1), plant())
+    assert found.is_a_bound
+    share = found.share(LEVEL)
+    assert share is not None and share * LEVEL == pytest.approx(found.most)
+    pushed = log.with_signals(F=log["F"] + 5.0 * found.most * np.sin(2.0 * log["t"]))
+    assert not of_motor(pushed, plant()).is_a_bound

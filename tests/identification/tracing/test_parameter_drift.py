@@ -1,5 +1,7 @@
 """What changed between training and test logs: the fewest parameters, and none that cannot be."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
@@ -37,3 +39,18 @@ def test_no_parameter_becomes_negative() -> None:
     changed = found(mine, rows, -40.0)
     assert all(after >= 0.0 for _, _, after, _ in changed)
     assert "F_cp" not in [name for name, *_ in changed]
+
+
+def test_a_change_within_the_error_of_the_training_is_none() -> None:
+    """A training log that hardly shows a parameter cannot show that it has changed."""
+    mine, rows = trained()
+    sliding = np.flatnonzero(mine.rows.speed >= mine.slowest)
+    few = np.isin(np.arange(len(mine.rows.b)), sliding[:: len(sliding) // 12])
+    vague = replace(
+        mine,
+        rows=mine.rows.at(few),
+        fit=replace(mine.fit, residual=3.0 * np.ones(int(np.sum(few)))),
+    )
+    ((name, *_),) = found(mine, rows, 0.5)
+    assert name == "F_cp"
+    assert found(vague, rows, 0.5) == []

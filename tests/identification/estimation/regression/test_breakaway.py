@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.regression.breakaway import _costs, breakaway_limits
+from identification.estimation.regression.breakaway import _costs, breakaway_limits, risen_to
 from identification.log import Log
-from tests.identification.motor_logs import NINE, made, seen
+from tests.identification.motor_logs import NINE, made, plant, seen
 
 
 def test_every_breakaway_gives_the_limit() -> None:
@@ -51,3 +51,28 @@ def test_a_body_that_never_moves_breaks_nowhere() -> None:
     log = made(1)
     still = np.random.default_rng(0).standard_normal(len(log)) * 1e-5
     assert len(breakaway_limits(seen(log.with_signals(y=still)), NINE).at) == 0
+
+
+def test_the_force_has_risen_to_the_limit_where_motion_is_seen() -> None:
+    """Never clearly less, and hardly more than it rises until then; with a noisy current too."""
+    for sd in (0.0, 0.3):
+        log = made(3)
+        noise = sd * np.random.default_rng(1).standard_normal(len(log))
+        found = risen_to([seen(log.with_signals(F=log["F"] + noise))], plant())
+        for name, limit in (("F_sp", NINE.F_sp), ("F_sn", -NINE.F_sn)):
+            force = abs(found[name].value)
+            assert limit - 3.0 * found[name].sd < force < 1.2 * limit
+
+
+def test_what_effects_push_is_in_the_force_at_breakaway() -> None:
+    effects = {"constant_force": {"F_0": 3.0}}
+    one = seen(made(3, effects))
+    with_it, without = (risen_to([one], plant(some)) for some in (effects, None))
+    assert with_it["F_sp"].value - without["F_sp"].value > 2.0
+    assert with_it["F_sn"].value - without["F_sn"].value > 2.0
+
+
+def test_a_body_that_never_rests_has_no_force_at_breakaway() -> None:
+    log = made(1)
+    still = seen(log.with_signals(y=1e-5 * np.random.default_rng(0).standard_normal(len(log))))
+    assert risen_to([still], plant()) == {}
