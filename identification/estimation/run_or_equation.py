@@ -4,7 +4,7 @@ One place decides. A rig that prescribes the motion, or a run by a measured forc
 body's own, leaves the equation. Else the run is settled, whole where it is followed so
 (`settling`); and where it leaves clearly more of the equation than the equation's own least squares
 do on held-out stretches, or identifies less of mass and sliding friction without following the log,
-the equation answers after all.
+the equation answers after all. Of a motor's noisy command both answer, each for what it shows.
 """
 
 from contextlib import suppress
