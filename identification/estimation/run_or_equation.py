@@ -104,9 +104,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     left = None if fit.effects else left_by(fit.friction, recorded)
     if left is None:
         return fit
-    if fit.adequate and recorded.held and any(one.walks(recorded.drive) for one in recorded.logs):
-        return _unless_unexplained(_with_stops(fit, recorded), left)
-    surer = left.surer
+    surer, noisy = left.surer, any(one.walks(recorded.drive) for one in recorded.logs)
     if fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
     # Of a run that is not followed, windows may identify next to nothing.
@@ -115,6 +113,8 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
+    elif noisy and recorded.held:
+        fit = _with_stops(fit, recorded)
     return _unless_unexplained(fit, left)
 
 
