@@ -22,7 +22,6 @@ from identification.estimation.regression.weighted_rows import (
     without_each_block,
 )
 from identification.log import Log
-from identification.model.estimates import NORMAL_95
 from identification.thresholds import BEYOND_CHANCE, MATERIAL
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
@@ -69,7 +68,7 @@ def significant_share(share: float, sd: float, gain: float) -> float:
     """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
     if share < BEYOND_CHANCE * sd or gain < MATERIAL:
         return 0.0
-    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + NORMAL_95 * sd else 0.0
+    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + BEYOND_CHANCE * sd else 0.0
 
 
 def between_samples(log: Log, share: float, held: bool) -> Log:
