@@ -174,8 +174,9 @@ def _found(model: Model, shows: bool) -> str:
     if model.resonance is not None:
         hertz = number(used(model.resonance["frequency"]), 4)
         return f"{text} Two masses with a spring between them swing at {hertz} Hz."
-    if all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE:
-        return f"{text} The equation of motion leaves nothing but noise; no free run follows."
+    if to_the_noise_by_equation(model):
+        leaves = "little more than noise, but a force is missing" if shows else "nothing but noise"
+        return f"{text} The equation of motion leaves {leaves}; no free run follows."
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 
@@ -188,11 +189,16 @@ def left_of(model: Model) -> str:
     return f"{length(max(off), model.rotary)} rms of position, where the sensor's noise is {noise}"
 
 
+def to_the_noise_by_equation(model: Model) -> bool:
+    """Whether the equation of motion answers for a model, and leaves hardly more than noise."""
+    return all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE
+
+
 def next_of_model(model: Model) -> str:
     """What to do with a model, and the command that does it."""
     if not model.fit.adequate and model.resonance is None:
         logs = " ".join(dict.fromkeys(e.file for e in model.log))
-        return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks"
+        return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks, if any"
     return "`workbench design model.json` makes a controller for this machine"
 
 

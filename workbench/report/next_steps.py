@@ -37,8 +37,11 @@ def check_of_refused(logs: Sequence[str], card: str) -> Callable[[str], Step]:
 
 def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path) -> Step:
     """Trace what the model lacks; design on one that leaves noise."""
+    from workbench.report.model_tables import to_the_noise_by_equation
+
     if not model.fit.adequate:
-        return step("an effect is missing", "trace", *logs, "--card", card)
+        why = "whether an" if to_the_noise_by_equation(model) else "an"
+        return step(f"{why} effect is missing", "trace", *logs, "--card", card)
     return step("a controller for it", "design", folder / "model.json")
 
 
