@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from identification.model.karnopp import Karnopp
 from tests.chain import EMPS, model_of
 from tests.workbench.trace_values import missing_force
 from workbench.documents.model import Model
@@ -12,9 +13,9 @@ from workbench.report.model_tables import summary
 from workbench.report.next_steps import after_identify
 
 
-def by_equation(left: float) -> Model:
+def by_equation(left: float, friction: Karnopp = EMPS) -> Model:
     """A model of the equation of motion alone, which leaves this mean square."""
-    model = model_of(EMPS, k_a=35.15)
+    model = model_of(friction, k_a=35.15)
     entries = tuple(replace(one, position_rms=None) for one in model.log)
     fit = replace(model.fit, adequate=False, chi_square=left)
     return replace(model, log=entries, fit=fit)
@@ -39,6 +40,6 @@ def test_what_an_equation_leaves_is_said_once(left: float, said: str, then: str)
 
 def test_a_force_that_shows_is_not_called_noise() -> None:
     found = missing_force(["stribeck"])
-    said = summary(by_equation(1.0), found.before)
+    said = summary(by_equation(1.0, replace(EMPS, F_cp=2.0, F_cn=2.0)), found.before)
     assert "little more than noise, but a force is missing" in said
     assert "Force missing: " in said
