@@ -129,7 +129,7 @@ def _clock(clock: Clock) -> str:
     gaps = "no gaps"
     if clock.gaps:
         many = f"{clock.gaps} gap" + ("s" if clock.gaps > 1 else "")
-        gaps = f"{many}, the longest of {clock.longest_gap:.3g} s"
+        gaps = f"{many}, the longest of {clock.longest_gap:.4g} s"
     return (
         f"{clock.rows} rows in {clock.duration:.4g} s, every {1e3 * clock.h:.4g} ms ({rate}),"
         f" {even}, {gaps}"

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.init_real_tables import fewest_wrong, machine, make_table
@@ -176,6 +178,38 @@ def test_stamps_and_bars_are_read(joint: dict[str, Array], tmp_path: Path) -> No
     found = proposed(tmp_path / "run.csv")
     assert columns(found) == {"t": "stamp", "y": "q", "F": "tau"}
     assert found.unused["'s1'"] == "'|' alone"
+
+
+@pytest.mark.parametrize(("least", "counts"), [(-32768.0, "4096"), (0.0, "65536")])
+def test_a_counter_that_overflows_is_unwrapped(
+    joint: dict[str, Array], tmp_path: Path, least: float, counts: str
+) -> None:
+    counted: Array = np.round(2e5 * joint["y"] / np.std(joint["y"])).astype(np.float64)
+    whole: Array = (counted - least) % 65536.0 + least
+    found = propose(
+        tmp_path, "time_s,position_counts,torque_Nm", T, whole, joint["F"],
+    )  # fmt: skip
+    assert columns(found) == {"t": "time_s", "y": "position_counts", "F": "torque_Nm"}
+    own = {one.name: one for one in found.signals}
+    assert own["F"].gain is None and own["y"].gain == f"{counts} count/turn"
+    assert not own["y"].sure
+    assert any("leaps by 65536" in one and "a counter of 16 bits" in one for one in found.remarks)
+
+
+def test_chinese_headers_give_units_and_a_current(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "时间(秒),实际位置(度),电流(安培)", T, joint["y"], joint["F"])
+    assert [(one.unit, one.sure) for one in found.signals] == [
+        ("s", True), ("deg", True), ("A", True)
+    ]  # fmt: skip
+    found = propose(tmp_path, "时间,反馈位置,电流反馈", T, joint["y"], joint["F"])
+    assert found.signals[-1].name == "u" and found.signals[-1].unit == "A"
+
+
+def test_dates_of_parquet_are_a_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    stamps = np.datetime64("2026-05-03", "ns") + np.round(1e9 * T).astype("m8[ns]")
+    table = {"time": stamps, "pos": plain(joint), "tau": joint["F"]}
+    pq.write_table(pa.table(table), tmp_path / "run.parquet")
+    assert columns(proposed(tmp_path / "run.parquet"))["t"] == "time"
 
 
 def test_a_position_that_only_rises_is_no_clock(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
     gaps = int(np.sum(steps > 5.0 * h))
     if gaps:
         many = f"{gaps} gap" + ("s" if gaps > 1 else "")
-        yield f"{many} in the clock, the longest of {float(np.max(steps)):.3g} s"
+        yield f"{many} in the clock, the longest of {float(np.max(steps)):.4g} s"
 
 
 def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
