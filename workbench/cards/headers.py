@@ -131,7 +131,7 @@ _SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each wi
     "acceleration": "a 1 acc 3 qdd 2 ddq 2",
     "force": "f 3 m 0.5 tau 2 trq 3 tor 2",
     "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
-    "command": "u 3 i 1.5 v 0.5 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
+    "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
     "temperature": "t 0.5",
     "count": "n 1 k 1 i 0.5 nr 2 no 2",
     "other": "id 2 isd 2 ud 2 vd 2 kp 2 ki 2 kd 2 ff 1.5",

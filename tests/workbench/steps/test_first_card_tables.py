@@ -95,6 +95,36 @@ def test_each_of_several_axes_has_its_card(
         propose(tmp_path, headers, *table, axis="toe")
 
 
+def test_axes_go_by_the_names_of_their_headers(
+    joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    table = (T, joint["y"], joint["F"], other["y"], other["F"], 0.7 * plain(joint)[::-1],
+             1e-3 * np.random.default_rng(4).standard_normal(len(T)))  # fmt: skip
+    headers = "time,arm_1_pos,arm_1_tau,arm_2_pos,arm_2_tau,torso_lift_pos,torso_lift_tau"
+    for axis, of in (("arm_2", "arm_2"), ("2", "arm_2"), ("torso_lift", "torso_lift")):
+        found = propose(tmp_path, headers, *table, axis=axis)
+        assert columns(found) == {"t": "time", "y": f"{of}_pos", "F": f"{of}_tau"}
+    assert found.axes == ("1", "2", "torso_lift")
+    assert any("inertia and friction explain only" in one for one in found.remarks)
+    with pytest.raises(BadLog, match="axes: 1, 2, torso_lift"):
+        propose(tmp_path, headers, *table, axis="arm")
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_current_of_the_motor_that_the_body_turns_is_no_drive(
+    joint: dict[str, Array], tmp_path: Path, driven: bool
+) -> None:
+    v = np.gradient(plain(joint), T)
+    noise = 1e-3 * np.std(v) * np.random.default_rng(2).standard_normal(len(T))
+    voltage = joint["F"] if driven else np.zeros(len(T))
+    table = (T, plain(joint), np.asarray(-0.006 * (v + noise)), voltage)
+    if driven:
+        propose(tmp_path, "t,theta,current,Vm", *table)
+        return
+    with pytest.raises(BadLog, match="nothing drives: the command 'Vm' is always 0, and 'current'"):
+        propose(tmp_path, "t,theta,current,Vm", *table)
+
+
 def test_a_sign_bit_is_named_and_nothing_is_fitted(joint: dict[str, Array], tmp_path: Path) -> None:
     raw = np.round(2000.0 * joint["y"])
     raw = np.where(raw < 0.0, 32768.0 - raw, raw)

@@ -351,4 +351,6 @@ def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGue
     if slope is not None and {"y", "v"} <= given.keys():
         rate = _sensible(slope * factor(given["v"].unit) / metre(given["y"].unit, given["y"]))
         why = "by the velocity and the position"
+    elif slope is not None and not {"y", "v"} & given.keys():
+        rate, why = _sensible(slope), "by the velocity, if it is the position's unit a second"
     return UnitGuess("1", f"{rate:.9g} 1/s", False, why)
