@@ -149,14 +149,14 @@ def _short_words() -> dict[str, dict[Quantity, float]]:
 
 
 _SHORT_WORDS = _short_words()
-_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque",
-           "トルク", "扭矩", "转矩", "力矩", "转速", "转角", "drehmoment",
-           "motormoment", "drehzahl", "omega", "rpm", "elbow", "knee", "wrist",
-           "shoulder", "pendulum", "pendel", "関節")  # fmt: skip
+_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "torque", "トルク", "扭矩",
+           "转矩", "力矩", "转速", "转角", "drehmoment", "motormoment", "drehzahl", "omega", "rpm",
+           "elbow", "knee", "wrist", "shoulder", "pendulum", "pendel")  # fmt: skip
 # Words that machines which turn use more than others: currents of a rotor's axes, Greek letters.
 _MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5, "alpha": 1.0,
              "beta": 1.0, "psi": 1.0, "q": 0.5, "qd": 0.5, "hip": 1.5, "yaw": 1.5, "moment": 1.0,
-             "phase": 0.5, "steering": 1.0, "axle": 1.0, "arm": 0.5}  # fmt: skip
+             "phase": 0.5, "joint": 1.2, "gelenk": 1.2, "関節": 1.2, "steering": 1.0, "axle": 1.0,
+             "arm": 0.5}  # fmt: skip
 _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
               "vorgabe", "consigne", "fuehrung", "führung", "目標", "目标", "设定", "给定", "指令",
               "rif", "trajectory", "planned")  # fmt: skip

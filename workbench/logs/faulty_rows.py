@@ -99,12 +99,13 @@ def several_axes(t: Array, columns: Iterable[tuple[str, NDArray[Any]]]) -> str:
 def _axes_in_turn(t: Array, cells: NDArray[Any]) -> tuple[str, ...]:
     """The axes that cells name, where rows of each come again and again, in the order of time."""
 
-    def texts(rows: int) -> NDArray[np.str_]:
-        return np.asarray([str(text_of(cell)) for cell in cells[:rows].tolist()])
+    def texts(some: NDArray[Any]) -> list[str]:
+        return [str(text_of(cell)) for cell in some.tolist()]
 
-    if not 1 < len(set(texts(_LOOKED_AT).tolist())) <= _MOST_AXES:
+    first, apart = cells[:_LOOKED_AT], cells[:: 1 + len(cells) // _LOOKED_AT]
+    if len(set(texts(first))) < 2 or len(set(texts(first) + texts(apart))) > _MOST_AXES:
         return ()
-    axes, of = np.unique(texts(len(cells)), return_inverse=True)
+    axes, of = np.unique(np.asarray(texts(cells)), return_inverse=True)
     again = np.sum(of[1:] != of[:-1]) >= len(axes)  # else they are runs
     if not again or len(axes) > _MOST_AXES or np.min(np.bincount(of)) < SHORTEST_LOG:
         return ()

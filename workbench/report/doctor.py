@@ -23,7 +23,7 @@ from workbench.steps.identifiable_by_log import Way
 LABEL_WIDTH = 15
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
-WHOLE = ("next", "note", "refused")  # kinds whose texts end in what to do
+END_IN_ADVICE = ("next", "note", "refused")  # kinds whose texts end in what to do
 
 
 def doctor_view(found: Examined, out: Path | None, card: str = "CARD") -> Screen:
@@ -77,8 +77,8 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
     ]  # fmt: skip
     lines = [f"{found.file}: {_verdict(found)}"]
     for name, texts, few in kinds:
-        own = None if most is None else max(most, few)
-        lines += labelled(name, texts, own, whole=name in WHOLE)
+        at_most = None if most is None else max(most, few)
+        lines += labelled(name, texts, at_most, whole=name in END_IN_ADVICE)
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
     return lines
@@ -108,6 +108,8 @@ def _then(found: Examined, card: str) -> str:
         return "exchange the columns of r and y in the card (see note), then ask again"
     if found.verdict == "nothing":
         return "log again, with the motion that 'add' names"
+    if found.rig.kind == "motor" and found.rig.force_per_command is None:
+        return "write force_per_command under the card's [rig], then ask again"
     first = f"workbench identify {found.file} --card {shlex.quote(card)}"
     return f"{first}; for the rest, log what 'add' names" if found.add else first
 

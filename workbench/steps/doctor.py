@@ -22,6 +22,7 @@ from identification.signals.clean import limits
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.even_clock import LONGEST_GAP, even_clock, rows_lost
 from identification.signals.noise import local_noise
+from identification.signals.offsets import ROUNDED_OFF
 from identification.signals.relations import command_lag, lead
 from workbench.cards.against_header import contradicted_units
 from workbench.cards.card import Card
@@ -233,8 +234,9 @@ def _sensor(name: str, x: Array) -> SensorState:
     good = x[np.isfinite(x)]
     if len(good) < 4:
         return SensorState(name, 0.0, 0.0, 0.0, 0.0)
-    low, high = float(good.min()), float(good.max())
-    return SensorState(name, low, high, local_noise(good), resolution(good))
+    low, high, noise = float(good.min()), float(good.max()), local_noise(good)
+    shown = noise if noise > ROUNDED_OFF * (high - low) else 0.0
+    return SensorState(name, low, high, shown, resolution(good))
 
 
 def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:

@@ -156,6 +156,20 @@ def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, 
     assert "give the column of y gain = -1" in shown and "..." not in shown
 
 
+def test_a_card_without_its_constant_is_filled_in_first(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
+    text = doctor_view(look(load_card(card.path), table), None).text()
+    assert "write force_per_command under the card's [rig]" in text
+
+
+def test_rounding_is_no_noise(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR + 'r = { column = "r", unit = "m" }\n', "utf-8")
+    found = look(load_card(card.path), {**table, "r": 0.1 + 0.02 * table["t"]})
+    assert next(one for one in found.sensors if one.name == "r").noise == 0.0
+
+
 def test_a_unit_that_the_header_denies_is_told_though_the_log_is_refused(
     motor: tuple[Card, Table],
 ) -> None:

@@ -125,6 +125,12 @@ def test_a_current_of_the_motor_that_the_body_turns_is_no_drive(
         propose(tmp_path, "t,theta,current,Vm", *table)
 
 
+def test_a_joint_may_slide(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "t,lift_joint_pos,lift_joint_effort", T, plain(joint), joint["F"])
+    assert found.motion == "rotary"
+    assert next(one for one in found.rig if one.key == "motion").rival == "linear"
+
+
 def test_a_sign_bit_is_named_and_nothing_is_fitted(joint: dict[str, Array], tmp_path: Path) -> None:
     raw = np.round(2000.0 * joint["y"])
     raw = np.where(raw < 0.0, 32768.0 - raw, raw)

@@ -64,8 +64,8 @@ def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:
             raise BadLog(
                 f"{columns.log.path}: nothing drives: the command {one.shown} is always 0, and"
                 f" {roles.columns['u'].shown} is the velocity alone ({share:.0%}), against it, as"
-                " of a motor that the body turns: it brakes, as friction does, and tells nothing"
-                " of that; log a run with a command"
+                " of a motor that the body turns, whose braking is no friction; log a run with a"
+                " command"
             )
 
 
