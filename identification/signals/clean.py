@@ -15,7 +15,15 @@ from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import check as check
 from identification.signals.check import check_time
-from identification.signals.even_clock import LONGEST_GAP, even_clock, in_counts, is_even
+from identification.signals.even_clock import (
+    LONGEST_GAP,
+    even_clock,
+    gaps_in,
+    in_counts,
+    is_even,
+    is_even_between_gaps,
+    told_of_hours,
+)
 from identification.signals.frozen import frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
@@ -75,9 +83,14 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         text = f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated"
     if any(one.done == "cut out" for one in bad) and all(is_even(run["t"]) for run in runs):
         text = f"{log.name}: cut where samples are bad"
+    elif len(runs) > 1 and is_even_between_gaps(log["t"], log.h):
+        text = f"{log.name}: cut at the gaps of its clock"
     said = [text]
     if len(runs) > 1 or lost > LONGEST_GAP * log.h:
-        said.append(f"{log.name}: in {len(runs)} runs; {lost:.3g} s in gaps or short runs left out")
+        hours = told_of_hours(gaps_in(log["t"], log.h), log.h)
+        said.append(
+            f"{log.name}: in {len(runs)} runs; {lost:.4g} s in gaps or short runs left out{hours}"
+        )
     return Prepared(runs, (*remarks, *said), bad)
 
 

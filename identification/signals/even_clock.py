@@ -13,6 +13,7 @@ from identification.signals.differentiate import resolution
 LONGEST_GAP = 5.0
 """Sampling periods between two samples above which a log is cut in two."""
 
+_HOUR = 3600.0  # s
 _EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
 _EVEN_BUT_FOR_LOST = 0.01  # part of a period, of a clock of which rows are lost
 
@@ -51,6 +52,25 @@ def _borders(t: Array, h: float) -> list[int]:
     """First samples of the pieces between gaps, and the end."""
     cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
     return [0, *cuts.tolist(), len(t)]
+
+
+def told_of_hours(leaps: Array, h: float) -> str:
+    """The end of what is said of leaps of a clock [s] of period h [s], where one is of whole hours,
+    as of a clock that was set; else empty."""
+    hours = np.rint(leaps / _HOUR)
+    whole = (hours != 0.0) & (np.abs(leaps - _HOUR * hours) <= LONGEST_GAP * h)
+    return " (whole hours: summer time, or a clock that was set)" if np.any(whole) else ""
+
+
+def gaps_in(t: Array, h: float) -> Array:
+    """The steps of a clock t (n,) [s] that are gaps [s]."""
+    step = np.diff(t)
+    return np.asarray(step[step > LONGEST_GAP * h])
+
+
+def is_even_between_gaps(t: Array, h: float) -> bool:
+    """Whether a clock t (n,) [s] of period h [s] is even but for its gaps."""
+    return all(is_even(t[a:b]) for a, b in pairwise(_borders(t, h)) if b - a > 1)
 
 
 def is_even(t: Array) -> bool:

@@ -169,13 +169,23 @@ class RigSection(CardTable):
             area_p=self.area_p_m2,
             area_n=self.area_n_m2,
             supply_pressure=self.supply_pressure_pa,
-            force_per_command=in_unit_of(self.force_per_command, per, "rig.force_per_command"),
+            force_per_command=self._per_command(per, command),
             control_limit=_positive_in(command, limit, "rig.control_limit"),
             stroke=self.stroke_m,
             motion=self.motion,
             command_unit=command,
             motor_inertia=_positive_in(mass, self.motor_inertia, "rig.motor_inertia"),
         )
+
+    def _per_command(self, per: str, command: str) -> float | None:
+        """The force per command in `per`; raises BadCard, naming the command's unit, where it is of
+        another."""
+        try:
+            return in_unit_of(self.force_per_command, per, "rig.force_per_command")
+        except BadCard as error:
+            raise BadCard(
+                f"{error}: by signals.u the command is in {command!r}; correct its unit, or this"
+            ) from None
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
         """The unit of the command's column; a force where none is logged but its limit is given."""

@@ -1,8 +1,8 @@
 """What a column's header says: its name, its unit as cards write it, and what its words mean.
 
 Headers are written as "pos [mm]", "Position (µm)", "p1/bar", "Kraft_N" or "変位(mm)". The words
-are those of English, German, Japanese, French, Italian and Spanish loggers; what they say is
-evidence only, which the column's own numbers may outweigh.
+are those of English, German, Japanese, Chinese, French, Italian and Spanish loggers; what they say
+is evidence only, which the column's own numbers may outweigh.
 """
 
 import re
@@ -48,31 +48,35 @@ class Header:
 
 
 _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
-    "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis"
-    " milliseconds millisekunden ミリ秒; us: us µs usec microseconds mikrosekunden; ns: ns nsec"
-    " nanoseconds; min: min minutes minuten 分",
-    "position": "m: m meter metre meters; mm: mm millimeter millimetre ミリ; cm: cm; um: um µm"
-    " micron microns mikrometer micrometer; nm: nm; inch: in inch inches zoll; foot: ft",
-    "velocity": "m/s: m/s mps m/sec; mm/s: mm/s mmps mm/sec; um/s: um/s µm/s; cm/s: cm/s;"
-    " inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
+    "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis 毫秒"
+    " milliseconds millisekunden ミリ秒; us: us µs usec microseconds mikrosekunden 微秒;"
+    " ns: ns nsec nanoseconds; min: min minutes minuten 分 分钟",
+    "position": "m: m meter metre meters 米; mm: mm millimeter millimetre ミリ 毫米; cm: cm 厘米;"
+    " um: um µm micron microns mikrometer micrometer 微米; nm: nm 纳米;"
+    " inch: in inch inches zoll; foot: ft",
+    "velocity": "m/s: m/s mps m/sec 米/秒; mm/s: mm/s mmps mm/sec 毫米/秒; um/s: um/s µm/s;"
+    " cm/s: cm/s; inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
     "acceleration": "m/s^2: m/s^2 m/s² m/s2 m/s**2; mm/s^2: mm/s^2 mm/s² mm/s2",
-    "force": "N: n newton newtons; kN: kn; mN: mn; lbf: lbf lb lbs; kip: kip; kgf: kgf kp",
-    "pressure": "bar: bar barg bara bar(g); mbar: mbar; Pa: pa pascal; kPa: kpa; hPa: hpa;"
-    " MPa: mpa; psi: psi psig psia; atm: atm; kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
-    "command": "V: v volt volts; mV: mv; A: a amp amps ampere; mA: ma; %: % pct percent prozent"
+    "force": "N: n newton newtons 牛 牛顿; kN: kn 千牛; mN: mn; lbf: lbf lb lbs;"
+    " kip: kip; kgf: kgf kp",
+    "pressure": "bar: bar barg bara bar(g) 巴; mbar: mbar 毫巴; Pa: pa pascal 帕;"
+    " kPa: kpa 千帕; hPa: hpa; MPa: mpa 兆帕; psi: psi psig psia; atm: atm;"
+    " kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
+    "command": "V: v volt volts 伏 伏特; mV: mv 毫伏; A: a amp amps ampere 安 安培;"
+    " mA: ma 毫安; %: % pct percent prozent"
     " %pwm %duty; 1: 1 - dimensionless",
     "count": "count: count counts cnt cnts inc incs ink inkremente increments pulse pulses pls"
-    " パルス ticks tick digits digit dig lsb steps",
-    "temperature": "degC: °c ℃ degc deg_c celsius c; degF: °f degf; K: k kelvin",
+    " パルス 脉冲 ticks tick digits digit dig lsb steps",
+    "temperature": "degC: °c ℃ degc deg_c celsius c 摄氏度; degF: °f degf; K: k kelvin",
 }
 _SPELT_ROTARY: Mapping[Quantity, str] = {
-    "position": "rad: rad radians; mrad: mrad; deg: deg degree degrees ° grad 度; turn: turn turns"
-    " rev revs rot u umdr umdrehungen 回転",
+    "position": "rad: rad radians 弧度; mrad: mrad; deg: deg degree degrees ° grad 度;"
+    " turn: turn turns rev revs rot u umdr umdrehungen 回転 转",
     "velocity": "rad/s: rad/s rads radps; deg/s: deg/s °/s dps degps; rpm: rpm u/min 1/min min-1"
-    " r/min rev/min upm; turn/s: rev/s turn/s rps",
+    " 转/分 r/min rev/min upm; turn/s: rev/s turn/s rps",
     "acceleration": "rad/s^2: rad/s^2 rad/s² rad/s2; deg/s^2: deg/s^2 deg/s² deg/s2 °/s² °/s^2",
-    "force": "N m: nm n·m n.m n*m n-m newtonmeter; mN m: mnm mn·m; N cm: ncm; lbf inch: lb-in"
-    " lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft",
+    "force": "N m: nm n·m n.m n*m n-m newtonmeter 牛米 牛·米; mN m: mnm mn·m; N cm: ncm;"
+    " lbf inch: lb-in lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft",
 }
 
 
@@ -97,23 +101,25 @@ _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
 
 _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they contain others
-    "time": "timestamp time zeit clock elapsed uhr 時間 時刻 temps tempo tiempo",
+    "time": "timestamp time zeit clock elapsed uhr 時間 時刻 时间 时刻 temps tempo tiempo",
     "position": "position posizione posicion posn pos displacement displ disp deplacement weg lage"
     " auslenkung hub stroke travel laser encoder lvdt schlitten spostamento abstand distance 位置"
-    " 変位 ストローク angle winkel theta phi 角度 回転角 joint gelenk",
-    "velocity": "velocity velocita velocidad vel speed geschw drehzahl vitesse 速度 回転数 omega",
+    " 変位 ストローク 位移 行程 转角 angle winkel theta phi 角度 回転角 joint gelenk",
+    "velocity": "velocity velocita velocidad vel speed geschw drehzahl vitesse 速度 回転数 转速"
+    " omega",
     "acceleration": "acceler accel acc beschl 加速度",
     "force": "loadcell force kraft thrust fuerza forza effort torque moment couple coppia トルク 力"
-    " 荷重 推力",
-    "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧",
+    " 荷重 推力 扭矩 转矩 力矩 拉力",
+    "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧 压力 气压",
     "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
     " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
-    " courant corrente 電流 motor",
+    " courant corrente 電流 电流 电压 控制量 motor",
     "temperature": "temperatur temper temp thermo 温度",
-    "count": "index idx sample counter scan zaehler lfd row 番号 連番",
+    "count": "index idx sample counter scan zaehler lfd row 番号 連番 序号 编号",
     "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
-    " schleppfehler 偏差 supply versorgung input_volts 電源 saturation saturated sättigung"
-    " saettigung activated active aktiv fault warning warnung valid betriebsart zustand state"
+    " schleppfehler 偏差 误差 使能 报警 状态 supply versorgung input_volts 電源"
+    " saturation saturated sättigung saettigung activated active aktiv fault warning"
+    " warnung valid betriebsart zustand state"
     " battery batterie akku vbus vbat vdc vcc udc zwischenkreis power leistung energy energie"
     " i2t gain trigger 状態 異常 電力 trust feedforward vorsteuerung humidity frequency frequenz"
     " load_cycle checksum crc latency",
@@ -125,7 +131,7 @@ _SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each wi
     "acceleration": "a 1 acc 3 qdd 2 ddq 2",
     "force": "f 3 m 0.5 tau 2 trq 3 tor 2",
     "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
-    "command": "u 3 i 1.5 v 0.5 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
+    "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
     "temperature": "t 0.5",
     "count": "n 1 k 1 i 0.5 nr 2 no 2",
     "other": "id 2 isd 2 ud 2 vd 2 kp 2 ki 2 kd 2 ff 1.5",
@@ -143,24 +149,34 @@ def _short_words() -> dict[str, dict[Quantity, float]]:
 
 
 _SHORT_WORDS = _short_words()
-_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque",
-           "トルク", "drehmoment", "motormoment", "drehzahl", "omega", "rpm", "elbow", "knee",
-           "wrist", "shoulder", "pendulum", "pendel", "関節")  # fmt: skip
+_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "torque", "トルク", "扭矩",
+           "转矩", "力矩", "转速", "转角", "drehmoment", "motormoment", "drehzahl", "omega", "rpm",
+           "elbow", "knee", "wrist", "shoulder", "pendulum", "pendel")  # fmt: skip
 # Words that machines which turn use more than others: currents of a rotor's axes, Greek letters.
 _MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5, "alpha": 1.0,
              "beta": 1.0, "psi": 1.0, "q": 0.5, "qd": 0.5, "hip": 1.5, "yaw": 1.5, "moment": 1.0,
-             "phase": 0.5, "steering": 1.0, "axle": 1.0, "arm": 0.5}  # fmt: skip
+             "phase": 0.5, "joint": 1.2, "gelenk": 1.2, "関節": 1.2, "steering": 1.0, "axle": 1.0,
+             "arm": 0.5}  # fmt: skip
 _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
-              "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
-              "planned")  # fmt: skip
+              "vorgabe", "consigne", "fuehrung", "führung", "目標", "目标", "设定", "给定", "指令",
+              "rif", "trajectory", "planned")  # fmt: skip
 _REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
-_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定",
-             "messwert", "encoder")  # fmt: skip
+_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定", "实际",
+             "反馈", "测量", "messwert", "encoder")  # fmt: skip
 _MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
 _MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
           "推定", "vorhersage")  # fmt: skip
 _MODEL_SHORT = ("pred", "hat", "sim", "mdl", "nn", "mlp", "lstm", "net", "modell")
-_ERRORS = ("error", "abweichung", "differenz", "schleppfehler", "偏差", "deviation", "following")
+_ERRORS = (
+    "error",
+    "abweichung",
+    "differenz",
+    "schleppfehler",
+    "偏差",
+    "deviation",
+    "following",
+    "误差",
+)
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 

@@ -18,6 +18,7 @@ import numpy as np
 from identification.errors import BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
+from workbench.cards.against_header import contradicted_units
 from workbench.cards.card_tables import SignalSpec
 from workbench.documents.model import LogEntry, Model
 
@@ -67,24 +68,30 @@ _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 def log_remarks(
     logs: Sequence[Log], rig: Rig, signals: Mapping[str, SignalSpec]
 ) -> tuple[str, ...]:
-    """A line for each signal, and each number of the rig, whose size no machine has.
+    """A line for each signal, and each number of the rig, whose size no machine has, or whose unit
+    is not that of its header.
 
     signals: how the card reads them, for the units in the lines.
     """
+    other = contradicted_units(signals, rig)
     named = {name: f"signals.{name}, read in {spec.unit!r}" for name, spec in signals.items()}
     periods, travels = [log.h for log in logs], [float(np.ptp(log["y"])) for log in logs]
     where = named.get("t", "signals.t")
-    lines = [_judged("period", x, rig, where, "sampled every") for x in _extremes(periods)]
+    lines = [*other.values()] + [
+        _judged("period", x, rig, where, "sampled every") for x in _extremes(periods)
+        if "t" not in other
+    ]  # fmt: skip
     where = named.get("y", "signals.y")
-    lines += [_judged("travel", max(travels), rig, where, "the position covers")]
-    if "F" in signals:
+    if "y" not in other:
+        lines += [_judged("travel", max(travels), rig, where, "the position covers")]
+    if "F" in signals and "F" not in other:
         peak = max(float(np.max(np.abs(log.signals.get("F_logged", log["F"])))) for log in logs)
         lines += [_judged("force", peak, rig, named["F"], "the force is at most")]
     for name in ("p_p", "p_n"):
-        if name in signals:
+        if name in signals and name not in other:
             peak = max(float(np.max(np.abs(log[name]))) for log in logs)
             lines += [_judged("pressure", peak, rig, named[name], "the pressure is at most")]
-    if rig.control_limit and "u" in signals:
+    if rig.control_limit and "u" in signals and "u" not in other:
         peak = max(float(np.max(np.abs(log["u"]))) for log in logs)
         if 0 < peak < _UNUSED * rig.control_limit:
             lines += [

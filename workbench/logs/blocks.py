@@ -7,7 +7,7 @@ line by itself. What differs from block to block is the name.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +67,19 @@ def blocks_of(text: str) -> list[Block]:
             close()
             above.append(line)
     close()
-    return found if len(found) >= FEWEST_BLOCKS else []
+    return found if len(found) >= FEWEST_BLOCKS and not _goes_on(found) else []
+
+
+def _goes_on(blocks: Sequence[Block]) -> bool:
+    """Whether one table goes on below lines that are no rows, as a logger's messages: without names
+    of their own, by a clock that goes on."""
+    if any(_heads(one) or one.width != blocks[0].width for one in blocks[1:]):
+        return False
+    ends = [[_fields(row, one.mark)[0] for row in (one.rows[0], one.rows[-1])] for one in blocks]
+    if not all(cell for pair in ends for cell in pair):
+        return False
+    times = [[float(cell.replace(",", ".")) for cell in pair] for pair in ends]
+    return all(one[1] < after[0] < after[1] for one, after in pairwise(times))
 
 
 def are_runs(blocks: Sequence[Block]) -> bool:

@@ -1,7 +1,7 @@
 """Rows of a file that are no samples of its run: a logger's message, a row written twice, a number
 that is text; and a clock that begins again where the logger was started anew."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array, BoolArray
 from identification.signals.check import SHORTEST_LOG
+from identification.signals.even_clock import LONGEST_GAP, told_of_hours
 from workbench.logs.table import number_of, text_of
 
 MOST_FAULTY = 0.01  # of the rows: more is a file that is laid out otherwise
 MOST_STARTS = 50  # of a clock in one file
+_MOST_AXES, _SHOWN_AXES, _LOOKED_AT = 50, 4, 1000  # axes of one file, named; rows looked at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +54,78 @@ def numbers_in(raw: NDArray[Any]) -> Numbers:
 
 
 def sound_rows(t: Array, others: Sequence[Array]) -> tuple[BoolArray, tuple[str, ...]]:
-    """Which rows (n,) are samples, and what is said of the others: rows without a time, where they
-    are few, and rows that are the one before once more, in time and all signals."""
+    """Which rows (n,) are samples, and what is said of the others: rows without a time or with
+    nothing else, where they are few, and rows that are the one before once more, in time and all
+    signals. others: the columns beside the time."""
     timed: BoolArray = np.isfinite(t)
     remarks = list[str]()
     untimed = int(np.sum(~timed))
     if not are_few(untimed, len(t)):
         return np.ones(len(t), dtype=bool), ()
     if untimed:
-        remarks.append(f"{untimed} rows without a time left out")
+        remarks.append(f"{rows_of(untimed)} without a time left out")
+    bare = np.all([~np.isfinite(x) for x in others], axis=0) & timed
+    if np.any(bare) and are_few(int(np.sum(bare)), len(t)):
+        remarks.append(f"{rows_of(int(np.sum(bare)))} with nothing but a time left out")
+        timed &= ~bare
     twice = np.zeros(len(t), dtype=bool)
     if np.any(t[1:] == t[:-1]):
         same = [np.equal(x[1:], x[:-1]) | (np.isnan(x[1:]) & np.isnan(x[:-1])) for x in others]
         twice[1:] = np.all([t[1:] == t[:-1], *same], axis=0)
     if repeated := int(np.sum(twice)):
-        remarks.append(f"{repeated} rows that repeat the row before left out")
+        remarks.append(f"{rows_of(repeated)} that repeat the row before left out")
     return timed & ~twice, tuple(remarks)
+
+
+def several_axes(t: Array, columns: Iterable[tuple[str, NDArray[Any]]]) -> str:
+    """What is said of a log whose rows are of several axes in turn, by a column that names the axis
+    of each row: the times (n,) go up in the rows of each; else empty.
+
+    columns: what each is called, and its cells (n,).
+    """
+    if np.all(np.diff(t) > 0.0):
+        return ""
+    for name, cells in columns:
+        axes = _axes_in_turn(t, cells) if len(cells) == len(t) else ()
+        if axes:
+            shown = ", ".join(repr(one) for one in axes[:_SHOWN_AXES])
+            return (
+                f"the rows are of {len(axes)} axes in turn ({shown} in column {name}); give each"
+                " axis a file of its own rows"
+            )
+    return ""
+
+
+def _axes_in_turn(t: Array, cells: NDArray[Any]) -> tuple[str, ...]:
+    """The axes that cells name, where rows of each come again and again, in the order of time."""
+
+    def texts(some: NDArray[Any]) -> list[str]:
+        return [str(text_of(cell)) for cell in some.tolist()]
+
+    first, apart = cells[:_LOOKED_AT], cells[:: 1 + len(cells) // _LOOKED_AT]
+    if len(set(texts(first))) < 2 or len(set(texts(first) + texts(apart))) > _MOST_AXES:
+        return ()
+    axes, of = np.unique(np.asarray(texts(cells)), return_inverse=True)
+    again = np.sum(of[1:] != of[:-1]) >= len(axes)  # else they are runs
+    if not again or len(axes) > _MOST_AXES or np.min(np.bincount(of)) < SHORTEST_LOG:
+        return ()
+    rise = all(np.all(np.diff(t[of == k]) > 0.0) for k in range(len(axes)))
+    return tuple(axes.tolist()) if rise else ()
+
+
+def rows_of(count: int) -> str:
+    """So many rows in words."""
+    return "a row" if count == 1 else f"{count} rows"
+
+
+def told_of_starts(t: Array, parts: Sequence[slice]) -> str:
+    """What the clock does between the parts that `stretches` made of it."""
+    h = float(np.median(np.diff(t)))
+    back = np.array([t[one.start - 1] - t[one.start] for one in parts if one.start])
+    if any(abs(t[one.start] - t[0]) <= LONGEST_GAP * h for one in parts[1:]):
+        return f"clock begins again: {len(parts)} runs"
+    said = f"clock goes back by {np.max(back):.4g} s{told_of_hours(back, h)}"
+    return f"{said}: {len(parts)} runs"
 
 
 def stretches(t: Array) -> list[slice]:

@@ -22,7 +22,14 @@ from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
-from workbench.logs.faulty_rows import at_rows, numbers_in, sound_rows, stretches
+from workbench.logs.faulty_rows import (
+    at_rows,
+    numbers_in,
+    several_axes,
+    sound_rows,
+    stretches,
+    told_of_starts,
+)
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
@@ -56,7 +63,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     if len(parts) == 1:
         made = prepared(log, first_row, path, card)
         return replace(made, remarks=tuple(dict.fromkeys((*remarks, *made.remarks))))
-    said = [*remarks, f"{log.name}: its clock begins again: {len(parts)} runs"]
+    said = [*remarks, f"{log.name}: its {told_of_starts(log['t'], parts)}"]
     runs, bad = list[Log](), list[BadSamples]()
     for number, rows in enumerate(parts, 1):
         part = Log(f"{log.name} (run {number})", at_rows(log.signals, rows))
@@ -136,7 +143,10 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
             groups[name] = table.groups[number]
     if not groups:
         whole = _same_length(signals, path)
-        rows, said = sound_rows(whole["t"], list(whole.values()))
+        cells = ((repr(key), np.asarray(table.fetch(k))) for k, key in enumerate(table.names))
+        if in_turn := several_axes(whole["t"], cells):
+            raise BadLog(f"{path}: {in_turn}")
+        rows, said = sound_rows(whole["t"], [x for key, x in whole.items() if key != "t"])
         whole = whole if np.all(rows) else at_rows(whole, rows)
         told = tuple(f"{called}: {one}" for one in (*remarks, *said))
         return Log(called, whole), table.first_row, told

@@ -20,6 +20,7 @@ from workbench.files import broken_link, refuse_larger, refuse_special
 from workbench.logs.channels import read_mdf, read_tdms, read_ulog
 from workbench.logs.excel import read_excel
 from workbench.logs.messages import read_bag, read_mcap
+from workbench.logs.packed import GZIP, ZIP, text_bytes
 from workbench.logs.structs import plain_tree, records, tags_are_sound, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
@@ -39,12 +40,10 @@ JSON_BYTES = 100_000_000  # of text; as Python's values it takes ten times that
 HDF5_MAGIC = b"\x89HDF"
 """How HDF5 begins, from byte 512 on where MATLAB wrote it."""
 
-_ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_OLE = b"\xd0\xcf\x11\xe0"
 _PACKED = {
-    b"\x1f\x8b": "compressed by gzip; unpack it (gunzip) and give the file in it",
     b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
     b"\xfd7zXZ": "compressed by xz; unpack it (unxz) and give the file in it",
-    _ZIP: "a zip archive or an Excel workbook; unpack it, or save its sheet as CSV",
     _OLE: "an old Excel workbook; save its sheet as CSV",
 }
 _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
@@ -84,6 +83,12 @@ def checked_format(path: Path, spec: FileSpec) -> Format:
             "card's [file]"
         )
     _check_magic(path, form, head, spec)
+    if form == "csv" and head.startswith((GZIP, ZIP)):
+        inner = find_format(Path(path.stem), text_bytes(path, len(head)))
+        if inner != "csv":
+            raise BadLog(
+                f"{path}: a {inner} file, packed; of packed files only text is read: unpack it"
+            )
     return form
 
 
@@ -123,7 +128,7 @@ def head_of(path: Path) -> bytes:
 def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
     """Raises BadLog where the first bytes are those of no such file."""
     for magic, what in _PACKED.items():
-        book = form == "excel" and magic in (_ZIP, _OLE)
+        book = form == "excel" and magic == _OLE
         if form in ("csv", "excel") and head.startswith(magic) and not book:
             raise BadLog(f"{path}: is {what}")
     is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
@@ -132,8 +137,8 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
         "mat": not head.startswith(b"MATLAB") and HDF5_MAGIC not in head and is_text,
         "hdf5": HDF5_MAGIC not in head,
         "json": head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["),
-        "excel": not head.startswith((_ZIP, _OLE)),
-        "npy": not head.startswith((*_MAGIC["npy"], _ZIP)),
+        "excel": not head.startswith((ZIP, _OLE)),
+        "npy": not head.startswith((*_MAGIC["npy"], ZIP)),
     }
     if wrong.get(form, form in _MAGIC and not head.startswith(_MAGIC[form])):
         advice = "; copy it again or rename it"

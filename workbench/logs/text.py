@@ -18,16 +18,17 @@ from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decim
 from workbench.logs.clocks import clock_groups
 from workbench.logs.faulty_rows import are_few
 from workbench.logs.layout import Layout, find_layout, is_number
+from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _WHOLE = re.compile(r"[+-]?\d+")
+_LETTERS = re.compile(r"[^\W\d_]{2}")
 _FEW_ROWS = 3
 _DELIMITERS = (";", "\t", ",", " ", "|")
 _COMPARED = 40  # lines by which the delimiter is found
 _END = "EOF"  # the last line of some scopes'
 MANY = 10  # rows of a wrong length that make the header suspect instead
-TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
 _EXAMINED = 262_144  # characters looked at to find the layout
 _HEAD_BYTES = 8 * _EXAMINED  # in which they are, whatever the letters
 
@@ -158,8 +159,7 @@ def refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
 
 def _head(path: Path, encoding: str) -> str:
     """More than `_EXAMINED` characters of the file, or all that it has."""
-    with path.open("rb") as file:
-        content = file.read(_HEAD_BYTES)
+    content = text_bytes(path, _HEAD_BYTES)
     if len(content) == _HEAD_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
         whole = content[: content.rfind(b"\n") + 1]
         try:
@@ -172,7 +172,7 @@ def _head(path: Path, encoding: str) -> str:
 
 
 def _decode(path: Path, encoding: str) -> str:
-    content = path.read_bytes()
+    content = text_bytes(path)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     try:
@@ -260,7 +260,7 @@ class _Parsed:
 
     def __init__(self, content: bytes, marks: _Marks, width: int) -> None:
         self.content, self.marks, self.width = content, marks, width
-        self.wrong: list[tuple[int, int]] = []  # row and its fields, of the last reading
+        self.wrong: list[tuple[int, int, str]] = []  # row, its fields, its text
 
     def load(self, kind: Any, wanted: list[str]) -> Any:
         """These columns as one kind; raises ArrowInvalid where a cell is not of it."""
@@ -268,7 +268,7 @@ class _Parsed:
         from pyarrow import csv as arrow
 
         def note(row: Any) -> str:
-            wrong.append((int(row.number or 0), int(row.actual_columns)))
+            wrong.append((int(row.number or 0), int(row.actual_columns), str(row.text)[:40]))
             return "skip"
 
         wrong = self.wrong = []
@@ -287,8 +287,10 @@ class _Parsed:
         logger or a row cut off."""
         if not self.wrong:
             return ""
-        (row, fields), count = self.wrong[0], len(self.wrong)
-        said = f"row {first_row + row - 1} has {fields} fields, {self.width} needed"
+        (row, fields, text), count = self.wrong[0], len(self.wrong)
+        many = "1 field" if fields == 1 else f"{fields} fields"
+        shown = f" ({text!r})" if _LETTERS.search(text) else ""
+        said = f"row {first_row + row - 1}{shown} has {many}, {self.width} needed"
         more = f" ({count} such rows)" if count > 1 else ""
         if are_few(count, rows):
             return f"{said}{more}: left out"

@@ -18,7 +18,8 @@ _PER_SECOND = {
 _DURATION = re.compile(rf"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) ?({'|'.join(_PER_SECOND)})")
 _OF_DAY = r"(\d{1,3}):(\d\d)(?::(\d\d)(?:[.,:](\d{1,9}))?)?"
 _DATE = r"\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4}|\d{1,2}-[A-Z][a-z]{2}-\d{4}|\d{4}/\d\d?/\d\d?"
-_MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?: ?(?:Z|UTC|[+-]\d\d(?::?\d\d)?))?")
+_ZONE = r" ?(?:Z|UTC|([+-])(\d\d)(?::?(\d\d))?)"
+_MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?:{_ZONE})?")
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d")
 _DAY = 86400.0
 
@@ -31,8 +32,8 @@ def is_time(field: str) -> bool:
 def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
     """Times of a column in s, missing ones as NaN; None where its first is a plain number.
 
-    Durations are as written, dates and clock times since midnight of the first day. Raises BadLog
-    naming the row of the first cell that is not of the first one's kind.
+    Durations are as written, dates and clock times since midnight of the first day, in the first
+    one's time zone. Raises BadLog naming the row of the first cell that is not of its kind.
     """
     if raw.dtype.kind == "m":
         return _spans(raw)
@@ -49,6 +50,7 @@ def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
         return None
     out = np.full(len(raw), np.nan)
     begun: date | None = None
+    zone: float | None = None
     for row, value in enumerate(raw):
         if _is_empty(value):
             continue
@@ -58,8 +60,9 @@ def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
                 f"{where}, row {first_row + row}: {str(value)[:40]!r} is no time as the first cell"
                 f" is ({str(first)[:40]!r}); correct it or leave the field empty"
             )
-        day, out[row] = read
-        begun = begun or day
+        day, out[row], east = read
+        begun, zone = begun or day, east if zone is None else zone
+        out[row] -= east - zone
         if day is not None and begun is not None:
             out[row] += (day - begun).days * _DAY
     return out if begun is not None else _over_midnight(out, first)
@@ -74,29 +77,32 @@ def _spans(raw: RawColumn) -> Array:
     return np.where(np.isnat(raw), np.nan, out)
 
 
-def _moment(value: Any) -> tuple[date | None, float] | None:
-    """Day, if any, and seconds of it; None where the cell is no time."""
+def _moment(value: Any) -> tuple[date | None, float, float] | None:
+    """Day, if any, seconds of it, and by how many the time zone is ahead of UTC; None where the
+    cell is no time."""
     match value:
         case datetime():
-            return value.date(), _of_day(value.time())
+            east = value.utcoffset() or timedelta()
+            return value.date(), _of_day(value.time()), east.total_seconds()
         case time():
-            return None, _of_day(value)
+            return None, _of_day(value), 0.0
         case timedelta():
-            return None, value.total_seconds()
+            return None, value.total_seconds(), 0.0
         case str():
             return _text_moment(value.strip())
     return None
 
 
-def _text_moment(text: str) -> tuple[date | None, float] | None:
+def _text_moment(text: str) -> tuple[date | None, float, float] | None:
     if found := _DURATION.fullmatch(text):
-        return None, float(found[1].replace(",", ".")) * _PER_SECOND[found[2]]
+        return None, float(found[1].replace(",", ".")) * _PER_SECOND[found[2]], 0.0
     found = _MOMENT.fullmatch(text)
     if found is None:
         return None
-    day, hours, minutes, secs, part = found.groups()
+    day, hours, minutes, secs, part, side, zone_hours, zone_minutes = found.groups()
+    east = 3600.0 * int(zone_hours or 0) + 60.0 * int(zone_minutes or 0)
     total = 3600.0 * int(hours) + 60.0 * int(minutes) + float(f"{secs or 0}.{part or 0}")
-    return (_day(day) if day else None), total
+    return (_day(day) if day else None), total, -east if side == "-" else east
 
 
 def _day(text: str) -> date | None:

@@ -2,6 +2,7 @@
 several clocks brought to one of these."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
@@ -19,9 +21,10 @@ from workbench.cards.headers import read_header, written_unit
 from workbench.files import refuse_larger
 from workbench.logs.faulty_rows import numbers_in
 from workbench.logs.layout import is_number
+from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
-from workbench.logs.tables import JSON_BYTES, find_format, head_of, read_table
-from workbench.logs.text import TEXT_BYTES, first_lines, holds_blocks
+from workbench.logs.tables import JSON_BYTES, checked_format, read_table
+from workbench.logs.text import first_lines, holds_blocks
 from workbench.logs.times import seconds
 
 FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
@@ -31,8 +34,8 @@ LEAST_COMMON = 0.5  # of the clock's span, that another one shares
 @dataclass(frozen=True, eq=False)
 class RawColumn:
     """One column: its number from 0, what a card calls it, its header and the unit below it, its
-    values (n,) (NaN where there is no number), why they cannot be used (else empty), and its group,
-    where the file has several."""
+    values (n,) (NaN where there is no number), why they cannot be used (else empty), its group,
+    where the file has several, and its cells (n,), where they are text."""
 
     number: int
     key: str | int
@@ -41,6 +44,7 @@ class RawColumn:
     values: Array
     unusable: str = ""
     group: str = ""
+    cells: NDArray[Any] | None = None
 
 
 def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) -> list[RawColumn]:
@@ -107,7 +111,9 @@ ONE_ROW = 1  # by which vectors of one log may differ in length
 _OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
 _ONLY_NUMBER = ("data", "value")  # of a message that holds one number
 _DEEPEST = 5  # tables in each other, in which the rows are looked for
-_ENCODINGS = ("utf-8", "cp932", "cp1252", "latin-1")
+_ONLY_DATES = "dates, not numbers"
+_ENCODINGS = ("utf-8", "gb18030", "cp932", "cp1252", "latin-1")
+_FIRST_LINES, _FEWEST_SPOKEN = 40, 2  # of a text, in which so many Chinese headers are known
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +134,7 @@ def read_unknown(path: Path) -> UnknownLog:
     Encoding, preamble, header and row of units of a text file, and the table in a JSON or MAT
     file, are found by looking. Raises BadLog, one line, where there are no columns of numbers.
     """
-    form = find_format(path, head_of(path))
+    form = checked_format(path, FileSpec())
     names, units, said = tuple[str, ...](), tuple[str, ...](), ""
     if form == "csv":
         spec, names, units = _text_layout(path)
@@ -150,13 +156,14 @@ def read_unknown(path: Path) -> UnknownLog:
         key = called[number] if headed and text and not twice else number
         below = units[number] if number < len(units) else ""
         values, why = _numbers(table, number)
-        if why.startswith("text"):
+        if why.startswith(("text", _ONLY_DATES)):
             with suppress(BadLog):
                 times = seconds(np.asarray(table.fetch(number)), str(path), table.first_row)
                 if times is not None:
                     values, why, below = times, "", "s"
         group = table.groups[number] if table.groups else ""
-        one = RawColumn(number, key, text, below, values, why, group)
+        cells = np.asarray(table.fetch(number)) if why.startswith("text") else None
+        one = RawColumn(number, key, text, below, values, why, group, cells)
         (scalars if len(values) == 1 else found).append(one)
     found = on_clock_of_most(found, table.clocks)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)
@@ -197,7 +204,7 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
     if raw.ndim != 1:
         return np.zeros(0), "no column"
     if raw.dtype.kind in "Mm":
-        return np.full(len(raw), np.nan), "dates, not numbers"
+        return np.full(len(raw), np.nan), _ONLY_DATES
     found = numbers_in(raw)
     if not np.any(found.is_text) or found.few:
         return found.values, ""
@@ -258,8 +265,9 @@ def _units(row: Sequence[str], width: int) -> tuple[str, ...]:
 
 
 def _encoding(path: Path) -> str:
-    """The first encoding in which the file is text; of Japanese by its letters."""
-    content = path.read_bytes()
+    """The first encoding in which the file is text; Chinese by its headers' words, Japanese by its
+    letters."""
+    content = text_bytes(path)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-8"  # the reader sees the mark itself
     for name in _ENCODINGS:
@@ -267,9 +275,18 @@ def _encoding(path: Path) -> str:
             text = content.decode(name)
         except UnicodeDecodeError:
             continue
+        if name == "gb18030" and not _speaks(text):
+            continue
         if name != "cp932" or any("\u3040" <= letter <= "\u9fff" for letter in text):
             return name
     return "utf-8"
+
+
+def _speaks(text: str) -> bool:
+    """Whether headers among the first lines are Chinese and known."""
+    cells = re.split(r"[,;\t\n]", "\n".join(text.splitlines()[:_FIRST_LINES]))
+    chinese = ("".join(re.findall("[\u4e00-\u9fff]", cell)) for cell in cells)
+    return sum(bool(read_header(one).means) for one in chinese if one) >= _FEWEST_SPOKEN
 
 
 def _rows_of(path: Path) -> tuple[str | None, str]:

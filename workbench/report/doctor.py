@@ -1,5 +1,6 @@
 """A log before any fit on one screen, and as charts: position, drive, clock, force over speed."""
 
+import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -22,14 +23,19 @@ from workbench.steps.identifiable_by_log import Way
 LABEL_WIDTH = 15
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
+END_IN_ADVICE = ("next", "note", "refused")  # kinds whose texts end in what to do
 
 
-def doctor_view(found: Examined, out: Path | None) -> Screen:
-    """What the log shows; of each kind a few lines, all of them with --verbose."""
-    return screen(instead(_lines(found, out, MOST_OF_A_KIND), _lines(found, out, None)))
+def doctor_view(found: Examined, out: Path | None, card: str = "CARD") -> Screen:
+    """What the log shows; of each kind a few lines, all of them with --verbose.
+
+    card: as it was given, for the command to type next.
+    """
+    few, every = (_lines(found, out, card, most) for most in (MOST_OF_A_KIND, None))
+    return screen(instead(few, every))
 
 
-def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
+def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> list[str]:
     """The lines, of which each kind has at most so many."""
     bad, remarks = [one.line for one in found.bad], [*found.remarks]
     if most is not None:
@@ -53,7 +59,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
                  f"would not: {', '.join(hidden) or 'none'}"]  # fmt: skip
     # Each kind: its label, its texts, and of how many a screen has room at least.
     kinds: list[tuple[str, Sequence[str], int]] = [
-        ("next", [_then(found)], 1),
+        ("next", [_then(found, card)], 1),
         ("clock", [_clock(found.clock)], 1),
         ("signal", [_sensor(found, one) for one in found.sensors], 8),
         ("samples", [_plain(found, one) for one in bad], 1),
@@ -71,7 +77,8 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     ]  # fmt: skip
     lines = [f"{found.file}: {_verdict(found)}"]
     for name, texts, few in kinds:
-        lines += labelled(name, texts, None if most is None else max(most, few))
+        at_most = None if most is None else max(most, few)
+        lines += labelled(name, texts, at_most, whole=name in END_IN_ADVICE)
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
     return lines
@@ -93,23 +100,29 @@ def _verdict(found: Examined) -> str:
     return f"{many} the {what} are identifiable from it"
 
 
-def _then(found: Examined) -> str:
+def _then(found: Examined, card: str) -> str:
     """What to do next."""
     if found.refused:
         return "mend the log or its card (see refused), then ask again"
+    if found.exchanged:
+        return "exchange the columns of r and y in the card (see note), then ask again"
     if found.verdict == "nothing":
         return "log again, with the motion that 'add' names"
-    first = f"workbench identify {found.file} --card CARD"
+    if found.rig.kind == "motor" and found.rig.force_per_command is None:
+        return "write force_per_command under the card's [rig], then ask again"
+    first = f"workbench identify {found.file} --card {shlex.quote(card)}"
     return f"{first}; for the rest, log what 'add' names" if found.add else first
 
 
-def labelled(name: str, texts: Sequence[str], most: int | None) -> list[str]:
-    """The first texts behind a label, each on one or two lines, and how many more there are; most:
-    None for all of them, whole."""
+def labelled(
+    name: str, texts: Sequence[str], most: int | None, *, whole: bool = False
+) -> list[str]:
+    """The first texts behind a label, each on one or two lines or whole, and how many more there
+    are; most: None for all of them, whole."""
     out = []
     room = 2 * (SCREEN_WIDTH - LABEL_WIDTH) - 12
     for text in texts[:most]:
-        short = text if most is None else textwrap.shorten(text, room, placeholder=" ...")
+        short = text if most is None or whole else textwrap.shorten(text, room, placeholder=" ...")
         first, *rest = textwrap.wrap(short, SCREEN_WIDTH - LABEL_WIDTH) or [""]
         out += [f"{name:{LABEL_WIDTH}}{first}", *(f"{'':{LABEL_WIDTH}}{one}" for one in rest)]
     if most is not None and len(texts) > most:
@@ -129,7 +142,7 @@ def _clock(clock: Clock) -> str:
     gaps = "no gaps"
     if clock.gaps:
         many = f"{clock.gaps} gap" + ("s" if clock.gaps > 1 else "")
-        gaps = f"{many}, the longest of {clock.longest_gap:.3g} s"
+        gaps = f"{many}, the longest of {clock.longest_gap:.4g} s"
     return (
         f"{clock.rows} rows in {clock.duration:.4g} s, every {1e3 * clock.h:.4g} ms ({rate}),"
         f" {even}, {gaps}"
@@ -149,6 +162,8 @@ def _sensor(found: Examined, one: SensorState) -> str:
 
 
 def _delay(one: Delay) -> str:
+    if one.of == "r" and one.seconds is not None and one.seconds < 0.0:
+        return f"the position is ahead of its reference by {-1e3 * one.seconds:.3g} ms"
     what = {"u": "the command acts on the ", "r": "the position is behind its reference"}[one.of]
     what += one.on if one.of == "u" else ""
     if one.seconds is None:

@@ -5,7 +5,7 @@ whether a parameter can be identified is asked of the same thresholds, with the 
 measured motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,15 @@ from identification.signals.clean import limits
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.even_clock import LONGEST_GAP, even_clock, rows_lost
 from identification.signals.noise import local_noise
+from identification.signals.offsets import ROUNDED_OFF
 from identification.signals.relations import command_lag, lead
+from workbench.cards.against_header import contradicted_units
 from workbench.cards.card import Card
 from workbench.cards.units import conversion
 from workbench.documents.model import Identifiable
 from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import longest_run, runs_of, table_of, with_force
+from workbench.steps.first_card.remarks import are_exchanged
 from workbench.steps.hardly_identifiable import hardly_identifiable
 from workbench.steps.identifiable_by_log import RunsIdentifiability, Ways, identifiability_of_runs
 
@@ -103,11 +106,13 @@ class Examined(CheckedLog):
     would identify the rest; effects: by how many deviations of the noise each would show at a size
     that matters, None where that was not asked; refused: why `identify` would not take the log,
     empty where it would.
+    exchanged: whether position and reference look like each other's columns.
     log and motion: the first run, for the picture; None where the log is refused before.
     """
 
     sensors: tuple[SensorState, ...]
     delays: tuple[Delay, ...]
+    exchanged: bool
     ways: Ways | None
     identifiability: tuple[Identifiable, ...]
     add: tuple[str, ...]
@@ -177,11 +182,16 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         if runs and not found.refused
         else RunsIdentifiability(reason=found.refused)
     )
-    remarks = list(found.remarks)
+    remarks = [*found.remarks, *contradicted_units(card.signals, found.rig).values()]
     late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else 0.0
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
         remarks += hardly_identifiable(runs, found.rig)
+    sensors = tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t")
+    delays = _delays(log, seen.motion, late) if log is not None and seen.motion else ()
+    exchanged = "" if log is None else _exchanged(delays, sensors, log.h)
+    if exchanged:
+        remarks.insert(0, exchanged)
     of_log = {
         **vars(found),
         "refused": found.refused or seen.reason,
@@ -189,8 +199,9 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     }
     return Examined(
         **of_log,
-        sensors=tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t"),
-        delays=_delays(log, seen.motion, late) if log is not None and seen.motion else (),
+        sensors=sensors,
+        delays=delays,
+        exchanged=bool(exchanged),
         ways=seen.ways,
         identifiability=seen.identifiability,
         add=tuple(dict.fromkeys(one.add for one in seen.identifiability if one.add)),
@@ -223,8 +234,9 @@ def _sensor(name: str, x: Array) -> SensorState:
     good = x[np.isfinite(x)]
     if len(good) < 4:
         return SensorState(name, 0.0, 0.0, 0.0, 0.0)
-    low, high = float(good.min()), float(good.max())
-    return SensorState(name, low, high, local_noise(good), resolution(good))
+    low, high, noise = float(good.min()), float(good.max()), local_noise(good)
+    shown = noise if noise > ROUNDED_OFF * (high - low) else 0.0
+    return SensorState(name, low, high, shown, resolution(good))
 
 
 def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
@@ -252,6 +264,21 @@ def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
         found = lead(log["r"], log["y"])
         out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))
     return tuple(out)
+
+
+def _exchanged(delays: Sequence[Delay], sensors: Sequence[SensorState], h: float) -> str:
+    """What is said of a position that comes before its reference, and that has less of a sensor's
+    noise than this, or is ahead by more than a sample; else empty."""
+    late = next((one.seconds for one in delays if one.of == "r"), None)
+    if late is None or late > -LEAST_LAG * h:
+        return ""
+    noise = {one.name: np.hypot(one.noise, one.step / np.sqrt(12.0)) for one in sensors}
+    if not are_exchanged(late / h) and noise["r"] <= noise["y"]:
+        return ""
+    return (
+        f"the position is ahead of its reference by {-1e3 * late:.3g} ms, as no loop makes it: the"
+        " columns of r and y look exchanged; exchange them in the card"
+    )
 
 
 def doctor_document(found: Examined, card: str) -> dict[str, Any]:

@@ -81,10 +81,19 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
         )
         return
     if rig.kind == "motor" and (share := derivative(motion, logged).share) > ALL_FOLLOWED:
-        yield (
-            f"the velocity follows the {name} ({share:.0%} of it is the velocity alone), as of a"
-            ' valve and cylinder: inertia is hardly identifiable; use kind = "velocity"'
+        yield _said_of_followed(name, share, of_current=rig.command_unit == "A")
+
+
+def _said_of_followed(name: str, share: float, *, of_current: bool) -> str:
+    said = f"the velocity follows the {name} ({share:.0%} of it is the velocity alone)"
+    if of_current:  # which is a force: no valve's
+        return (
+            f"{said}: inertia is hardly identifiable, and a motor that the body turns makes such a"
+            " current by itself; log quick strokes that a command drives"
         )
+    return (
+        f'{said}, as of a valve and cylinder: inertia is hardly identifiable; use kind = "velocity"'
+    )
 
 
 def _said_of_one_way(up: float) -> str:

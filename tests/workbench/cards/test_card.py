@@ -121,6 +121,12 @@ def test_wrong_values_name_their_key(tmp_path: Path, old: str, new: str, found: 
     assert found in refusal(tmp_path, CONTRACT.replace(old, new, 1))
 
 
+def test_a_force_of_another_command_names_the_commands_unit(tmp_path: Path) -> None:
+    text = CONTRACT.replace("supply_pressure_pa = 5.0e5", 'force_per_command = "30 N/A"')
+    said = "unit 'N/A' is of another kind than 'N/V': by signals.u the command is in 'V'"
+    assert said in refusal(tmp_path, text)
+
+
 def test_split_names_known_files_once(tmp_path: Path) -> None:
     files = CONTRACT + '[[files]]\nname = "run1.csv"\n[split]\n'
     assert "'run1.csv'?" in refusal(tmp_path, files + 'train = ["run2.csv"]')

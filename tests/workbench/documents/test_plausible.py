@@ -49,6 +49,12 @@ def test_a_sound_log_has_no_remark() -> None:
     assert log_remarks([log(y=100.0)], replace(RIG, motion="rotary"), SIGNALS) == ()
 
 
+def test_a_header_tells_the_slip_better_than_the_size() -> None:
+    read = {**SIGNALS, "y": SignalSpec(column="position_mm", unit="m")}
+    (line,) = log_remarks([log(y=1e3)], RIG, read)
+    assert "the header 'position_mm' says mm, the card 'm'" in line
+
+
 @pytest.mark.parametrize(
     ("slip", "signal", "said"),
     [

@@ -110,14 +110,16 @@ def test_a_column_of_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize("fields", [1, 2, 4])
 def test_rows_of_another_length(tmp_path: Path, fields: int) -> None:
     message = refusal(edited(tmp_path, 57, lambda f: [*f, "9"][:fields], rows=5))
-    assert f"row 57 has {fields} fields, 3 needed (5 such rows)" in message
+    many = "1 field" if fields == 1 else f"{fields} fields"
+    assert f"row 57 has {many}, 3 needed (5 such rows)" in message
 
 
 @pytest.mark.parametrize("fields", [1, 2, 4])
 def test_one_row_of_another_length_is_left_out(tmp_path: Path, fields: int) -> None:
     path = edited(tmp_path, 57, lambda f: [*f, "9"][:fields])
     found = read_runs(path, card(tmp_path, CARD))
-    assert found.remarks[0] == f"a.csv: row 57 has {fields} fields, 3 needed: left out"
+    many = "1 field" if fields == 1 else f"{fields} fields"
+    assert found.remarks[0] == f"a.csv: row 57 has {many}, 3 needed: left out"
     (run,) = found.runs
     assert run.lost is not None
     assert np.flatnonzero(run.lost).tolist() == [55]
@@ -350,7 +352,7 @@ def test_a_column_name_that_is_there_twice(tmp_path: Path) -> None:
         (b"\x1f\x8b", "gzip"),
         (b"BZh9", "bzip2"),
         (b"\xfd7zXZ\0", "xz"),
-        (b"PK\x03\x04", "save its sheet as CSV"),
+        (b"PK\x03\x04", "zip archive"),
         (b"\xd0\xcf\x11\xe0", "old Excel workbook"),
     ],
 )

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import openpyxl
 import pytest
 from mcap.writer import CompressionType
 
@@ -278,6 +279,19 @@ def test_a_sheet_with_lines_above_and_a_row_of_units(tmp_path: Path) -> None:
         read_log(
             tmp_path / "a.xlsx", card(tmp_path, text("t", "y", "F", '[file]\nrows="Tabelle1"\n'))
         )
+
+
+def test_the_first_sheet_with_a_table_is_read_and_said(tmp_path: Path) -> None:
+    rows = zip(*(v.tolist() for v in signals().values()), strict=True)
+    book = openpyxl.Workbook(write_only=True)
+    book.create_sheet("cover").append(["axis X, shift 2"])
+    sheet = book.create_sheet("data")
+    for row in [list(signals()), *([str(x).replace(".", ",") for x in row] for row in rows)]:
+        sheet.append(row)
+    book.save(tmp_path / "a.xlsx")
+    found = read_runs(tmp_path / "a.xlsx", card(tmp_path))
+    assert found.remarks == ("a.xlsx: read from sheet 'data', the first with a table",)
+    np.testing.assert_allclose(found.runs[0]["y"], signals()["y"], rtol=1e-12)
 
 
 def test_empty_cells_are_missing_samples(tmp_path: Path) -> None:

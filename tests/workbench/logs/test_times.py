@@ -68,6 +68,13 @@ def test_durations(values: list[object], expected: list[float]) -> None:
     np.testing.assert_allclose(read(values), expected, rtol=1e-12)
 
 
+def test_times_of_several_zones_are_in_the_first_ones() -> None:
+    zones = ["2026-03-29T01:59:59+01:00", "2026-03-29T03:00:00+02:00", "2026-03-29T01:00:01Z"]
+    np.testing.assert_allclose(read([*zones]), [7199.0, 7200.0, 7201.0])
+    stamps: list[object] = [datetime.fromisoformat(one) for one in zones]
+    np.testing.assert_allclose(read(stamps), [7199.0, 7200.0, 7201.0])
+
+
 def test_numbers_are_no_times() -> None:
     assert seconds(np.asarray([0.0, 0.1]), "a", 1) is None
     assert seconds(np.asarray(["0.1", "0.2"], dtype=object), "a", 1) is None

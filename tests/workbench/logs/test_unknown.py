@@ -49,7 +49,12 @@ def test_marks_at_the_beginning_and_decimal_commas(tmp_path: Path, encoding: str
 
 
 @pytest.mark.parametrize(
-    ("header", "encoding"), [("t,Weg (µm),Stellgröße", "cp1252"), ("時間,位置,荷重", "cp932")]
+    ("header", "encoding"),
+    [
+        ("t,Weg (µm),Stellgröße", "cp1252"),
+        ("時間,位置,荷重", "cp932"),
+        ("时间,反馈位置,电流反馈", "gb18030"),
+    ],
 )
 def test_encodings_of_windows_are_found(tmp_path: Path, header: str, encoding: str) -> None:
     found = read_unknown(write(tmp_path, text([header]), encoding))

@@ -129,6 +129,58 @@ def test_a_late_command_is_told(force: tuple[Card, Table], late: int) -> None:
         assert delay.seconds is None
 
 
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_a_position_ahead_of_its_reference_is_told(
+    motor: tuple[Card, Table], exchanged: bool
+) -> None:
+    card, table = motor
+    (card.path).write_text(MOTOR + 'r = { column = "r", unit = "m" }\n', "utf-8")
+    noise = 2e-6 * np.random.default_rng(1).standard_normal(len(table["y"]))
+    smooth = np.convolve(table["y"], np.ones(5) / 5.0, mode="same")
+    ahead, behind = np.append(smooth[1:], smooth[-1]), table["y"] + noise
+    own = {"y": ahead, "r": behind} if exchanged else {"y": behind, "r": ahead}
+    found = look(load_card(card.path), {**table, **own})
+    assert found.exchanged == exchanged
+    said = "the columns of r and y look exchanged; exchange them in the card"
+    text = doctor_view(found, None).text()
+    assert any(said in one for one in found.remarks) == exchanged
+    assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
+
+
+def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    text = doctor_view(look(card, table), None, "my card.toml").text()
+    assert "workbench identify run.csv --card 'my card.toml'" in " ".join(text.split())
+    found = look(card, {**table, "u": -table["u"]})
+    shown = " ".join(doctor_view(found, None).text().split())
+    assert "give the column of y gain = -1" in shown and "..." not in shown
+
+
+def test_a_card_without_its_constant_is_filled_in_first(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
+    text = doctor_view(look(load_card(card.path), table), None).text()
+    assert "write force_per_command under the card's [rig]" in text
+
+
+def test_rounding_is_no_noise(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR + 'r = { column = "r", unit = "m" }\n', "utf-8")
+    found = look(load_card(card.path), {**table, "r": 0.1 + 0.02 * table["t"]})
+    assert next(one for one in found.sensors if one.name == "r").noise == 0.0
+
+
+def test_a_unit_that_the_header_denies_is_told_though_the_log_is_refused(
+    motor: tuple[Card, Table],
+) -> None:
+    card, table = motor
+    text = MOTOR.replace('column = "y", unit = "m"', 'column = "y [mm]", unit = "m"')
+    card.path.write_text(text, "utf-8")
+    found = look(load_card(card.path), {"t": table["t"], "y [mm]": table["y"], "u": -table["u"]})
+    assert found.verdict == "refused"
+    assert any("the header 'y [mm]' says mm, the card 'm'" in one for one in found.remarks)
+
+
 def test_counts_are_told_as_a_step(motor: tuple[Card, Table]) -> None:
     card, table = motor
     table["y"] = 2e-5 * np.round(table["y"] / 2e-5)

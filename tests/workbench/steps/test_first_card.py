@@ -122,7 +122,8 @@ def test_two_pressures_are_the_right_way_round(logs: dict[str, Table], tmp_path:
     one = found.signal("p_p")
     assert one is not None and one.column == "P2 [bar]"
     card = tomllib.loads(written(found))
-    assert {"area_p_m2", "area_n_m2", "supply_pressure_pa"} <= set(card["rig"])
+    assert {"area_p_m2", "area_n_m2"} <= set(card["rig"])
+    assert card["rig"]["supply_pressure_pa"] == 1e5  # around the rod, of absolute pressures
 
 
 def test_counts_get_their_gain_from_the_reference(logs: dict[str, Table], tmp_path: Path) -> None:
@@ -172,9 +173,11 @@ def test_a_sample_number_gets_its_rate_from_the_speed(
     number = np.arange(len(true["t"]), dtype=np.float64)
     table = {"index": number, "y [mm]": 1e3 * true["y"], "F [N]": true["F"],
              "speed [mm/s]": 1e3 * np.gradient(true["y"], 2e-3)}  # fmt: skip
-    one = propose(tmp_path, table).signal("t")
-    assert one is not None
-    assert (one.unit, one.gain) == ("1", "500 1/s")
+    for headers in (tuple(table), ("index", "angle", "torque", "velocity")):
+        named = dict(zip(headers, table.values(), strict=True))
+        one = propose(tmp_path, named).signal("t")
+        assert one is not None
+        assert (one.unit, one.gain) == ("1", "500 1/s")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.init_real_tables import fewest_wrong, machine, make_table
@@ -93,6 +95,42 @@ def test_each_of_several_axes_has_its_card(
         propose(tmp_path, headers, *table, axis="toe")
 
 
+def test_axes_go_by_the_names_of_their_headers(
+    joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    table = (T, joint["y"], joint["F"], other["y"], other["F"], 0.7 * plain(joint)[::-1],
+             1e-3 * np.random.default_rng(4).standard_normal(len(T)))  # fmt: skip
+    headers = "time,arm_1_pos,arm_1_tau,arm_2_pos,arm_2_tau,torso_lift_pos,torso_lift_tau"
+    for axis, of in (("arm_2", "arm_2"), ("2", "arm_2"), ("torso_lift", "torso_lift")):
+        found = propose(tmp_path, headers, *table, axis=axis)
+        assert columns(found) == {"t": "time", "y": f"{of}_pos", "F": f"{of}_tau"}
+    assert found.axes == ("1", "2", "torso_lift")
+    assert any("inertia and friction explain only" in one for one in found.remarks)
+    with pytest.raises(BadLog, match="axes: 1, 2, torso_lift"):
+        propose(tmp_path, headers, *table, axis="arm")
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_current_of_the_motor_that_the_body_turns_is_no_drive(
+    joint: dict[str, Array], tmp_path: Path, driven: bool
+) -> None:
+    v = np.gradient(plain(joint), T)
+    noise = 1e-3 * np.std(v) * np.random.default_rng(2).standard_normal(len(T))
+    voltage = joint["F"] if driven else np.zeros(len(T))
+    table = (T, plain(joint), np.asarray(-0.006 * (v + noise)), voltage)
+    if driven:
+        propose(tmp_path, "t,theta,current,Vm", *table)
+        return
+    with pytest.raises(BadLog, match="nothing drives: the command 'Vm' is always 0, and 'current'"):
+        propose(tmp_path, "t,theta,current,Vm", *table)
+
+
+def test_a_joint_may_slide(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "t,lift_joint_pos,lift_joint_effort", T, plain(joint), joint["F"])
+    assert found.motion == "rotary"
+    assert next(one for one in found.rig if one.key == "motion").rival == "linear"
+
+
 def test_a_sign_bit_is_named_and_nothing_is_fitted(joint: dict[str, Array], tmp_path: Path) -> None:
     raw = np.round(2000.0 * joint["y"])
     raw = np.where(raw < 0.0, 32768.0 - raw, raw)
@@ -176,6 +214,38 @@ def test_stamps_and_bars_are_read(joint: dict[str, Array], tmp_path: Path) -> No
     found = proposed(tmp_path / "run.csv")
     assert columns(found) == {"t": "stamp", "y": "q", "F": "tau"}
     assert found.unused["'s1'"] == "'|' alone"
+
+
+@pytest.mark.parametrize(("least", "counts"), [(-32768.0, "4096"), (0.0, "65536")])
+def test_a_counter_that_overflows_is_unwrapped(
+    joint: dict[str, Array], tmp_path: Path, least: float, counts: str
+) -> None:
+    counted: Array = np.round(2e5 * joint["y"] / np.std(joint["y"])).astype(np.float64)
+    whole: Array = (counted - least) % 65536.0 + least
+    found = propose(
+        tmp_path, "time_s,position_counts,torque_Nm", T, whole, joint["F"],
+    )  # fmt: skip
+    assert columns(found) == {"t": "time_s", "y": "position_counts", "F": "torque_Nm"}
+    own = {one.name: one for one in found.signals}
+    assert own["F"].gain is None and own["y"].gain == f"{counts} count/turn"
+    assert not own["y"].sure
+    assert any("leaps by 65536" in one and "a counter of 16 bits" in one for one in found.remarks)
+
+
+def test_chinese_headers_give_units_and_a_current(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "时间(秒),实际位置(度),电流(安培)", T, joint["y"], joint["F"])
+    assert [(one.unit, one.sure) for one in found.signals] == [
+        ("s", True), ("deg", True), ("A", True)
+    ]  # fmt: skip
+    found = propose(tmp_path, "时间,反馈位置,电流反馈", T, joint["y"], joint["F"])
+    assert found.signals[-1].name == "u" and found.signals[-1].unit == "A"
+
+
+def test_dates_of_parquet_are_a_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    stamps = np.datetime64("2026-05-03", "ns") + np.round(1e9 * T).astype("m8[ns]")
+    table = {"time": stamps, "pos": plain(joint), "tau": joint["F"]}
+    pq.write_table(pa.table(table), tmp_path / "run.parquet")
+    assert columns(proposed(tmp_path / "run.parquet"))["t"] == "time"
 
 
 def test_a_position_that_only_rises_is_no_clock(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """What a log will hardly tell, said before a fit: of each kind, and of a sound log nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,8 @@ ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
         ("perhaps by hand", FORCE, T, SWING + noise(1e-5), 2.5 * np.sin(SWING) + noise(0.01)),
         ("hardly any work", FORCE, T, SWING + noise(1e-5), 0.9 + noise(0.01)),
         ('kind = "velocity"', MOTOR, T, SWING + noise(1e-5), 3.0 * np.gradient(SWING, T)),
+        ("a motor that the body turns makes such a current", replace(MOTOR, command_unit="A"), T,
+         SWING + noise(1e-5), 3.0 * np.gradient(SWING, T)),
     ],
 )  # fmt: skip
 def test_what_is_hardly_told_is_said(

@@ -14,7 +14,8 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     """The axis of each column by its number, "" of what belongs to all; empty for one axis.
 
     Headers that differ in one word alone make a family: of positions that do not move together
-    the word is the axis. columns: headers and numbers; alike: correlation of the columns, (k, k).
+    the word is the axis; other headers that end alike are of axes by what they begin with, where
+    several begin so. columns: headers and numbers; alike: correlation of the columns, (k, k).
     """
     heads = [head for head, _ in columns]
     words = [words_of(head.name) for head in heads]
@@ -25,16 +26,36 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
                 families.setdefault((*own[:place], "*", *own[place + 1 :]), {})[word] = k
     found = {key: one for key, one in families.items() if len(one) > 1}
     every = list(found.values())
-    best = max(
-        (_positions(one, heads, alike, every, alone=key == ("*",)) for key, one in found.items()),
-        key=len, default=(),
+    key, best = max(
+        ((key, _positions(one, heads, alike, every, alone=key == ("*",)))
+         for key, one in found.items()),
+        key=lambda one: len(one[1]), default=((), ()),
     )  # fmt: skip
     if len(best) < 2:
         return {}
+    end = key[key.index("*") + 1 :]
+    others = _beginnings(words, heads, end, best)
     out = {}
     for (_, number), own in zip(columns, words, strict=True):
         named = [word for word in dict.fromkeys(own) if word in best]
+        named += ["_".join(one) for one in others if tuple(own[: len(one)]) == one]
         out[number] = named[0] if len(named) == 1 else ""
+    return out
+
+
+def _beginnings(
+    words: Sequence[Sequence[str]], heads: Sequence[Header], end: tuple[str, ...],
+    best: Sequence[str],
+) -> list[tuple[str, ...]]:  # fmt: skip
+    """What positions that end as those of the named axes begin with, where others begin so too."""
+    out = list[tuple[str, ...]]()
+    for head, own in zip(heads, words, strict=True):
+        begin = tuple(own[: len(own) - len(end)])
+        if not (end and begin and tuple(own[len(begin) :]) == end and _is_position(head)):
+            continue
+        alike = sum(tuple(other[: len(begin)]) == begin for other in words)
+        if alike > 1 and not set(own) & set(best) and not any(map(says_purpose, begin)):
+            out.append(begin)
     return out
 
 

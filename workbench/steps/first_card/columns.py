@@ -3,17 +3,22 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadLog
+from identification.log import Log
+from identification.signals.check import SHORTEST_LOG
 from identification.signals.differentiate import Motion, resolution
+from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.noise import local_noise
+from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
 from workbench.cards.headers import Header, read_header
-from workbench.logs.faulty_rows import sound_rows, stretches
+from workbench.logs.faulty_rows import several_axes, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
@@ -30,6 +35,8 @@ SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are ap
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
 FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
+ANGLES_WRAP = (2.0 * np.pi, 360.0)
+COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 
 
@@ -142,12 +149,23 @@ def columns_of(log: UnknownLog) -> Columns:
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
+    if (piece := _longest_piece(clock.values)) is not None:
+        usable = [replace(one, values=one.values[piece]) for one in usable]
+        most = float(np.max(np.diff(clock.values)))
+        leap = f"the clock leaps by {most:.4g}, longer than its runs: this is what one shows"
+        log = replace(log, notes=(*log.notes, leap))
+        clock = next(one for one in usable if one.raw.number == clock.raw.number)
     step = float(np.median(np.diff(clock.values)))
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
     left_out |= dict.fromkeys(sorted(clocks), "goes up evenly, as another clock does")
     others = [one for one in usable if one is not clock and one.raw.number not in clocks]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
-    signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
+    whole = [_unwrapped(clock.values, one) for one in others]
+    log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
+    signals = [
+        replace(one, x=_on_grid(clock.values, x, step, grid))
+        for one, (x, _) in zip(others, whole, strict=True)
+    ]
     distinct, twice = _without_doubles(signals)
     own = tuple(_with_axes(distinct))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
@@ -160,16 +178,27 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
         for one in columns:
             if "time" not in one.header.means:
                 continue
-            rows, said = sound_rows(one.values, [other.values for other in columns])
+            beside = [other.values for other in columns if other is not one]
+            rows, said = sound_rows(one.values, beside)
             runs = stretches(one.values[rows])
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = np.flatnonzero(rows)[longest]
             if len(at) < len(one.values) and _ticks(replace(one, values=one.values[at])):
                 if len(runs) > 1:
-                    said = (*said, f"the clock begins again: {len(runs)} runs, of which this is"
-                                   " what the longest shows")  # fmt: skip
+                    told = told_of_starts(one.values[rows], runs)
+                    said = (*said, f"the {told}, of which this is what the longest shows")
                 return [replace(c, values=c.values[at], x=c.values[at]) for c in columns], said
     return list(columns), ()
+
+
+def _longest_piece(t: Array) -> slice | None:
+    """The longest run between the gaps of a clock, where these last longer than the runs."""
+    step = np.diff(t)
+    gaps = step > LONGEST_GAP * np.median(step)
+    if 2.0 * np.sum(step[gaps]) <= t[-1] - t[0]:
+        return None
+    pieces = pairwise([0, *(np.flatnonzero(gaps) + 1).tolist(), len(t)])
+    return slice(*max(pieces, key=lambda piece: piece[1] - piece[0]))
 
 
 def _unusable(one: Column) -> str:
@@ -222,6 +251,11 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
     if not ticking and len(rising) == 1:  # a clock that is uneven, and called something else
         return rising[0]
     if not ticking:
+        cells = [(one.shown, one.values if one.raw.cells is None else one.raw.cells)
+                 for one in (*columns, *texts)]  # fmt: skip
+        for one in columns:
+            if "time" in one.header.means and (said := several_axes(one.values, cells)):
+                raise BadLog(f"{path}: {said}")
         named = [one for one in columns if "time" in one.header.means]
         found = "no column goes up evenly from row to row"
         if named:
@@ -254,6 +288,24 @@ def _wrong_with_clock(t: Array) -> str:
     if np.mean(step == 0.0) > OFTEN_REPEATED:
         return f"repeats its times (data row {row}): they are coarser than the rows"
     return f"does not go up evenly (see data row {row})"
+
+
+def _unwrapped(t: Array, one: Column) -> tuple[Array, str]:
+    """A column (n,), unwrapped as whoever reads a position by a card does where it is a counter or
+    an angle that wraps, and what is said of that; any other as it is."""
+    known = np.isfinite(one.values)
+    may_be = not one.header.means or "position" in one.header.means
+    if not may_be or np.sum(known) < SHORTEST_LOG:
+        return one.values, ""
+    made, found = unwrapped(Log("", {"t": t[known], "y": one.values[known]}), rotary=True)
+    size = found[0].size if found else None
+    counter = size is not None and size in COUNTERS_WRAP
+    if not size or not (counter or any(abs(size / turn - 1.0) < OF_TURN for turn in ANGLES_WRAP)):
+        return one.values, ""
+    x = one.values.copy()
+    x[known] = made["y"]
+    what = f"a counter of {round(np.log2(size))} bits" if counter else "an angle"
+    return x, f"{one.shown} leaps by {size:.7g} {found[0].samples} times, {what}: unwrapped"
 
 
 def _on_grid(t: Array, x: Array, step: float, size: int) -> Array:

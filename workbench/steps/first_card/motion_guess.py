@@ -16,8 +16,8 @@ TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
-CURRENTS = ("current", "strom", "電流", "courant", "corrente", " iq ", " i q ", " isq ", " ia ",
-            " i a ", " amp")  # fmt: skip
+CURRENTS = ("current", "strom", "電流", "电流", "courant", "corrente", " iq ", " i q ", " isq ",
+            " ia ", " i a ", " amp")  # fmt: skip
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 

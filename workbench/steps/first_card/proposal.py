@@ -1,21 +1,28 @@
 """A card proposed for a log that none describes, with the reason of each of its lines."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from identification.errors import BadLog
 from identification.log import RigKind
 from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
-from workbench.steps.first_card.motion_guess import known_motion
+from workbench.steps.first_card.motion_guess import is_current, known_motion
+from workbench.steps.first_card.refusals import (
+    SAID_SO,
+    no_body,
+    of_axis,
+    refuse_resting,
+    refuse_sign_bits,
+    refuse_undriven,
+)
 from workbench.steps.first_card.remarks import (
     BALANCED,
     are_exchanged,
@@ -40,8 +47,8 @@ DRIVEN_BY = {
 }
 VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
-SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
+AMBIENT = 1e5  # Pa
 MOST_OF_AIR = 1.5e6  # Pa, of compressed air; above, pressures are those of oil
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
@@ -138,22 +145,12 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     where no clock is found, no such axis, or no column that moves as a driven body.
     """
     columns = columns_of(read_unknown(path))
-    signals, only = _of_axis(columns, axis)
+    signals, only = of_axis(columns, axis)
     roles = known_roles(signals, only)
     if roles is None:
-        there = ", ".join(one.shown for one in columns.signals) or "none"
-        left_out = "; ".join(
-            f"left out: column {one.shown}: {why}"
-            for one in columns.read if (why := columns.left_out.get(one.raw.number))
-        )  # fmt: skip
-        raise BadLog(
-            f"{path}: no column moves as a body that another one drives (tried: {there}"
-            f"{'; ' if left_out else ''}{left_out}); a position is needed that goes both ways, and"
-            " beside it a force, two pressures or a motor's command; or write the card by hand"
-            " (manual: The card, key by key)"
-        )
-    _refuse_resting(columns, roles)
-    _refuse_sign_bits(columns, roles)
+        raise no_body(columns)
+    refuse_resting(columns, roles)
+    refuse_sign_bits(columns, roles)
     named = re.sub(r"[^\w.-]+", "-", name or path.stem).strip("-.") or "machine"
     found = _of_roles(columns, roles, named)
     y = roles.columns["y"].motion
@@ -161,6 +158,8 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     if roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO:
         share = derivative(y, roles.columns["u"].x).share  # of the command, that is the velocity
         if share > ALL_FOLLOWED:
+            refuse_undriven(columns, roles, share)
+        if share > ALL_FOLLOWED and not is_current(roles.columns["u"]):
             return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
     return replace(found, other=other)
@@ -219,49 +218,6 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
         axis=roles.columns["y"].axis,
         extra=_extra(columns, roles),
     )
-
-
-def _of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Column | None]:
-    """The columns that belong to an axis, and the one that is to be its position, if any."""
-    if axis is None:
-        return columns.signals, None
-    name = axis.strip().casefold()
-    if name in columns.axes:
-        return [one for one in columns.signals if one.axis in ("", name)], None
-    named = [one for one in columns.signals if one.raw.header.strip().casefold() == name]
-    if len(named) == 1:
-        return columns.signals, named[0]
-    there = ", ".join(columns.axes) or "its headers name one alone"
-    raise BadLog(
-        f"{columns.log.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
-        " a position"
-    )
-
-
-def _refuse_sign_bits(columns: Columns, roles: Roles) -> None:
-    """Raises BadLog where a signal's sign is a bit of its own, which no card can undo."""
-    for one in roles.columns.values():
-        found = one.register
-        if found is None or found.sign_bit is None:
-            continue
-        top = 2**found.sign_bit
-        raise BadLog(
-            f"{columns.log.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
-            f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
-            f" write x where x < {top}, else {top} - x, and give that log"
-        )
-
-
-def _refuse_resting(columns: Columns, roles: Roles) -> None:
-    """Raises BadLog where a position by its header stands still, and another column is none."""
-    y = roles.columns["y"]
-    for one in columns.read:
-        why = columns.left_out.get(one.raw.number, "")
-        if why.startswith("is always") and said(one, "y") >= max(SURE, said(y, "y") + 1.0):
-            raise BadLog(
-                f"{columns.log.path}: column {one.shown}, the position by its header, {why}; motion"
-                " needed: check the sensor, or leave the column out"
-            )
 
 
 def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str | None]:
@@ -346,13 +302,13 @@ def _rig(
 
 
 def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
-    """The pressure on the rod's area: the supply's of compressed air, else none."""
+    """The pressure on the rod's area: the ambient one of absolute pressures of air, else none."""
     chambers = [roles.columns[name].values * factor(units[name].unit) for name in ("p_p", "p_n")]
     low, high = min(map(np.nanmin, chambers)), max(map(np.nanmax, chambers))
-    air = low > 0.0 and high < MOST_OF_AIR
-    why = "not in any log: the pressure around the rod; it matters where the areas differ"
-    gauge = "; leave it out where pressures are measured against the ambient one"
-    return RigGuess("supply_pressure_pa", 6e5 if air else None, "Pa", False, why + gauge)
+    air = low > 0.5 * AMBIENT and high < MOST_OF_AIR
+    why = "not in any log: the pressure around the rod, mostly the ambient one; it matters where"
+    why += " the areas differ; leave it out where pressures are measured against that"
+    return RigGuess("supply_pressure_pa", AMBIENT if air else None, "Pa", False, why)
 
 
 def _motor_constant(columns: Columns, force: str) -> RigGuess:

@@ -10,7 +10,7 @@ from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.pairs import ONE_SIGNAL
-from workbench.steps.first_card.roles import Roles
+from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
 
@@ -38,15 +38,20 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
                 f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
                 f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
             )
+    if roles.law.share < MOSTLY_ITS_LAW:
+        yield (
+            f"inertia and friction explain only {roles.law.share:.0%} of what drives: a weight or a"
+            " spring is in it, or it is not what drives this position"
+        )
     behind = behind_reference(roles)
     if behind is not None:
         late = 1e3 * behind * h * columns.grid
-        yield (
-            f"the position is ahead of the reference by {-late:.3g} ms, as no loop makes it: the"
-            " two columns may be the other way round"
-            if are_exchanged(behind)
-            else f"the position follows the reference by {late:.3g} ms"
-        )
+        said = f"the position follows the reference by {late:.3g} ms"
+        if late < 0.0:
+            said = f"the position is ahead of the reference by {-late:.3g} ms"
+        if are_exchanged(behind):
+            said += ", as no loop makes it: the two columns may be the other way round"
+        yield said
 
 
 def behind_reference(roles: Roles) -> float | None:
@@ -75,7 +80,7 @@ def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
     gaps = int(np.sum(steps > 5.0 * h))
     if gaps:
         many = f"{gaps} gap" + ("s" if gaps > 1 else "")
-        yield f"{many} in the clock, the longest of {float(np.max(steps)):.3g} s"
+        yield f"{many} in the clock, the longest of {float(np.max(steps)):.4g} s"
 
 
 def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:

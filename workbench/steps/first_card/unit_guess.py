@@ -23,6 +23,7 @@ from workbench.steps.first_card.motion_guess import (
     is_current,
     unit_by_turn,
 )
+from workbench.steps.first_card.registers import BITS
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
 
@@ -49,6 +50,7 @@ ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
 NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
 COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
+REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
 SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
 SENSOR_OUTPUTS = ("command", "count")
 
@@ -265,7 +267,7 @@ def by_reference(
     unit = "V" if y.header.unit and y.header.unit.quantity == "command" else "count"
     per = "turn" if motion == "rotary" else "mm"
     turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
-    if turn is not None:
+    if turn is not None and turn not in REGISTERS:
         return UnitGuess(unit, f"{turn} count/turn", True, "it leaps back after a turn")
 
     def guess(number: float, why: str, rival: float | None = None) -> UnitGuess:
@@ -282,11 +284,14 @@ def by_reference(
             number = _sensible(_slow_ratio(y.x, r.x), per == "turn")
             return guess(number, f"by its size beside the reference {r.shown}")
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
+    if turn is not None:
+        return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
     why, width = "not in the log: see the sensor's data sheet", float(np.ptp(y.numbers))
     if unit == "V":
         return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
     span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
-    if motion == "rotary" and width > NEARLY_A_TURN * span and span in COUNTS_OF_A_TURN:
+    whole = width > NEARLY_A_TURN * span and float(np.min(y.numbers)) >= 0.0
+    if motion == "rotary" and whole and span in COUNTS_OF_A_TURN:
         return guess(span, f"it spans nearly {span:.9g}, a turn it may be", number)
     return guess(number, why, other)
 
@@ -346,4 +351,6 @@ def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGue
     if slope is not None and {"y", "v"} <= given.keys():
         rate = _sensible(slope * factor(given["v"].unit) / metre(given["y"].unit, given["y"]))
         why = "by the velocity and the position"
+    elif slope is not None and not {"y", "v"} & given.keys():
+        rate, why = _sensible(slope), "by the velocity, if it is the position's unit a second"
     return UnitGuess("1", f"{rate:.9g} 1/s", False, why)

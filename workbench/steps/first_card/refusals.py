@@ -1,0 +1,95 @@
+"""Logs of which no card is proposed, each with its reason; and the columns of one axis."""
+
+from collections.abc import Sequence
+
+from identification.errors import BadLog
+from workbench.cards.headers import words_of
+from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.motion_guess import is_current
+from workbench.steps.first_card.roles import Roles
+from workbench.steps.first_card.weights import SURE, said
+
+SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
+
+
+def no_body(columns: Columns) -> BadLog:
+    """The one line for a log of which no column moves as a body that is driven."""
+    there = ", ".join(one.shown for one in columns.signals) or "none"
+    left_out = "; ".join(
+        f"left out: column {one.shown}: {why}"
+        for one in columns.read if (why := columns.left_out.get(one.raw.number))
+    )  # fmt: skip
+    return BadLog(
+        f"{columns.log.path}: no column moves as a body that another one drives (tried: {there}"
+        f"{'; ' if left_out else ''}{left_out}); a position is needed that goes both ways, and"
+        " beside it a force, two pressures or a motor's command; or write the card by hand"
+        " (manual: The card, key by key)"
+    )
+
+
+def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Column | None]:
+    """The columns that belong to an axis, and the one that is to be its position, if any."""
+    if axis is None:
+        return columns.signals, None
+    name = axis.strip().casefold()
+    called = words_of(name)
+    places = [one.axis for one in columns.signals if one.axis and _has(one, called)]
+    own = {name} & set(columns.axes) or set(places)
+    if len(own) == 1:
+        (name,) = own
+        return [one for one in columns.signals if one.axis in ("", name)], None
+    named = [one for one in columns.signals if one.raw.header.strip().casefold() == name]
+    if len(named) == 1:
+        return columns.signals, named[0]
+    there = ", ".join(columns.axes) or "its headers name one alone"
+    raise BadLog(
+        f"{columns.log.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
+        " a position"
+    )
+
+
+def _has(one: Column, words: Sequence[str]) -> bool:
+    """Whether a header has these words one after the other."""
+    text = f" {' '.join(words_of(one.raw.header))} "
+    return bool(words) and f" {' '.join(words)} " in text
+
+
+def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:
+    """Raises BadLog where a command is always 0 and the current is what the motor makes that the
+    body turns: the velocity alone (share), against it."""
+    if not is_current(roles.columns["u"]) or roles.signs["u"] > 0.0:
+        return
+    for one in columns.read:
+        if columns.left_out.get(one.raw.number) == "is always 0" and said(one, "u") >= SAID_SO:
+            raise BadLog(
+                f"{columns.log.path}: nothing drives: the command {one.shown} is always 0, and"
+                f" {roles.columns['u'].shown} is the velocity alone ({share:.0%}), against it, as"
+                " of a motor that the body turns, whose braking is no friction; log a run with a"
+                " command"
+            )
+
+
+def refuse_sign_bits(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where a signal's sign is a bit of its own, which no card can undo."""
+    for one in roles.columns.values():
+        found = one.register
+        if found is None or found.sign_bit is None:
+            continue
+        top = 2**found.sign_bit
+        raise BadLog(
+            f"{columns.log.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
+            f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
+            f" write x where x < {top}, else {top} - x, and give that log"
+        )
+
+
+def refuse_resting(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where a position by its header stands still, and another column is none."""
+    y = roles.columns["y"]
+    for one in columns.read:
+        why = columns.left_out.get(one.raw.number, "")
+        if why.startswith("is always") and said(one, "y") >= max(SURE, said(y, "y") + 1.0):
+            raise BadLog(
+                f"{columns.log.path}: column {one.shown}, the position by its header, {why}; motion"
+                " needed: check the sensor, or leave the column out"
+            )
