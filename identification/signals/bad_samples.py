@@ -49,9 +49,12 @@ class BadSamples:
         if self.kind == "saturated" and self.signal == "u":
             return f"{self.log}: the command is at its limit in {self.samples} samples, {when}"
         if self.kind == "saturated":
+            where = "at an end of its range"
+            if self.done == "kept":
+                where = "at its largest or smallest value"
             return (
-                f"{self.log}: the sensor of {self.signal!r} is at an end of its range in"
-                f" {self.samples} samples, {when}: {self.done}"
+                f"{self.log}: the sensor of {self.signal!r} is {where} in {self.samples} samples,"
+                f" {when}: {self.done}"
             )
         return f"{self.log}: {self.signal!r} has {_SAID[self.kind]} at {when}{many}: {self.done}"
 
