@@ -120,16 +120,39 @@ def estimates(
     units = units_of(rig.motion, rig.command_unit)
     found = {}
     for name, value in values.items():
-        reason = silent_reason(name, events, log)
+        reason = silent_reason(name, events, log) or _no_stick(name, values, sd)
         if reason:
             found[name] = Estimate(None, units[name], reason=reason, assumed=value)
         else:
-            bounds = (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf)
+            low = _least_stick(name, values, sd) if name.startswith("F_s") else 0.0
+            bounds = (-np.inf, -low) if name in NEGATIVE else (low, np.inf)
             found[name] = reported_estimate(
                 value, units[name], sd[name], bounds=bounds, beside=_beside(name, values, events),
                 at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
             )  # fmt: skip
     return found
+
+
+def _least_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]) -> float:
+    """What the stick limit of a parameter's direction is at least, without its sign: the Coulomb
+    level, by the lower end of its 95 % interval. Ours; of the model, F_s >= F_c: Karnopp, J. Dyn.
+    Sys. 107 (1985) 100."""
+    level = "F_cn" if name.endswith("n") else "F_cp"
+    return max(values.get(level, 0.0) - NORMAL_95 * (sd.get(level) or 0.0), 0.0)
+
+
+def _no_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]) -> str | None:
+    """Reason why a stick limit, and the band in which it acts, are none that a body can have."""
+    if not name.startswith(("F_s", "dv")):
+        return None
+    limit = "F_sn" if name.endswith("n") else "F_sp"
+    least = _least_stick(name, values, sd)
+    if limit not in values or abs(values[limit]) >= least:
+        return None
+    return (
+        f"found {limit} = {values[limit]:.3g}, below the Coulomb level ({least:.3g} at least),"
+        f" which no stick limit is: not identifiable from these logs; {EXCITE}"
+    )
 
 
 def silent_reason(name: str, events: Events, log: str) -> str | None:

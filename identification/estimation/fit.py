@@ -39,6 +39,7 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.row_fit import rough
 from identification.estimation.run_or_equation import answered
 from identification.estimation.settling import settled
+from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
@@ -229,7 +230,7 @@ def finished(
     """
     search, other, forced_rng = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
-        return fit_imposed(recorded, PRESCRIBED_WHY)
+        return as_sliding_shows(fit_imposed(recorded, PRESCRIBED_WHY), recorded)
     # A motor's stops are searched already.
     hopeless = loose(found.plant, recorded.drive) and rough(found.outcomes)
     followed = found.misfit <= COMPLETE and not found.imposed
@@ -242,7 +243,7 @@ def finished(
             start = plain_structure(forced, other)
             again = finished(start, forced, forced_rng, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
-    return answered(found, recorded, report, quick=quick)
+    return as_sliding_shows(answered(found, recorded, report, quick=quick), recorded)
 
 
 def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> KarnoppFit:

@@ -13,7 +13,7 @@ _SAID: dict[Kind, str] = {
     "jump": "a jump that stays",
     "wrap": "a counter that wraps",
     "frozen": "a value that stands still",
-    "saturated": "a command at its limit",
+    "saturated": "an end of its range",
 }
 
 
@@ -46,8 +46,16 @@ class BadSamples:
             when += f" to {self.last:.6g} s"
         size = "" if self.size is None else f", {self.size:.3g} at most"
         many = f" ({self.samples} samples{size})"
-        if self.kind == "saturated" and self.done == "kept":
+        if self.kind == "saturated" and self.signal == "u":
             return f"{self.log}: the command is at its limit in {self.samples} samples, {when}"
+        if self.kind == "saturated":
+            where = "at an end of its range"
+            if self.done == "kept":
+                where = "at its largest or smallest value"
+            return (
+                f"{self.log}: the sensor of {self.signal!r} is {where} in {self.samples} samples,"
+                f" {when}: {self.done}"
+            )
         return f"{self.log}: {self.signal!r} has {_SAID[self.kind]} at {when}{many}: {self.done}"
 
 

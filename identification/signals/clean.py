@@ -13,18 +13,16 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
+from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
-from identification.signals.check import check_time
 from identification.signals.even_clock import (
     LONGEST_GAP,
     even_clock,
     gaps_in,
     in_counts,
-    is_even,
-    is_even_between_gaps,
     told_of_hours,
 )
-from identification.signals.frozen import frozen
+from identification.signals.frozen import clipped, frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
 from identification.signals.steps import beside_gaps, small_spikes, white_noise
@@ -76,16 +74,13 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         return Prepared(runs, remarks, bad)
     runs = _moving(runs)
     lost = log.duration - sum(run.duration for run in runs)
-    text = f"{log.name}: uneven clock, resampled every {1e3 * log.h:.3g} ms"
+    said = list[str]()
     filled = [run.lost for run in runs if run.lost is not None]
     if filled:
         share = float(np.mean(np.concatenate(filled)))
-        text = f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated"
-    if any(one.done == "cut out" for one in bad) and all(is_even(run["t"]) for run in runs):
-        text = f"{log.name}: cut where samples are bad"
-    elif len(runs) > 1 and is_even_between_gaps(log["t"], log.h):
-        text = f"{log.name}: cut at the gaps of its clock"
-    said = [text]
+        said.append(f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated")
+    elif not all(np.all(np.isin(run["t"], log["t"])) for run in runs):
+        said.append(f"{log.name}: uneven clock, resampled every {1e3 * log.h:.3g} ms")
     if len(runs) > 1 or lost > LONGEST_GAP * log.h:
         hours = told_of_hours(gaps_in(log["t"], log.h), log.h)
         said.append(
@@ -137,7 +132,8 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     if "y" in log:
         log, jumped = without_jumps(log, rotary)
         bad.extend(jumped)
-    bad += _limits(log)
+    log, ends = _within_range(log, first_row)
+    bad += ends
     told = [one for one in bad if one.done != "interpolated"]
     return Repaired(log, (*remarks, *lines(told)), tuple(bad))
 
@@ -215,7 +211,7 @@ def _left_out(log: Log, lost: Mask, away: Mask, first_row: int) -> Log:
     they are few."""
     if not np.any(lost | away):
         return log
-    wide = np.convolve(away, np.ones(_SHORTEST_CUT // 2 + 1), mode="same") > 0.5
+    wide = _widened(away)
     if (wide | lost).mean() > _MOST_CUT:
         faulty = lost | away
         raise BadLog(
@@ -224,6 +220,11 @@ def _left_out(log: Log, lost: Mask, away: Mask, first_row: int) -> Log:
             f" {_MOST_CUT:.0%} are left out; check the sensor and its cable"
         )
     return Log(log.name, {key: x[~(wide | lost)] for key, x in log.signals.items()})
+
+
+def _widened(away: Mask) -> Mask:
+    """These rows with their neighbours, so that what is cut out is a gap of the clock, (n,)."""
+    return np.convolve(away, np.ones(_SHORTEST_CUT // 2 + 1), mode="same") > 0.5
 
 
 def _found(
@@ -243,12 +244,29 @@ def _found(
     ]
 
 
-def _limits(log: Log) -> list[BadSamples]:
-    """Where the command stands at its largest or smallest value: reported, and kept."""
-    return limits(log, "u") if "u" in log else []
+def _within_range(log: Log, first_row: int) -> tuple[Log, list[BadSamples]]:
+    """The log without the rows in which its force sensor is at an end of its range, and where that
+    is; where its command is at its limit, which is kept.
+
+    Raises BadLog where no run is left.
+    """
+    ends = limits(log, "u") if "u" in log else []
+    if "F" not in log or _commanded(log) or not np.any(at := clipped(log["F"])):
+        return log, ends
+    # Beside these rows, those are left whose noise was not up to the end.
+    kept = np.flatnonzero(np.convolve(at, np.ones(2 * _SHORTEST_CUT + 1), mode="same") < 0.5)
+    if max(map(len, np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1))) < SHORTEST_LOG:
+        raise BadLog(
+            f"{log.name}: the sensor of F is at an end of its range ({log['F'].min():g} or"
+            f" {log['F'].max():g}) in {at.mean():.0%} of the rows, first in row"
+            f" {first_row + int(np.argmax(at))}, and no {SHORTEST_LOG} rows in a row are without;"
+            " log gentler motion, or use a sensor of a larger range"
+        )
+    left = Log(log.name, {key: x[kept] for key, x in log.signals.items()})
+    return left, ends + limits(log, "F", "cut out")
 
 
-def limits(log: Log, name: str) -> list[BadSamples]:
+def limits(log: Log, name: str, done: Done = "kept") -> list[BadSamples]:
     """Where a signal stands at its largest or smallest value for several samples, a finding each.
 
     Of a sensor of a force or pressure that is its range's end; a position may rest there.
@@ -263,7 +281,7 @@ def limits(log: Log, name: str) -> list[BadSamples]:
         if np.count_nonzero(at[1:] & at[:-1]) >= LONGEST_REPAIR:
             t, count = log["t"][at], int(at.sum())
             first, last = float(t[0]), float(t[-1])
-            out.append(BadSamples(log.name, name, "saturated", first, last, count, None, "kept"))
+            out.append(BadSamples(log.name, name, "saturated", first, last, count, None, done))
     return out
 
 

@@ -68,11 +68,6 @@ def gaps_in(t: Array, h: float) -> Array:
     return np.asarray(step[step > LONGEST_GAP * h])
 
 
-def is_even_between_gaps(t: Array, h: float) -> bool:
-    """Whether a clock t (n,) [s] of period h [s] is even but for its gaps."""
-    return all(is_even(t[a:b]) for a, b in pairwise(_borders(t, h)) if b - a > 1)
-
-
 def is_even(t: Array) -> bool:
     """Whether a clock t (n,) [s] is even to 1e-3 of its period."""
     grid = np.linspace(t[0], t[-1], len(t))

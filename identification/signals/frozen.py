@@ -20,6 +20,9 @@ DROP_LEAPS = 5.0  # times the median step, that a value that drops out leaps
 STEADY_SPEED = 1.5  # ratio of the speeds before and after
 SLOW_BLOCK = 24  # samples that give a signal's noise at their speed
 CLOCK_SHARE = 0.1  # of a sample, by which a clock may jitter
+ROUNDING_SHOWS = (
+    1.4  # counts of noise, more than rounding makes: third differences of 4 at most are 1.33
+)
 INFORMATIVE_PART = 0.05  # of these blocks, that have to show the noise
 SPEED_AROUND = 8  # samples to either side, whose speed is looked at
 
@@ -36,7 +39,7 @@ def noise_shows(x: Array, still: NDArray[np.bool_]) -> bool:
         return False
     ends = moves[: (len(noise) + 1) * SLOW_BLOCK : SLOW_BLOCK]
     step = np.abs(np.diff(ends, append=moves[-1])[: len(noise)]) / SLOW_BLOCK
-    shown = noise > np.maximum(resolution(x), CLOCK_SHARE * step)
+    shown = noise > np.maximum(ROUNDING_SHOWS * resolution(x), CLOCK_SHARE * step)
     return float(np.mean(shown)) > INFORMATIVE_PART
 
 
@@ -53,12 +56,7 @@ def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
     long = high - low >= MANY_OF_A_KIND
     if not np.any(long):
         return out
-    repeats = int(np.sum((high - low - 1)[~long]))
-    bend = np.diff(x, 2)
-    bend = bend[bend != 0.0]
-    noisy = repeats <= REPEATS_ELSEWHERE * len(x) and len(bend) > len(x) // 2
-    noisy = noisy and float(np.mean(bend[1:] * bend[:-1] < 0.0)) > LIKE_NOISE
-    noisy = noisy and noise_shows(x, within(low[long], high[long], len(x)))
+    noisy = _repeats_nothing_else(x, within(low[long], high[long], len(x)))
     for a, b in zip(low[long].tolist(), high[long].tolist(), strict=True):
         if at_limits and x[a] in (x.min(), x.max()):
             continue
@@ -66,6 +64,27 @@ def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
         if (noisy and (not off or _dropped(x, a, b))) or _caught_up(x, a, b):
             out[a:b] = True
     return out if out.mean() <= MOST_FROZEN else np.zeros_like(out)
+
+
+def clipped(x: Array) -> NDArray[np.bool_]:
+    """Where a sensor stands at an end of its range, (n,): it repeats its largest or its smallest
+    value, and no other, though its noise shows."""
+    end = (x == x.min()) | (x == x.max())
+    few = np.count_nonzero(end[1:] & (np.diff(x) == 0.0)) < MANY_OF_A_KIND
+    return np.zeros_like(end) if few or not _repeats_nothing_else(x, end) else end
+
+
+def _repeats_nothing_else(x: Array, still: NDArray[np.bool_]) -> bool:
+    """Whether a signal's noise shows, and it repeats next to no value but in these samples."""
+    repeats = int(np.count_nonzero((np.diff(x) == 0.0) & ~(still[1:] & still[:-1])))
+    bend = np.diff(x, 2)
+    bend = bend[bend != 0.0]
+    return (
+        repeats <= REPEATS_ELSEWHERE * len(x)
+        and len(bend) > len(x) // 2
+        and float(np.mean(bend[1:] * bend[:-1] < 0.0)) > LIKE_NOISE
+        and noise_shows(x, still)
+    )
 
 
 def within(low: NDArray[np.intp], high: NDArray[np.intp], n: int) -> NDArray[np.bool_]:

@@ -9,7 +9,6 @@ import numpy as np
 from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import NotIdentifiable
 from identification.log import Log
-from identification.signals.differentiate import resolution
 from identification.signals.noise import local_noise
 from identification.velocity.model import Valve, moved
 
@@ -135,7 +134,7 @@ def recorded(logs: Sequence[Log]) -> Record:
 
 def _noise(y: Array) -> float:
     """Deviation of a sensor's error [m]: its white noise, and the counts of an encoder."""
-    return float(np.hypot(local_noise(y), resolution(y) / np.sqrt(12.0)))
+    return local_noise(y)
 
 
 def folds(record: Record, count: int) -> IntArray:

@@ -90,8 +90,9 @@ def identify(
     )
     friction = [fit.estimates[n].value for n in NAMES if n in fit.estimates]
     if fit.surroundings.none and all(value is None for value in friction):
-        first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
-        raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
+        reasons = {n: fit.estimates[n].reason for n in ("m", "F_cp") if n in fit.estimates}
+        first = "; ".join(f"{n}: {reason}" for n, reason in reasons.items())
+        raise NotIdentifiable(f"none of the nine parameters is identifiable: {first}")
     plant, reason = arx_or_reason(logs, options)
     model = Model(
         card=card,

@@ -19,10 +19,15 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.weighted_rows import least_squares, solve_rows
 from identification.log import Log
 from identification.signals.clock_jitter import position_noise
-from identification.signals.differentiate import Motion, differentiate, resolution
+from identification.signals.differentiate import Motion, differentiate
 from identification.signals.force_random_walk import force_random_walk
 from identification.signals.intersample import kinks
-from identification.signals.noise import local_noise, noise_of_lost_rows, quiet_part
+from identification.signals.noise import (
+    local_noise,
+    noise_of_lost_rows,
+    quiet_part,
+    rounding_of_force,
+)
 from identification.signals.weak_form import all_windows, noise_gain, sliding_windows, weights
 
 WINDOW_SECONDS = 0.06  # of a window
@@ -111,7 +116,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
 
 def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNoise:
     """The noise of a log as its signals by themselves show it."""
-    quiet = max(local_noise(log["y"]), resolution(log["y"]) / np.sqrt(12.0))
+    quiet = local_noise(log["y"])
     # A position that stands for a fifth of its log to the last digit hides its noise there.
     y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
     unsteady = position_noise(log["y"], motion.v)
@@ -121,7 +126,7 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNois
         unlogged = 0.0 if log.lost is None else noise_of_lost_rows(log["F"], log.lost)
         F = float(np.sqrt(_beside_control(log) ** 2 + between**2 + unlogged**2))
     else:
-        F = local_noise(log["F"])
+        F = max(local_noise(log["F"]), rounding_of_force(log))
     return LogNoise(y, 0.0 if unsteady is None else unsteady.jitter, motion.v_noise, F, between)
 
 
@@ -199,4 +204,4 @@ def _unexplained(one: MotionLog) -> float:
     k1, k2, _ = solve_rows(actuator(one, np.array([1.0, 0.0, 0.0]))).theta
     h = one.log.h
     force = one.log["F"] - k1 * integral(one.log["u"], h) + k2 * one.signals["smooth"]
-    return local_noise(force)
+    return max(local_noise(force), rounding_of_force(one.log))

@@ -94,3 +94,20 @@ def test_next_to_nothing_is_no_friction_however_narrow_its_interval() -> None:
         assert found[name].value is None
         assert "not significantly different from 0" in (found[name].reason or "")
     assert found["F_cn"].value == tiny["F_cn"]
+
+
+def test_a_stick_limit_below_the_coulomb_level_is_none_nor_is_its_band() -> None:
+    values = {**VALUES, "F_sn": -0.9 * VALUES["F_cn"]}
+    found = estimates(values, spread(0.01), PLENTY, Rig("force"), "log")
+    for name in ("F_sn", "dv_n"):
+        assert found[name].value is None
+        assert "below the Coulomb level" in (found[name].reason or "")
+    assert found["F_sp"].value is not None
+    assert found["dv_p"].value is not None
+
+
+def test_an_interval_of_a_stick_limit_ends_at_the_coulomb_level() -> None:
+    values = {**VALUES, "F_sn": -VALUES["F_cn"]}
+    found = estimates(values, {**spread(0.01), "F_sn": 0.1 * VALUES["F_cn"]}, PLENTY, Rig("force"),
+                      "log")["F_sn"]  # fmt: skip
+    assert found.high == pytest.approx(-(1.0 - 1.96 * 0.01) * VALUES["F_cn"], rel=1e-3)

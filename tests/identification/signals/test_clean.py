@@ -363,3 +363,33 @@ def test_a_command_at_its_limit_is_told_and_kept() -> None:
     made = prepare(log.with_signals(u=u), RIG)
     assert {(one.kind, one.done) for one in made.bad} == {("saturated", "kept")}
     np.testing.assert_array_equal(made.runs[0]["u"], u)
+
+
+def noisy_force(log: Log) -> Log:
+    noise = 0.05 * np.random.default_rng(0).standard_normal(len(log))
+    return log.with_signals(F=log["F"] + noise)
+
+
+def test_rows_beyond_the_range_of_a_force_sensor_are_cut_out() -> None:
+    log = noisy_force(sliding_log(n=8000, h=0.005))
+    made = prepare(log.with_signals(F=np.clip(log["F"], -10.7, 10.5)), RIG)
+    assert {(one.signal, one.kind, one.done) for one in made.bad} == {("F", "saturated", "cut out")}
+    assert sum(one.samples for one in made.bad) == np.count_nonzero(
+        (log["F"] <= -10.7) | (log["F"] >= 10.5)
+    )
+    assert all(run["F"].min() > -10.7 and run["F"].max() < 10.5 for run in made.runs)
+    assert "'F' is at an end of its range" in made.remarks[0]
+    assert not any("uneven clock" in one for one in made.remarks)
+
+
+def test_a_force_sensor_at_its_end_all_over_is_refused() -> None:
+    log = noisy_force(sliding_log())
+    with pytest.raises(BadLog, match=r"at an end of its range .* in .* larger range"):
+        repair(log.with_signals(F=np.clip(log["F"], -10.0, 10.0)))
+
+
+def test_a_force_that_is_the_command_is_kept_at_its_limit() -> None:
+    log = noisy_force(sliding_log())
+    u = np.clip(log["F"], -10.0, 10.0)
+    made = prepare(log.with_signals(F=2.0 * u, u=u), RIG)
+    assert {(one.signal, one.done) for one in made.bad} == {("u", "kept")}

@@ -7,7 +7,7 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.check import check
-from identification.signals.frozen import frozen
+from identification.signals.frozen import clipped, frozen, noise_shows
 
 
 def motion(noise: float = 1e-5, count: float = 0.0, n: int = 4000) -> Array:
@@ -77,3 +77,25 @@ def test_an_encoder_with_noise_at_rest_is_one_where_it_stands() -> None:
         check(
             Log("encoder", {"t": 1e-3 * np.arange(len(y), dtype=np.float64), "y": y}), Rig("force")
         )
+
+
+def test_a_body_that_creeps_and_rests_shows_no_noise_but_its_rounding() -> None:
+    x = np.resize([5.0, 3.0], 4000) * np.where(np.arange(4000) % 1000 < 300, 0.0, 1.0)
+    x[300:400] = 1.0
+    y = 1e-6 * np.cumsum(x)  # whole counts, to either side of 4 a sample
+    still = x == 0.0
+    assert not noise_shows(y, still)
+    assert noise_shows(y + 1e-6 * np.random.default_rng(0).integers(-4, 5, len(y)), still)
+    check(Log("creep", {"t": 2e-3 * np.arange(len(y), dtype=np.float64), "y": y}), Rig("force"))
+
+
+def test_a_sensor_at_an_end_of_its_range() -> None:
+    force = np.sin(6e-3 * np.arange(4000)) + 0.02 * np.random.default_rng(0).standard_normal(4000)
+    assert not np.any(clipped(force))
+    cut = np.clip(force, -0.9, 0.8)
+    assert np.array_equal(clipped(cut), cut != force)
+
+
+@pytest.mark.parametrize(("noise", "count"), [(0.0, 0.0), (1e-3, 5e-3), (0.0, 1e-4)])
+def test_levels_that_are_repeated_are_no_end_of_a_range(noise: float, count: float) -> None:
+    assert not np.any(clipped(np.clip(motion(noise, count), -0.04, 0.04)))

@@ -99,7 +99,9 @@ def test_bad_samples_are_told(force: tuple[Card, Table], kind: Kind, signal: str
         limit = np.quantile(np.abs(x), 0.8)
         table[signal] = np.clip(x, -limit, limit)
     found = look(card, table)
-    assert (kind, signal) in {(one.kind, one.signal) for one in found.bad}
+    told = [one for one in found.bad if (one.kind, one.signal) == (kind, signal)]
+    assert told
+    assert all(("command" in one.line) == (signal == "u") for one in told if kind == "saturated")
 
 
 def test_gaps_and_jitter_of_the_clock_are_told(force: tuple[Card, Table]) -> None:

@@ -79,7 +79,7 @@ class Column:
     @cached_property
     def noise(self) -> float:
         """White noise and rounding of the column, one sigma."""
-        return float(np.hypot(local_noise(self.x), resolution(self.x) / np.sqrt(12.0)))
+        return local_noise(self.x)
 
     @cached_property
     def levels(self) -> Array:

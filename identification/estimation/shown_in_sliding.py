@@ -1,0 +1,100 @@
+"""What a fit states though steady sliding does not show it: no value, with the reason.
+
+A mass whose inertia is next to nothing of the force or, by the equation, shows as the body turns
+back alone, and Coulomb apart from viscous friction where all sliding has one speed. How a body
+turns back is not in the columns of sliding, and the fit takes one for the other.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import BoolArray
+from identification.estimation.imposed_motion import WHY_NOT
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.equation_rows import FIVE
+from identification.estimation.regression.motion_rows import rows_and_windows
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    least_squares,
+    solve_rows,
+    stacked,
+)
+from identification.log import Rig
+from identification.model.estimates import KarnoppFit
+from identification.model.plant import units_of
+from identification.thresholds import FOURFOLD, HALF, MATERIAL, OF_ACCOUNT
+
+COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
+TURNING_WHY = (
+    "inertia shows where the body turns back alone, in which friction is not that of sliding: the"
+    " mass is not identifiable; log gentler changes of speed"
+)
+ONE_WAY_THROUGHOUT = (
+    1.0 - 1e-9
+)  # share of a window in which a body goes one way that does not turn back
+
+
+def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
+    """The fit without the values of mass and sliding friction that its logs' sliding does not show.
+
+    Source: information of least squares, Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; the rules
+    are ours.
+    """
+    p = fit.friction
+    theta = np.array([getattr(p, name) for name in FIVE])
+    every = stacked([one.rows for one in rows_and_windows(recorded.logs, theta)])
+    if not len(every.b):
+        return fit
+    steady = [np.abs(every.X[:, level]) > ONE_WAY_THROUGHOUT for level, _ in COLUMNS_OF_WAYS]
+    reasons = dict[str, str]()
+    share = abs(p.m) * float(np.std(every.X[:, 0])) / max(float(np.std(every.b)), 1e-300)
+    if fit.estimates["m"].known and share < MATERIAL:
+        reasons["m"] = WHY_NOT["m"].format(share=f"{share:.1%}")
+    elif fit.estimates["m"].known and fit.imposed and _by_turning(every, steady[0] | steady[1], 0):
+        reasons["m"] = TURNING_WHY
+    for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
+        if _by_turning(every, kept, way[1]):
+            reasons |= _together(every.at(kept), way, recorded.rig)
+    return _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
+
+
+def _by_turning(every: Rows, steady: BoolArray, column: int) -> bool:
+    """Whether rows of steady sliding (r,), though they are most of those in which a column is,
+    have next to nothing of the information on its coefficient."""
+    some = every.at(steady)
+    if len(some.b) <= HALF * np.count_nonzero(every.X[:, column]):
+        return False
+    return _information(some, column) < OF_ACCOUNT * _information(every, column)
+
+
+def _information(rows: Rows, column: int) -> float:
+    """Information of these rows on the coefficient of a column beside those of all others."""
+    A = rows.X / rows.sd[:, np.newaxis]
+    others = np.delete(A, column, axis=1)
+    return float(np.sum((A[:, column] - others @ least_squares(others, A[:, column])) ** 2))
+
+
+def _together(steady: Rows, way: tuple[int, int], rig: Rig) -> dict[str, str]:
+    """Why neither of the two of a direction is given, by name; steady: rows of sliding in it."""
+    level, slope = (FIVE[k] for k in way)
+    factor, unit = (1.0, "rad/s") if rig.motion == "rotary" else (1e3, "mm/s")
+    v = factor * float(np.median(np.abs(steady.X[:, way[1]])))
+    force = solve_rows(replace(steady, X=steady.X[:, (0, way[0])])).theta[1]
+    why = (
+        f"sliding of one speed, {v:.3g} {unit}, shows {level} and {slope} together alone,"
+        f" {force:.3g} {units_of(rig.motion)[level]} there; add strokes at other speeds, at least"
+        f" {FOURFOLD:g} times apart"
+    )
+    return {level: why, slope: why}
+
+
+def _without(fit: KarnoppFit, reasons: Mapping[str, str]) -> KarnoppFit:
+    """The fit without these values, by the reason of each."""
+    none = {
+        name: fit.estimates[name].withheld(why, float(getattr(fit.friction, name)))
+        for name, why in reasons.items()
+    }
+    falling = {name: one for name, one in fit.falling.items() if name not in none}
+    return replace(fit, estimates={**fit.estimates, **none}, falling=falling)

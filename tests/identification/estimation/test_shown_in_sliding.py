@@ -1,0 +1,63 @@
+"""What a log's sliding does not show becomes a reason; what it shows stays."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from identification.arrays import Array
+from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.shown_in_sliding import as_sliding_shows
+from identification.log import Log, Rig
+from identification.model.estimates import KarnoppFit
+
+H = 2e-3
+M, F_CP, F_CN, F_VP, F_VN = 5.0, 16.0, 14.0, 22.0, 19.0
+
+
+def fitted(speeds: Array, turning: float) -> KarnoppFit:
+    """The fit of strokes at these speeds [m/s], of half a second each; turning: samples in which
+    the body turns back."""
+    v = np.asarray(gaussian_filter1d(np.repeat(speeds, 250), turning), dtype=np.float64)
+    y, a = np.cumsum(v) * H, np.gradient(v, H)
+    F = M * a + np.where(v > 0, F_CP + F_VP * v, -F_CN + F_VN * v)
+    rng = np.random.default_rng(0)
+    t = H * np.arange(len(v), dtype=np.float64)
+    F, y = F + 0.2 * rng.standard_normal(len(v)), y + 1e-7 * rng.standard_normal(len(v))
+    recorded = recorded_logs(
+        [Log("run.csv", {"t": t, "y": np.asarray(y), "F": np.asarray(F)})], Rig("force"), "force"
+    )
+    return as_sliding_shows(fit_imposed(recorded, "why"), recorded)
+
+
+def test_one_speed_both_ways_shows_a_sum_alone() -> None:
+    found = fitted(0.25 * np.resize([1.0, -1.0], 40), 2.0).estimates
+    assert all(found[name].value is None for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn"))
+    assert found["F_cp"].reason == found["F_vp"].reason
+    sums = f"{F_CP + 0.25 * F_VP:.3g} N", f"{F_CN + 0.25 * F_VN:.3g} N"
+    for name, force in zip(("F_cp", "F_cn"), sums, strict=True):
+        reason = found[name].reason or ""
+        assert "one speed, 250 mm/s" in reason and force in reason and "other speeds" in reason
+    assert "turns back" in (found["m"].reason or "")
+
+
+@pytest.mark.parametrize("turning", [2.0, 40.0])
+def test_strokes_at_several_speeds_show_friction(turning: float) -> None:
+    found = fitted(np.resize([0.05, -0.05, 0.1, -0.1, 0.3, -0.3], 42), turning).estimates
+    for name, value in zip(("F_cp", "F_cn", "F_vp", "F_vn"), (F_CP, F_CN, F_VP, F_VN), strict=True):
+        assert found[name].value == pytest.approx(value, rel=0.1)
+    assert (found["m"].value is None) == (turning < 10.0)
+
+
+def test_one_speed_reached_on_slow_ramps_shows_all_five() -> None:
+    found = fitted(0.25 * np.resize([1.0, -1.0], 40), 40.0).estimates
+    assert found["m"].value == pytest.approx(M, rel=0.05)
+    assert found["F_cp"].value == pytest.approx(F_CP, rel=0.1)
+    assert found["F_vp"].value == pytest.approx(F_VP, rel=0.3)
+
+
+def test_a_mass_of_next_to_no_inertia_is_none() -> None:
+    found = fitted(np.resize([0.001, -0.001, 0.004, -0.004], 40), 10.0)
+    stated = found.estimates["m"]
+    assert stated.value is None
+    assert "inertia explains" in (stated.reason or "")
