@@ -1,11 +1,12 @@
 """What was found beside the plain model, on logs that neither the choice nor the fit has seen."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from identification.estimation.regression.effect_columns import in_columns
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
@@ -19,7 +20,7 @@ from identification.tracing.model_errors import (
     row_noise,
     share_left,
 )
-from identification.tracing.parameter_drift import parameter_drift
+from identification.tracing.parameter_drift import parameter_drift, with_changes
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.probability import Evidence, evidence
@@ -141,7 +142,12 @@ class HeldOut:
         if was is not None and now is not None and now > WORSE * was:
             return f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
         plain = self.plain.model
-        if not self.seen or plain.imposed or self.model.imposed:
+        if (
+            not self.seen
+            or plain.imposed
+            or self.model.imposed
+            or self._measured_force_is_explained
+        ):
             return ""
         worse = predicts_worse(plain.plant, self.model.plant, self.seen, self.drive)
         if worse is None:
@@ -151,23 +157,38 @@ class HeldOut:
             f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)"
         )
 
+    @property
+    def _measured_force_is_explained(self) -> bool:
+        """Whether effects that leave the measured force as it is leave next to nothing of what was
+        missing on the test logs: then it was predicted, and a run that loses its way at a stop says
+        nothing against them."""
+        columns = all(in_columns(step.candidate.effect) for step in self.choice.steps)
+        return columns and self.share <= OF_ACCOUNT
+
     @cached_property
     def missing(self) -> MissingForce | None:
         """The force that either model lacks on the test logs."""
-        own = self.choice.base[MECHANICAL].slowest
-        slowest = max(own, self.choice.start.band, band(self.model))
-        return missing_force(self.plain.model, self.model, self.unseen, slowest)
+        return self._missing(())
+
+    def _missing(self, changed: Sequence[Change]) -> MissingForce | None:
+        """The same with the parameters that have changed as they are on the test logs."""
+        slowest = max(self.choice.base[MECHANICAL].slowest, band(self.model))
+        before = with_changes(self.plain.model, changed)
+        after = before if self.model is self.plain.model else with_changes(self.model, changed)
+        return missing_force(before, after, self.unseen, slowest)
 
     @property
     def evidence(self) -> Evidence:
         """Of the effects found, by the share of the missing force that they leave: none where the
         run leaves nothing but noise; of those that act in stops alone, of which the force while
-        sliding says nothing, by the run's error if that is less."""
+        sliding says nothing, by the run's error if that is less. Of a machine that changed between
+        the logs with what has changed in both models, since no effect is to explain that."""
         steps = self.choice.steps
         if follows(self.was, self.now):
             return evidence(0.0, len(steps))
         of_error = float(np.sqrt(self.share))
-        of_force = None if self.missing is None else self.missing.share_left
+        missing = self._missing(self.changed) if self.changed and steps else self.missing
+        of_force = None if missing is None else missing.share_left
         if of_force is None:
             of_force = of_error
         elif all(step.candidate.effect.place.in_stops for step in steps):

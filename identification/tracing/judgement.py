@@ -18,6 +18,7 @@ from identification.tracing.result import Dependence, Left, Trace
 from identification.tracing.verdict import (
     found_effect,
     next_experiment,
+    parameters_before,
     parameters_of,
     rivals_of,
     verdict_of,
@@ -42,6 +43,7 @@ def judgement(held: HeldOut) -> Trace:
         )
         if levels:
             verdict, changed, doubts = "drift", levels, [how]
+    was = parameters_before if choice.steps else parameters_of
     complete = verdict != "unknown" and predicted(held.now, held.noise)
     unknown = left if verdict == "unknown" else NOTHING
     return Trace(
@@ -57,7 +59,7 @@ def judgement(held: HeldOut) -> Trace:
         unknown=unknown,
         drift=changed,
         next_experiment=next_experiment(verdict, choice, unknown),
-        parameters_before=parameters_of(before, plain.recorded),
+        parameters_before=was(before, plain.recorded),
         parameters_after=parameters_of(after, plain.recorded),
         plant=after.plant,
         residuals=residuals_of(choice),

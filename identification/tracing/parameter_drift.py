@@ -1,6 +1,7 @@
 """Drift: the parameters that changed between two logs, the fewest that bring the error down."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -51,6 +52,17 @@ def parameter_drift(
                     for name, *change in changes(mine, rows, keep, names, blur)
                 ]
     return tuple(out)
+
+
+def with_changes(model: FittedStructure, changed: Sequence[Change]) -> FittedStructure:
+    """A model whose body has changed as another one's did: mass and friction by the same share."""
+    friction = model.plant.friction
+    own = {
+        one.name: getattr(friction, one.name) * one.after / one.before
+        for one in changed
+        if one.name in FIVE and one.before > 0.0
+    }
+    return replace(model, plant=replace(model.plant, friction=replace(friction, **own)))
 
 
 def _blur(stage: EffectRows, equation: str, rows: Rows, keep: BoolArray) -> Array:

@@ -203,8 +203,12 @@ def _chosen(
 
     setting, choice = first(recorded_rows(train, rig, halt))
     share = share_beside(setting.recorded, choice)
-    if share != 0.0:
-        setting, choice = first(recorded_rows(train, rig, halt, share))
+    if share == 0.0:  # or it shows beside several effects alone
+        choice = selection(choice, setting, choose, report)
+        share = 0.0 if halt.reached() else share_beside(setting.recorded, choice)
+        if share == 0.0:
+            return setting, choice
+    setting, choice = first(recorded_rows(train, rig, halt, share))
     return setting, selection(choice, setting, choose, report)
 
 

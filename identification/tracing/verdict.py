@@ -11,6 +11,7 @@ from identification.estimation.regression.effect_rows import EffectRows, with_ef
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
+from identification.estimation.run_or_equation import by_equation_if_surer
 from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.model.estimates import Estimate
@@ -141,6 +142,16 @@ def next_experiment(verdict: TraceVerdict, choice: Choice, left: Dependence) -> 
 def listed(signals: Sequence[str]) -> str:
     """Signals in words, those that no log has with what they are."""
     return ", ".join(SAID.get(name, name) for name in signals)
+
+
+def parameters_before(plain: FittedStructure, recorded: RecordedLogs) -> dict[str, Estimate]:
+    """`parameters_of` the plain model beside effects: where its run leaves clearly more of the
+    equation of motion than this does by itself, those of the equation, as a fit would give them."""
+    told, fit = parameters_of(plain, recorded), None
+    if plain.fit is None and not plain.imposed:
+        fit = by_equation_if_surer(plain.plant.friction, recorded)
+    surer = {} if fit is None else {k: e for k, e in fit.estimates.items() if e.value is not None}
+    return {**told, **surer}
 
 
 def parameters_of(model: FittedStructure, recorded: RecordedLogs) -> dict[str, Estimate]:

@@ -336,6 +336,8 @@ def test_material() -> None:
     assert (
         significant_share(0.3, 0.01, 0.008) == 0.0 and significant_share(0.3, 0.01, 0.0125) == 0.3
     )
+    # What is beyond half a step is no more to it, where half explains all but this of the square.
+    assert significant_share(0.54, 0.005, 0.9) == 0.5 and significant_share(0.57, 0.005, 0.9) == 0.0
 
 
 def rivals(gain: float, mine: float) -> int:

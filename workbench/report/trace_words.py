@@ -160,7 +160,9 @@ def share_explained(traced: Traced) -> str:
     if found.complete:
         return f" {it} all of what was missing {where}, down to the sensors' noise."
     rest = "the rest depends on none of the signals"
-    if found.left.depends_on:
+    if found.verdict == "effect" and found.drift:
+        rest = "the machine has changed beside"
+    elif found.left.depends_on:
         rest = f"the rest depends on {listed(found.left.depends_on)}"
     return f" {it} {100 - share:.3g} % of what was missing {where}; {rest}."
 

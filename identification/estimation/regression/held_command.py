@@ -65,10 +65,15 @@ def _rate_column(one: MotionLog) -> Array:
 
 
 def significant_share(share: float, sd: float, gain: float) -> float:
-    """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
+    """The share (with its deviation), 0 where it is none; gain: part of the square it explains.
+
+    A drive's own lag adds to it: what is beyond the largest share is not missed where this explains
+    as much but for an immaterial part of the square.
+    """
     if share < BEYOND_CHANCE * sd or gain < MATERIAL:
         return 0.0
-    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + BEYOND_CHANCE * sd else 0.0
+    beyond = max(BEYOND_CHANCE * sd, share * MATERIAL**0.5)
+    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + beyond else 0.0
 
 
 def between_samples(log: Log, share: float, held: bool) -> Log:

@@ -18,7 +18,7 @@ from identification.model.plant import Plant
 from identification.progress import Halt
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, EARNS, HOPELESS, OF_ACCOUNT
 from identification.tracing.plain_model import PlainModel
-from identification.tracing.regression.stepwise import Choice, Step, with_candidate
+from identification.tracing.regression.stepwise import Choice, Step, scaled_as, with_candidate
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,5 +155,5 @@ def with_steps(
     """The stage with these effects in it, and what it leaves."""
     stage, outcomes = start, first
     for step in steps:
-        stage, outcomes = with_candidate(stage, step.candidate)
+        stage, outcomes = with_candidate(scaled_as(step, stage), step.candidate)
     return stage, outcomes

@@ -18,8 +18,9 @@ from identification.estimation.windowed_run.parameters import loose
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without
 from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.library_search import ABSORBED
 from identification.tracing.regression.shape_grid import median_rest, shape_grid
-from identification.tracing.regression.stepwise import ABSORBED, Choice, Step, gives_way
+from identification.tracing.regression.stepwise import Choice, Step, gives_way
 
 RIGID_CONTACT = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 RIVALS_TRIED = 3  # rivals of an effect taken that are tried in its place

@@ -1,7 +1,6 @@
 """Which effects are missing: forward selection with exchange, against a calibrated threshold."""
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -38,19 +37,15 @@ from identification.progress import Halted, Progress
 from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
 from identification.tracing.regression.candidates import (
     EffectCandidate,
-    FirstShape,
     best_of,
-    first_shape,
-    refined,
 )
 from identification.tracing.regression.cross_validation import left_out_error
+from identification.tracing.regression.library_search import at_own_scale, of_sliding, scales_of
 from identification.tracing.regression.significance import by_luck, chance
 
-ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
-IN_SIGHT = 0.1  # of what the best shape of any effect's grid gains, from which a shape is refined
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
 FURTHER_EFFECT = "a further effect beside the first"
@@ -106,7 +101,7 @@ def choose(
         stage, base, steps, tried = begun.end, begun.base, list(begun.steps), begun.tried
     try:
         for turn in range(len(steps), most):
-            tried = all_candidates(stage, base, library, partial(_report, report, turn))
+            tried = at_own_scale(stage, base, library, partial(_report, report, turn))
             found = accepted(tried, stage, base, rng)
             if found is None:
                 break
@@ -133,8 +128,9 @@ def accepted(
         if step is None:
             return None
         after, left = with_candidate(step.stage, step.candidate)
-        both = base.keys() & left.keys()
-        if sum(left[e].criterion for e in both) <= sum(base[e].criterion for e in both):
+        without = base_fits(replace(stage, scales=after.scales))
+        both = without.keys() & left.keys()
+        if sum(left[e].criterion for e in both) <= sum(without[e].criterion for e in both):
             return step, after, left
         key = step.candidate.effect.key
         tried = [one for one in tried if one.effect.key != key]
@@ -156,7 +152,7 @@ def trusted(
     error = left_out_error(stage, slowest)
     missing = mean_square(base[MECHANICAL]) - 1.0
     for step in steps:
-        after, found = with_candidate(stage, step.candidate)
+        after, found = with_candidate(scaled_as(step, stage), step.candidate)
         without = left_out_error(after, slowest)
         if error > 0 and MECHANICAL in step.candidate.outcomes:
             less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
@@ -202,36 +198,14 @@ def polished(
             del best[effect.key]
         else:
             best[effect.key] = replace(best[effect.key], values=candidate.values)
-    after, found = settled_fits(replace(stage, chosen=kept(), scales={}))
+    after, found = settled_fits(of_sliding(replace(stage, chosen=kept()), stage.scale(MECHANICAL)))
     left = [s for s in steps if s.candidate.effect.key in best]
     return after, found, [replace(s, candidate=best[s.candidate.effect.key]) for s in left]
 
 
-def all_candidates(
-    stage: EffectRows, base: Mapping[str, RowFit], library: Library, report: Callable[[float], None]
-) -> list[EffectCandidate]:
-    """Every effect of the library that is not in the stage yet, beside it: at its best, or as it
-    begins where that is far behind another's begin."""
-    taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
-    keys = [k for k in library if k not in taken and k not in ABSORBED]
-    with ThreadPoolExecutor(2) as pool:
-        starts = []
-        for i, start in enumerate(
-            pool.map(lambda key: first_shape(stage, library[key], base), keys)
-        ):
-            starts += [] if start is None else [start]
-            report(0.5 * (i + 1) / len(keys))
-        least = IN_SIGHT * max((start.gain for start in starts), default=0.0)
-
-        def done(start: FirstShape) -> EffectCandidate | None:
-            near = start.by_rounds or start.gain >= least
-            return refined(start) if near else start.candidate(start.shape)
-
-        found: list[EffectCandidate] = []
-        for i, candidate in enumerate(pool.map(done, starts)):
-            found += [] if candidate is None else [candidate]
-            report(0.5 + 0.5 * (i + 1) / len(starts))
-    return found
+def scaled_as(step: Step, stage: EffectRows) -> EffectRows:
+    """The stage at the scale of a step."""
+    return of_sliding(stage, step.stage.scale(MECHANICAL))
 
 
 def next_step(
@@ -340,15 +314,6 @@ def explained_part(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> fl
     return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
 
 
-def scales_of(found: Sequence[EffectCandidate], base: Mapping[str, RowFit]) -> dict[str, float]:
-    """Square that the best candidate leaves in each equation, 1 at least: what is noise to all."""
-    out = {}
-    for equation, o in base.items():
-        options = [c.outcomes[equation] for c in found if equation in c.outcomes] + [o]
-        out[equation] = max(1.0, min(mean_square(x) for x in options))
-    return out
-
-
 def rescaled(
     stage: EffectRows, candidate: EffectCandidate, base: Mapping[str, RowFit]
 ) -> EffectCandidate:
@@ -408,8 +373,9 @@ def shift_rms(candidate: EffectCandidate, stage: EffectRows, one: MotionLog) -> 
 def with_candidate(
     stage: EffectRows, candidate: EffectCandidate
 ) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The stage with the effect in it, fitted, and what it leaves."""
-    return settled_fits(replace(absorb(stage, candidate), scales={}))
+    """The stage with the effect in it, fitted, and what it leaves; sliding at the stage's scale, or
+    the rows in which the effect is might be left out again."""
+    return settled_fits(of_sliding(absorb(stage, candidate), stage.scale(MECHANICAL)))
 
 
 def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:

@@ -14,6 +14,7 @@ from identification.estimation.estimates import HELD, of_effect
 from identification.log import Rig
 from identification.model.karnopp import NAMES
 from identification.tracing.result import (
+    Change,
     Dependence,
     Errors,
     FreeCurve,
@@ -195,6 +196,14 @@ def test_an_effect_that_is_not_all_is_told_with_its_share_and_the_rest() -> None
     said = trace_sentence(traced(alone, tested=False))
     assert "It explains 70 % of what was missing on the stretches left out" in said
     assert "the rest depends on none of the signals" in said
+
+
+def test_beside_a_change_of_the_machine_the_rest_is_no_riddle() -> None:
+    changed = (Change("F_cp", "N", 12.0, 13.2, 0.01),)
+    found = replace(trace_of("effect"), complete=False, left=Left(0.6, ()), drift=changed)
+    said = trace_sentence(traced(found))
+    assert "40 % of what was missing on the held-out logs; the machine has changed beside." in said
+    assert "none of the signals" not in said
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,108 @@
+"""What the held-out logs say of effects: beside a change of the machine, and above which speed."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.effects._library import built_in
+from identification.estimation.regression.effect_rows import EffectRows
+from identification.estimation.regression.row_fit import RowFit, first_stage
+from identification.estimation.structure_fit import FittedStructure, band
+from identification.tracing import held_out
+from identification.tracing.held_out import HeldOut
+from identification.tracing.predictive_check import Worse
+from identification.tracing.regression.stepwise import choose
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
+from identification.tracing.verdict import parameters_before
+from tests.identification.motor_logs import NINE, made, plant, seen
+from tests.identification.tracing.settings import MOTOR, setting_of
+
+FALLS = {"stribeck": {"F_s": 6.0, "v_s": 0.05}}
+NO_BAND = replace(NINE, dv_p=0.0, dv_n=0.0, F_sp=18.0, F_sn=-16.0)
+
+
+@cache
+def worn() -> Trace:
+    """A motor with Stribeck friction whose Coulomb levels are a tenth higher in the test log."""
+    later = replace(NO_BAND, F_cp=1.1 * NO_BAND.F_cp, F_cn=1.1 * NO_BAND.F_cn)
+    logs = [[made(i, FALLS, friction=p)] for i, p in ((4, NO_BAND), (5, later))]
+    library = {"stribeck": built_in()["stribeck"]}
+    return trace(logs[0], logs[1], MOTOR, library, np.random.default_rng(0))
+
+
+@pytest.mark.slow
+def test_a_change_of_the_machine_is_not_held_against_an_effect() -> None:
+    found = worn()
+    assert found.verdict == "effect"
+    assert {one.name for one in found.drift} == {"F_cp", "F_cn"}
+    assert found.effects[0].probability > 0.95
+
+
+def far_off(stage: EffectRows, first: Mapping[str, RowFit]) -> FittedStructure:
+    """A plain model whose run follows no log."""
+    plain = plant(friction=replace(NINE, F_cp=20.0, F_cn=4.0))
+    return FittedStructure(stage, first, plain, dict.fromkeys(vars(NINE), 90.0), False, 90.0)
+
+
+@cache
+def judged() -> HeldOut:
+    """A motor with a spring of 40 N/m, its plain model far off, and the model with the spring."""
+    one = seen(made(4, {"spring": {"k": 40.0}}))
+    rng = np.random.default_rng(0)
+    start, first = first_stage([one], False)
+    plain = far_off(start, first)
+    library = {"spring": built_in()["spring"]}
+    setting = setting_of([one], plain, library, rng)
+    choice = choose(start, first, library, rng, lambda _stage, _share: None)
+    sprung = plant({"spring": {"k": 40.0}})
+    model = FittedStructure(choice.end, choice.base, sprung, {}, False, 1.0)
+    return HeldOut(setting.plain, choice, model, ())
+
+
+def test_force_is_missing_above_the_band_of_the_model_that_explains_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The plain model's own band may have taken the place of the effect."""
+    held, asked = judged(), list[float]()
+
+    def missing(before: Any, after: Any, logs: Any, slowest: float) -> None:
+        asked.append(slowest)
+
+    monkeypatch.setattr(held_out, "missing_force", missing)
+    swollen = replace(held.choice.start, band=0.5)
+    replace(held, choice=replace(held.choice, start=swollen)).missing  # noqa: B018
+    assert asked[0] <= max(band(held.model), held.choice.base["mechanical"].slowest) < 0.5
+
+
+def test_before_an_effect_a_plain_run_that_is_not_followed_has_the_values_of_the_equation() -> None:
+    one = seen(made(4))
+    start, first = first_stage([one], False)
+    plain = far_off(start, first)
+    found = parameters_before(
+        plain, setting_of([one], plain, {}, np.random.default_rng(0)).recorded
+    )
+    assert found["F_cp"].value == pytest.approx(NINE.F_cp, rel=0.05)
+    assert found["F_cn"].value == pytest.approx(NINE.F_cn, rel=0.05)
+    assert found["dv_p"].value is None
+
+
+def test_a_force_that_is_explained_as_measured_is_not_outvoted_by_the_position(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Through stops a run loses its way by chance; an effect of the sensor makes its own force."""
+    held = replace(judged(), seen=judged().logs)
+    monkeypatch.setattr(held_out, "predicts_worse", lambda *_: Worse(0.2, 9.0, 11.0))
+    assert held.share < 0.1 and held.against == ""
+    shown = built_in()["backlash"]
+    (step,) = held.choice.steps
+    by_sensor = replace(step, candidate=replace(step.candidate, effect=shown))
+    other = replace(held, choice=replace(held.choice, steps=(by_sensor,)))
+    vars(other).update(
+        {name: getattr(held, name) for name in ("share", "before", "after", "changed")}
+    )
+    assert "position" in other.against
