@@ -166,7 +166,7 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    return _way(_moved(logs, held))
+    return _way(_moved(logs, held), fewest=1)
 
 
 def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
@@ -174,25 +174,27 @@ def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
     return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
 
 
-def _way(moved: Sequence[MotionLog]) -> bool | None:
+def _way(moved: Sequence[MotionLog], fewest: int = FEWEST_COMPARED) -> bool | None:
+    """The way that at least so many windows of sliding go, as `way_of`."""
     up = np.concatenate([one.up for one in moved])
     share = float(np.mean(up)) if len(up) else 0.5
-    return share > 0.5 if len(up) >= FEWEST_COMPARED and is_one_way(share) else None
+    return share > 0.5 if len(up) >= fewest and is_one_way(share) else None
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
-    """The fit of logs that move one way, with Coulomb friction not identifiable: together with
-    whatever constant force there is."""
-    name = "F_cp" if up else "F_cn"
-    both = fit.estimates[name]
-    if both.value is None:
-        return fit
-    between = "" if both.low is None else f" ({both.low:.3g} to {both.high:.3g})"
-    reason = (
-        f"motion one way alone: {both.value:.3g} {units_of(rig.motion)[name]}{between} is friction"
-        " and any constant force together; log motion both ways"
-    )
-    return replace(fit, estimates={**fit.estimates, name: both.withheld(reason, both.value)})
+    """The fit of logs that move one way, with Coulomb friction and stick limit not identifiable:
+    together with whatever constant force there is."""
+    units, found = units_of(rig.motion), dict(fit.estimates)
+    for name in ("F_cp", "F_sp") if up else ("F_cn", "F_sn"):
+        both = found[name]
+        if both.value is not None:
+            between = "" if both.low is None else f" ({both.low:.3g} to {both.high:.3g})"
+            reason = (
+                f"motion one way alone: {both.value:.3g} {units[name]}{between} is friction and any"
+                " constant force together; log motion both ways"
+            )
+            found[name] = both.withheld(reason, both.value)
+    return replace(fit, estimates=found)
 
 
 def _slightest_mass(data: Sequence[Rows]) -> float:

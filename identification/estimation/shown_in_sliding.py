@@ -1,8 +1,9 @@
 """What a fit states though steady sliding does not show it: no value, with the reason.
 
-A mass whose inertia is next to nothing of the force or, by the equation, shows as the body turns
-back alone, and Coulomb apart from viscous friction where all sliding has one speed. How a body
-turns back is not in the columns of sliding, and the fit takes one for the other.
+A mass whose inertia is next to nothing of the force, goes with the position as a spring or, by the
+equation, shows as the body turns back alone, and Coulomb apart from viscous friction where all
+sliding has one speed. How a body turns back is not in the columns of sliding, and the fit takes one
+for the other.
 """
 
 from collections.abc import Mapping
@@ -10,19 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import BoolArray
+from identification.arrays import Array, BoolArray
 from identification.estimation.imposed_motion import WHY_NOT
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.regression.motion_rows import rows_and_windows
 from identification.estimation.regression.weighted_rows import (
+    OVERLAP,
     Rows,
     least_squares,
     solve_rows,
     stacked,
 )
 from identification.log import Rig
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.thresholds import FOURFOLD, HALF, MATERIAL, OF_ACCOUNT
 
@@ -30,6 +32,10 @@ COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of
 TURNING_WHY = (
     "inertia shows where the body turns back alone, in which friction is not that of sliding: the"
     " mass is not identifiable; log gentler changes of speed"
+)
+SPRING_WHY = (
+    "the acceleration goes with the position, as in motion of one frequency: {:.3g} {} is the mass"
+    " less what any spring takes off it (k/w^2); log motion of several frequencies"
 )
 ONE_WAY_THROUGHOUT = (
     1.0 - 1e-9
@@ -44,16 +50,22 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """
     p = fit.friction
     theta = np.array([getattr(p, name) for name in FIVE])
-    every = stacked([one.rows for one in rows_and_windows(recorded.logs, theta)])
+    made = rows_and_windows(recorded.logs, theta)
+    every = stacked([one.rows for one in made])
     if not len(every.b):
         return fit
+    logged = zip(made, recorded.plain, strict=True)
+    y = np.concatenate([one.windows.mean @ np.asarray(log["y"]) for one, log in logged])
     steady = [np.abs(every.X[:, level]) > ONE_WAY_THROUGHOUT for level, _ in COLUMNS_OF_WAYS]
     reasons = dict[str, str]()
     share = abs(p.m) * float(np.std(every.X[:, 0])) / max(float(np.std(every.b)), 1e-300)
-    if fit.estimates["m"].known and share < MATERIAL:
-        reasons["m"] = WHY_NOT["m"].format(share=f"{share:.1%}")
-    elif fit.estimates["m"].known and fit.imposed and _by_turning(every, steady[0] | steady[1], 0):
-        reasons["m"] = TURNING_WHY
+    if fit.estimates["m"].known:
+        if share < MATERIAL:
+            reasons["m"] = WHY_NOT["m"].format(share=f"{share:.1%}")
+        elif fit.imposed and _by_turning(every, steady[0] | steady[1], 0):
+            reasons["m"] = TURNING_WHY
+        elif _is_a_springs(every, y, p.m):
+            reasons["m"] = SPRING_WHY.format(p.m, units_of(recorded.rig.motion)["m"])
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
         if _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
@@ -67,6 +79,18 @@ def _by_turning(every: Rows, steady: BoolArray, column: int) -> bool:
     if len(some.b) <= HALF * np.count_nonzero(every.X[:, column]):
         return False
     return _information(some, column) < OF_ACCOUNT * _information(every, column)
+
+
+def _is_a_springs(every: Rows, y: Array, m: float) -> bool:
+    """Whether the accelerations of these rows (r,) are all but the positions y (r,), and a spring
+    beside the mass m [kg] would make it another."""
+    beside = replace(every, X=np.column_stack([every.X, y, np.ones(len(y))]))
+    own = _information(beside, 0)
+    if own >= OF_ACCOUNT * _information(every, 0):
+        return False
+    free = solve_rows(beside)
+    sd = np.sqrt(OVERLAP * float(np.mean(free.residual**2)) / max(own, 1e-300))
+    return abs(m - float(free.theta[0])) > NORMAL_95 * float(sd)
 
 
 def _information(rows: Rows, column: int) -> float:

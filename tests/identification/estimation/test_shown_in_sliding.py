@@ -18,9 +18,13 @@ M, F_CP, F_CN, F_VP, F_VN = 5.0, 16.0, 14.0, 22.0, 19.0
 def fitted(speeds: Array, turning: float) -> KarnoppFit:
     """The fit of strokes at these speeds [m/s], of half a second each; turning: samples in which
     the body turns back."""
-    v = np.asarray(gaussian_filter1d(np.repeat(speeds, 250), turning), dtype=np.float64)
+    return of_velocity(gaussian_filter1d(np.repeat(speeds, 250), turning))
+
+
+def of_velocity(v: Array, stiffness: float = 0.0) -> KarnoppFit:
+    """The fit of a body of this velocity [m/s] on a spring [N/m]."""
     y, a = np.cumsum(v) * H, np.gradient(v, H)
-    F = M * a + np.where(v > 0, F_CP + F_VP * v, -F_CN + F_VN * v)
+    F = M * a + np.where(v > 0, F_CP + F_VP * v, -F_CN + F_VN * v) + stiffness * y
     rng = np.random.default_rng(0)
     t = H * np.arange(len(v), dtype=np.float64)
     F, y = F + 0.2 * rng.standard_normal(len(v)), y + 1e-7 * rng.standard_normal(len(v))
@@ -61,3 +65,16 @@ def test_a_mass_of_next_to_no_inertia_is_none() -> None:
     stated = found.estimates["m"]
     assert stated.value is None
     assert "inertia explains" in (stated.reason or "")
+
+
+def test_a_mass_in_one_sine_is_a_springs_too() -> None:
+    t = H * np.arange(10_000)
+    one = 0.3 * np.minimum(t, 1.0) * np.cos(5.0 * t)
+    two = one + 0.2 * np.cos(13.0 * t)
+    found = of_velocity(one, stiffness=40.0).estimates
+    assert found["m"].value is None
+    reason = found["m"].reason or ""
+    assert "any spring" in reason and "several frequencies" in reason
+    assert found["F_vp"].value is not None
+    assert of_velocity(one).estimates["m"].value == pytest.approx(M, rel=0.05)
+    assert of_velocity(two).estimates["m"].value == pytest.approx(M, rel=0.05)
