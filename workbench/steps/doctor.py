@@ -237,9 +237,10 @@ def _sensor(name: str, x: Array) -> SensorState:
     good = x[np.isfinite(x)]
     if len(good) < 4:
         return SensorState(name, 0.0, 0.0, 0.0, 0.0)
-    low, high, noise = float(good.min()), float(good.max()), local_noise(good)
-    shown = noise if noise > ROUNDED_OFF * (high - low) else 0.0
-    return SensorState(name, low, high, shown, resolution(good))
+    low, high, step = float(good.min()), float(good.max()), resolution(good)
+    white = float(np.sqrt(max(local_noise(good) ** 2 - step**2 / 12.0, 0.0)))  # but for rounding
+    shown = white if white > ROUNDED_OFF * (high - low) else 0.0
+    return SensorState(name, low, high, shown, step)
 
 
 def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
