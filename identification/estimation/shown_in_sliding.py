@@ -26,7 +26,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
-from identification.thresholds import FOURFOLD, HALF, MATERIAL, OF_ACCOUNT
+from identification.thresholds import FOURFOLD, HALF, MATERIAL, NEARLY_ALL, OF_ACCOUNT, TWICE
 
 COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
 TURNING_WHY = (
@@ -48,6 +48,8 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     Source: information of least squares, Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; the rules
     are ours.
     """
+    if recorded.by_command and fit.adequate and not fit.imposed:
+        return fit  # its run is that of an actuator's command, and shows how the body turns back
     p = fit.friction
     theta = np.array([getattr(p, name) for name in FIVE])
     made = rows_and_windows(recorded.logs, theta)
@@ -67,9 +69,18 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         elif _is_a_springs(every, y, p.m):
             reasons["m"] = SPRING_WHY.format(p.m, units_of(recorded.rig.motion)["m"])
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
-        if _by_turning(every, kept, way[1]):
+        if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     return _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
+
+
+def _of_one_speed(steady: Rows, column: int) -> bool:
+    """Whether nearly all rows of steady sliding have about the same speed."""
+    speed = np.abs(steady.X[steady.X[:, column] != 0.0, column])
+    if not len(speed):
+        return False
+    low, high = np.quantile(speed, (OF_ACCOUNT, NEARLY_ALL))
+    return bool(high < TWICE * low)
 
 
 def _by_turning(every: Rows, steady: BoolArray, column: int) -> bool:

@@ -83,7 +83,7 @@ def test_a_folder_gets_the_card(shop: Path) -> None:
     ("arguments", "said"),
     [
         (["init", "nowhere.csv"], "no such file"),
-        (["init", "notes.txt"], "notes.txt: row 2 has 3 fields"),
+        (["init", "notes.txt"], "notes.txt: row 2 ('Tuesday: run 7') has 3 fields"),
         (["init", "."], "is a directory"),
         (["init", "run.csv", "--out", "run.csv/card.toml"], "cannot be written"),
         (["doctor", "run.csv"], "workbench init run.csv"),
