@@ -56,6 +56,11 @@ class RecordedLogs:
         return self.rig.kind == "motor"
 
     @property
+    def by_noisy_command(self) -> bool:
+        """Whether a motor drives them whose command, and so its force, has noise of its own."""
+        return self.held and any(one.walks(self.drive) for one in self.logs)
+
+    @property
     def by_command(self) -> bool:
         """Whether an actuator's equation is fitted beside the mechanical one."""
         return self.drive == "command" and not self.held

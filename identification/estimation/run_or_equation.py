@@ -104,7 +104,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     left = None if fit.effects else left_by(fit.friction, recorded)
     if left is None:
         return fit
-    surer, noisy = left.surer, any(one.walks(recorded.drive) for one in recorded.logs)
+    surer = left.surer
     if fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
     # Of a run that is not followed, windows may identify next to nothing.
@@ -113,7 +113,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
-    elif noisy and recorded.held:
+    elif recorded.by_noisy_command:
         fit = _with_stops(fit, recorded)
     return _unless_unexplained(fit, left)
 

@@ -226,7 +226,7 @@ def _of_both(
 ) -> dict[str, Estimate]:
     """The stick limits of a motor, each with an interval that holds both the run's and that of the
     force at its breakaways: they err to either side where the force changes between samples."""
-    if not (recorded.held and any(one.walks(recorded.drive) for one in recorded.logs)):
+    if not recorded.by_noisy_command:
         return {}
     risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
     for name in ("F_sp", "F_sn"):

@@ -37,9 +37,8 @@ SPRING_WHY = (
     "the acceleration goes with the position, as in motion of one frequency: {:.3g} {} is the mass"
     " less what any spring takes off it (k/w^2); log motion of several frequencies"
 )
-ONE_WAY_THROUGHOUT = (
-    1.0 - 1e-9
-)  # share of a window in which a body goes one way that does not turn back
+# Share of a window in which a body goes one way that does not turn back.
+ONE_WAY_THROUGHOUT = 1.0 - 1e-9
 
 
 def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:

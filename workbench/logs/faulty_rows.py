@@ -40,16 +40,19 @@ def are_few(faulty: int, rows: int) -> bool:
 
 
 def numbers_in(raw: NDArray[Any]) -> Numbers:
-    """The numbers in a column of numbers or of cells."""
+    """The numbers in a column of numbers or of cells; those of a column of text as far as it takes
+    to see that it is one."""
     if raw.dtype.kind in "fiub":
         return Numbers(np.asarray(raw, dtype=np.float64), np.zeros(len(raw), dtype=bool))
-    values, is_text, first = np.full(len(raw), np.nan), np.zeros(len(raw), dtype=bool), ""
+    values, is_text, first, faulty = np.full(len(raw), np.nan), np.zeros(len(raw), bool), "", 0
     for k, cell in enumerate(raw.tolist()):
         try:
             values[k] = number_of(cell)
         except (TypeError, ValueError):
             is_text[k] = True
-            first = first or " ".join(str(text_of(cell)).split())
+            first, faulty = first or " ".join(str(text_of(cell)).split()), faulty + 1
+            if not are_few(faulty, len(raw)):
+                break
     return Numbers(values, is_text, first)
 
 

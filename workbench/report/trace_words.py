@@ -109,13 +109,13 @@ def _named(found: Trace) -> list[str]:
     that they are."""
     orders = found.surroundings.orders
     of_a_turn = {one.key for one in found.surroundings.cogging} if len(orders) > 1 else set[str]()
-    out, told = list[str](), False
+    out, cogging = list[str](), False
     for e in found.effects:
         name, meaning = words(e.effect.key), e.effect.meaning
         if e.effect.key in of_a_turn:
-            if told:
+            if cogging:
                 continue
-            told, name = True, "cogging"
+            cogging, name = True, "cogging"
             *most, last = (str(one.order) for one in orders)
             meaning = f"torques {', '.join(most)} and {last} times in a turn (magnets, teeth)"
         out.append(f"{name} – {meaning} (probability {chance(e.probability)})")
