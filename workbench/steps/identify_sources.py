@@ -18,7 +18,7 @@ from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify
 from workbench.steps.other_kind import looks_like_velocity
 from workbench.steps.present import present_of_card
-from workbench.steps.surrounding_lines import surrounding_lines
+from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
@@ -76,7 +76,7 @@ def identify_sources(
         model = replace(model, posterior=_posterior(posterior_samples, fit))
     remarks = (
         *looks_like_velocity(logs, sources.rig, model),
-        *surrounding_lines(fit.surroundings, sources.rig),
+        *surrounding_lines(fit.surroundings, sources.rig), *unequal_friction(model.friction),
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip
     return Identified(model, fit, sources.runs, remarks, posterior_samples)

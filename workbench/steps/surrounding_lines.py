@@ -1,13 +1,15 @@
 """In words: gravity, a constant force, a position and a force that are not of one instant."""
 
 import math
+from collections.abc import Mapping
 
 from identification.log import Rig
-from identification.model.estimates import NORMAL_95
+from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
+from identification.thresholds import TWICE
 from workbench.cards.readable import number
 
 MS = 1e3
@@ -41,6 +43,23 @@ def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
     if around.resonance is not None:
         lines.append(_resonance(around.resonance, units_of(rig.motion)["m"]))
     return tuple(lines)
+
+
+def unequal_friction(friction: Mapping[str, Estimate]) -> tuple[str, ...]:
+    """A line where Coulomb friction of one direction is at least twice that of the other: in motion
+    it acts as equal friction beside a constant force of half the difference."""
+    up, down = friction["F_cp"], friction["F_cn"]
+    if up.value is None or down.value is None:
+        return ()
+    low, high = sorted((up.value, down.value))
+    if high < TWICE * low or high - low < NORMAL_95 * math.hypot(up.sd or 0.0, down.sd or 0.0):
+        return ()
+    mean, force = 0.5 * (up.value + down.value), 0.5 * (down.value - up.value)
+    return (
+        f"F_cp and F_cn may as well be {number(mean)} {up.unit} in both directions and a constant"
+        f" force of {number(force)} {up.unit} (a weight, a tilt, a sensor's offset): motion"
+        " alone does not distinguish them",
+    )
 
 
 def _resonance(found: Resonance, unit: str) -> str:

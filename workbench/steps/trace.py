@@ -25,7 +25,7 @@ from workbench.documents.reading import plain, versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
 from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects
 from workbench.steps.present import present_of_card
-from workbench.steps.surrounding_lines import surrounding_lines
+from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 
 TRACE_SCHEMA = "trace/1"
 
@@ -98,7 +98,8 @@ def trace_sources(
     bad = (*train.bad, *(test.bad if test else ()))
     now = present_of_card(train.card, train.rig, model.period)
     model = replace(model, bad_samples=train.bad, controller=now)
-    return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)), bad)
+    remarks = (*remarks, *unequal_friction(model.friction), *model_remarks(model))
+    return Traced(found, model, train.runs, seen, remarks, bad)
 
 
 def _held_out(train: Sources) -> list[str]:

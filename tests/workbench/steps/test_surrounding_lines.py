@@ -1,0 +1,24 @@
+"""Unequal Coulomb friction is said to be, as well, equal friction and a constant force."""
+
+import pytest
+
+from identification.model.estimates import Estimate
+from workbench.steps.surrounding_lines import unequal_friction
+
+
+def levels(up: float | None, down: float | None, sd: float) -> dict[str, Estimate]:
+    return {"F_cp": Estimate(up, "N", sd), "F_cn": Estimate(down, "N", sd)}
+
+
+def test_a_weight_that_makes_friction_unequal_is_said() -> None:
+    (line,) = unequal_friction(levels(150.0, 18.0, 1.0))
+    assert "84 N in both directions and a constant force of -66 N" in line
+
+
+@pytest.mark.parametrize(
+    ("up", "down", "sd"),
+    [(20.0, 15.0, 0.1), (3.0, 1.0, 1.0), (None, 15.0, 0.1)],
+    ids=["nearly equal", "not significant", "not identifiable"],
+)
+def test_else_nothing_is_said(up: float | None, down: float | None, sd: float) -> None:
+    assert unequal_friction(levels(up, down, sd)) == ()
