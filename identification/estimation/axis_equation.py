@@ -1,32 +1,29 @@
 """An axis by its equation of motion alone, in a second: what a maintenance engineer asks of a log.
 
-Mass, friction and breakaway of each direction, and friction along the travel, by least squares of
-the equation in weak form, with the terms that a fit of it has; no free run, no search. Deviations
-are the jackknife's over stretches of the log, so they hold what varies in it, and 0.4 % of a value
-by which the equation errs itself.
+Mass, friction and breakaway of each direction, and friction along the travel, by the force
+equation that `identify` has where no run is followed; no free run, no search.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    NOTHING_KNOWN,
+    MotionLog,
+    mechanical,
+)
 from identification.estimation.regression.force_terms import fewest_terms
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import OF_EQUATION
+from identification.estimation.regression.motion_rows import NOISE_ROUNDS
 from identification.estimation.regression.standstill import breakaways
-from identification.estimation.regression.weighted_rows import (
-    Rows,
-    solve_rows,
-    spread_of_left_out,
-    without_each_block,
-)
-from identification.log import Log
+from identification.estimation.regression.weighted_rows import Rows, solve_rows
+from identification.log import Log, Rig
 from identification.thresholds import EVENTS_NEEDED, MANY_OF_A_KIND
 
-AXIS_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, converges
 SLOW_QUARTER = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
@@ -53,15 +50,14 @@ class AxisEquation:
     up: BoolArray
 
 
-def axis_equation(log: Log, *, held: bool) -> AxisEquation:
+def axis_equation(log: Log, rig: Rig) -> AxisEquation:
     """The log's equation of motion; y [m] and F [N] are needed.
 
-    held: the force is a zero-order hold of a command. Raises NotIdentifiable where too little
-    slides in a direction, BadLog where the log is too short for one window. Sources: weak form,
-    Messenger, Bortz (2021); inverse dynamic model by least squares, Gautier, Khalil, CDC 1988;
-    jackknife, Tukey (1958); deviation of a median, Huber, Robust Statistics (1981).
+    Raises NotIdentifiable where too little slides in a direction. Sources: weak form, Messenger,
+    Bortz (2021); inverse dynamic model by least squares, Gautier, Khalil, CDC 1988; deviation of a
+    median, Huber, Robust Statistics (1981).
     """
-    one = motion_log(log, held=held, by_command=False)
+    one = motion_log(log, held=rig.kind == "motor", by_command=False)
     up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
     if not slides_enough(up, down):
         raise NotIdentifiable(
@@ -69,23 +65,17 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
     rows = _converged(one)
-    used = list(fewest_terms([rows]).used)
-    some = replace(rows, X=rows.X[:, used])
-    theta, each = solve_rows(some).theta, without_each_block(some)
-    spread = np.hypot(spread_of_left_out(each), OF_EQUATION * np.abs(theta))
-    names = [rows.names[k] for k in used]
-    values = dict(zip(names, theta.tolist(), strict=True))
-    sd = dict(zip(names, spread.tolist(), strict=True))
-    up_at, down_at = names.index("F_cp"), names.index("F_cn")
-    offset = spread_of_left_out(0.5 * (each[:, [down_at]] - each[:, [up_at]]))
-    bias = 0.5 * OF_EQUATION * float(np.hypot(values["F_cp"], values["F_cn"]))
+    fit = fewest_terms([rows])
+    names = [FIVE[k] for k in fit.used]
+    values = dict(zip(names, fit.theta.tolist(), strict=True))
+    levels = np.array([values.get(name, 0.0) for name in ("F_cp", "F_cn")])
+    half = np.array([{"F_cp": -0.5, "F_cn": 0.5}.get(name, 0.0) for name in names])
     limits, limit_sd, count = _breakaway(one, values.get("m", 0.0))
-    left, levels = rows.b - some.X @ theta, [up_at, down_at]
-    level = left + some.X[:, levels] @ theta[levels]
+    level = fit.residuals[0] + rows.X[:, (1, 2)] @ levels
     return AxisEquation(
-        {**values, **limits}, {**sd, **limit_sd},
-        (0.5 * (values["F_cn"] - values["F_cp"]), float(np.hypot(offset[0], bias))), count,
-        float(np.linalg.norm(left) / max(float(np.linalg.norm(rows.b)), 1e-300)),
+        {**values, **limits}, {**fit.sd, **limit_sd},
+        (0.5 * float(levels[1] - levels[0]), float(np.sqrt(half @ fit.covariance @ half))),
+        count, fit.relative,
         np.asarray(log["y"])[one.sliding.middle], level * np.where(one.up, 1.0, -1.0), one.up,
     )  # fmt: skip
 
@@ -98,7 +88,7 @@ def slides_enough(up: int, down: int) -> bool:
 def _converged(one: MotionLog) -> Rows:
     """The rows, their noise that of the mass and damping that they show."""
     theta = NOTHING_KNOWN
-    for _ in range(AXIS_ROUNDS):
+    for _ in range(NOISE_ROUNDS):
         theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
     return mechanical(one, np.maximum(theta, 0.0))
 

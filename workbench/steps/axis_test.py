@@ -15,8 +15,9 @@ from scipy.stats import norm
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
 from identification.estimation.estimates import reported_estimate
+from identification.estimation.imposed_motion import WHY_NOT
 from identification.estimation.surroundings import surroundings
-from identification.model.estimates import Estimate
+from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.surroundings import Surroundings
 from identification.signals.check import check_driven
 from identification.thresholds import HALF
@@ -140,7 +141,7 @@ def axis_test(
     source = max(sources.runs, key=lambda one: one.log.duration)
     check_driven(source.log)
     around = surroundings([source.log], sources.rig)
-    found = axis_equation(around.taken_out(source.log), held=sources.rig.kind == "motor")
+    found = axis_equation(around.taken_out(source.log), sources.rig)
     units = limit_units(sources.rig)
     estimates = estimates_of(found, around, units)
     if earlier is not None and earlier.estimates is not None:
@@ -173,7 +174,7 @@ def estimates_of(
 ) -> dict[str, Estimate]:
     """Every quantity of the test, by name, as far as the equation of motion identifies it."""
     out = {}
-    scale = max(abs(found.values["F_cp"]), abs(found.values["F_cn"]))
+    coulomb = [found.values.get(name, 0.0) for name in ("F_cp", "F_cn")]
     unheld = (
         f"mass and friction leave {100 * found.relative:.0f} % of the force, so no estimate is"
         " valid; `workbench trace` searches for the cause"
@@ -185,12 +186,15 @@ def estimates_of(
             out[name] = Estimate(None, units[name], reason=unheld)
         else:
             out[name] = reported_estimate(
-                found.values[name], units[name], found.sd[name], bounds=(0.0, np.inf)
+                found.values[name],
+                units[name],
+                found.sd[name],
+                bounds=(_least(name, found), np.inf),
             )
     value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
     half = float(norm.ppf(0.975)) * sd
     constant = Estimate(value, units["constant_force"], sd, value - half, value + half)
-    if found.relative > HALF or not half < scale:
+    if found.relative > HALF or not half < max(map(abs, coulomb)):
         constant = Estimate(None, units["constant_force"], reason=unheld)
     out["constant_force"] = constant
     out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)
@@ -198,12 +202,19 @@ def estimates_of(
     return out
 
 
+def _least(name: str, found: AxisEquation) -> float:
+    """The least that a number can be: a breakaway force is no less than Coulomb friction, by the
+    lower end of its 95 % interval."""
+    level = {"F_sp": "F_cp", "F_sn": "F_cn"}.get(name)
+    if level not in found.values:
+        return 0.0
+    return max(found.values[level] - NORMAL_95 * found.sd[level], 0.0)
+
+
 def _why_not(name: str, found: AxisEquation) -> str:
     """Why a number is not identified."""
-    if name == "m":
-        return "inertia is too small a part of the force; add faster reversals"
-    if name.startswith("F_v"):
-        return "speeds too similar to separate it from Coulomb friction; add strokes at others"
+    if not name.startswith("F_s"):
+        return WHY_NOT[name if name == "m" else name[:3]].format(share="next to nothing")
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]

@@ -62,19 +62,20 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
-    the levels err by what viscous friction moves them that is significant and left out."""
+    the levels are as uncertain as beside viscous friction that is left out."""
     every = [fitted(data, used) for used in COLUMN_SETS]
     fits = [one for one in every if _may_be(one) and (1 in one.used or _rubs(every[-1]))]
     rows = stacked(data)
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
-    fuller = [one for one in fits if set(one.used) > set(best.used)]
-    moved = np.zeros(len(best.used))
-    for other in fuller:
-        off = [other.theta[other.used.index(column)] for column in best.used] - best.theta
-        moved = np.maximum(moved, np.abs(off))
-    moved = np.where(np.isin(best.used, LEVEL_COLUMNS), moved, 0.0)
-    covariance = best.covariance + np.diag(moved**2)
+    levels = np.isin(best.used, LEVEL_COLUMNS)
+    beside = np.zeros(len(best.used))
+    for fuller in (one for one in every if set(one.used) > set(best.used)):
+        at = [fuller.used.index(column) for column in best.used]
+        more = np.diag(fuller.covariance)[at] - np.diag(best.covariance)
+        off = fuller.theta[at] - best.theta
+        beside = np.maximum(beside, off**2 + np.maximum(more, 0.0))
+    covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
     return replace(best, covariance=covariance, share=every[-1].share)
 
 
