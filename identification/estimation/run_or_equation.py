@@ -101,11 +101,11 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     equation than least squares do on held-out stretches: its run is not followed, or only down to a
     noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
     (1974) 111; the comparison is ours."""
-    left = None if fit.effects else left_by(fit.friction, recorded)
-    if left is None:
+    if fit.effects:
         return fit
-    surer = left.surer
-    if fit.adequate:
+    left = left_by(fit.friction, recorded)
+    surer = left is not None and left.surer
+    if left is not None and fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
     # Of a run that is not followed, windows may identify next to nothing.
     if surer or not fit.adequate:
@@ -115,7 +115,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
             fit = replace(other, adequate=fit.adequate)
     elif recorded.by_noisy_command:
         fit = _with_stops(fit, recorded)
-    return _unless_unexplained(fit, left)
+    return fit if left is None else _unless_unexplained(fit, left)
 
 
 def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:

@@ -224,23 +224,30 @@ def structure_estimates(
 def _of_both(
     found: Mapping[str, Estimate], plant: Plant, recorded: RecordedLogs
 ) -> dict[str, Estimate]:
-    """The stick limits of a motor, each with an interval that holds both the run's and that of the
-    force at its breakaways: they err to either side where the force changes between samples."""
+    """The stick limits of a motor, each midway between the run's, or the Coulomb level where the
+    run has none, and the force at its breakaways: where the force changes between samples the one
+    errs to below and the other to above, and the interval holds both. Ours."""
     if not recorded.by_noisy_command:
         return {}
     risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
-    for name in ("F_sp", "F_sn"):
-        one = found.get(name)
-        if one is None or one.value is None or one.low is None or one.high is None:
+    for name, level, way in (("F_sp", "F_cp", 1.0), ("F_sn", "F_cn", -1.0)):
+        one, coulomb = found.get(name), found.get(level)
+        if one is None:
             continue
         if name not in risen:
-            out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
+            if one.value is not None:
+                out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
             continue
-        other = risen[name]
-        low = min(one.low, other.value - NORMAL_95 * other.sd)
-        high = max(one.high, other.value + NORMAL_95 * other.sd)
-        sd = 0.5 * (high - low) / NORMAL_95
-        out[name] = reported_estimate(one.value, one.unit, sd, interval=(low, high))
+        run = one if one.low is not None else coulomb
+        if run is None or run.low is None or run.high is None:
+            continue
+        least = 0.0 if coulomb is None or coulomb.low is None else coulomb.low
+        other, spread = way * risen[name].value, NORMAL_95 * risen[name].sd
+        sizes = (abs(run.low), abs(run.high), other - spread, other + spread)
+        low, high = max(min(sizes), least), max(*sizes, least)
+        middle, sd = 0.5 * (low + high), 0.5 * (high - low) / NORMAL_95
+        ends = (low, high) if way > 0.0 else (-high, -low)
+        out[name] = reported_estimate(way * middle, one.unit, sd, interval=ends)
     return out
 
 

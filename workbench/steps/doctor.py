@@ -186,7 +186,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         else RunsIdentifiability(reason=found.refused)
     )
     remarks = [*found.remarks, *contradicted_units(card.signals, found.rig).values()]
-    late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else 0.0
+    late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else None
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
         remarks += hardly_identifiable(runs, found.rig)
@@ -243,27 +243,24 @@ def _sensor(name: str, x: Array) -> SensorState:
     return SensorState(name, low, high, shown, step)
 
 
-def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
+def _delays(log: Log, motion: Motion, late_command: float | None) -> tuple[Delay, ...]:
     """How late the command acts, and how far the position is behind its reference.
 
-    late_command [s]: of a motor, where the equation of motion or its run shows it; else 0.
+    late_command [s]: of a motor, as the equation of motion or its run shows it, 0 where it shows
+    none; None of an actuator.
     """
     out = []
-    longest = max(2, round(LONGEST_LAG / log.h))
     if "u" in log and "F" in log and np.ptp(log["u"]) > 0.0:
-        smooth = {key: low_pass(log[key], log.h, motion.cutoff) for key in ("u", "F")}
-        one = np.ones(len(log))
-        most = int(np.argmax(np.abs(log["u"])))
-        if np.allclose(log["F"], log["u"] * (log["F"][most] / log["u"][most]), rtol=1e-6):  # motor
-            target, on = motion.a, "motion"
-            others = np.column_stack([motion.v, np.sign(motion.v), one])
+        if late_command is None:
+            u, F = (low_pass(log[key], log.h, motion.cutoff) for key in ("u", "F"))
+            others = np.column_stack([motion.v, np.ones(len(log))])
+            longest = max(2, round(LONGEST_LAG / log.h))
+            late, gain = command_lag(np.gradient(F, log.h), others, u, longest)
+            late -= HALF_A_HOLD  # a zero-order hold acts half of it later on the average
+            shown = late * log.h if gain > SURE_LAG and late > LEAST_LAG else None
+            out.append(Delay("u", "force", shown))
         else:
-            target, on = np.gradient(smooth["F"], log.h), "force"
-            others = np.column_stack([motion.v, one])
-        late, gain = command_lag(target, others, smooth["u"], longest)
-        late -= HALF_A_HOLD  # what a zero-order hold gives acts half of it later on the average
-        shown = late * log.h if gain > SURE_LAG and late > LEAST_LAG else None
-        out.append(Delay("u", on, late_command if on == "motion" and late_command else shown))
+            out.append(Delay("u", "motion", late_command or None))
     if "r" in log and np.ptp(log["r"]) > 0.0:
         found = lead(log["r"], log["y"])
         out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))

@@ -30,6 +30,7 @@ from identification.model.size import Size
 from identification.signals.sampling import samples
 from identification.simulation.free_run import released
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
+from identification.thresholds import EVENTS_NEEDED
 
 SAMPLES_BEFORE, SAMPLES_AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
 EXACT_POSITION = 1e-12  # m or rad: a position without noise
@@ -115,7 +116,7 @@ def _costs(
 
 def risen_to(logs: Sequence[MotionLog], plant: Plant) -> dict[str, Size]:
     """F_sp and F_sn [N] by the force at the instants from which motion is seen after a rest,
-    however short; none of a direction without such.
+    however short; none of a direction with too few such.
 
     The force is a line through its samples at rest, less noisy than any of them, but for the last,
     in which the body may have let go; with what the plant's effects push. Each counts by its
@@ -126,7 +127,7 @@ def risen_to(logs: Sequence[MotionLog], plant: Plant) -> dict[str, Size]:
     out: dict[str, Size] = {}
     for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
         force, sd = found[found[:, 0] == way, 1:].T
-        if len(force):
+        if len(force) >= EVENTS_NEEDED:
             weight = 1.0 / sd**2
             mean = float(np.average(force, weights=weight))
             spread = float(np.mean(((force - mean) / sd) ** 2))
