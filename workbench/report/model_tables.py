@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from identification.effects._base import Param
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
-from identification.thresholds import ADEQUATE, OF_ACCOUNT
+from identification.thresholds import ADEQUATE, ASTRAY, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
@@ -167,10 +167,9 @@ def _found(model: Model, shows: bool) -> str:
     text = f"{many} friction parameters identified from {logs}."
     if model.assumed:
         text += f" Not identifiable: {', '.join(model.assumed)}."
-    if model.fit.adequate and shows:
-        return f"{text} The free run leaves nothing but sensor noise, the equation of motion more."
     if model.fit.adequate:
-        return f"{text} The model leaves nothing but sensor noise."
+        who, more = ("free run", ", the equation of motion more") if shows else ("model", "")
+        return f"{text} The {who} leaves nothing but {_noise_of(model)}{more}."
     if model.resonance is not None:
         hertz = number(used(model.resonance["frequency"]), 4)
         return f"{text} Two masses with a spring between them swing at {hertz} Hz."
@@ -180,13 +179,28 @@ def _found(model: Model, shows: bool) -> str:
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 
+def _noise_of(model: Model) -> str:
+    """Whose noise an adequate model leaves: that of what drives its run is larger in position than
+    the position sensor's."""
+    off, drive = _off(model), model.fit.drive
+    if off is None or off <= ASTRAY * model.fit.noise_y:
+        return "sensor noise"
+    return f"what noise of the {'command' if drive == 'command' else 'measured force'} makes"
+
+
 def left_of(model: Model) -> str:
     """What the model leaves, beside the noise."""
-    off = [e.position_rms for e in model.log if e.position_rms is not None]
-    if not off:
+    off = _off(model)
+    if off is None:
         return f"{times(model.fit.chi_square**0.5)} the sensors' noise"
     noise = length(model.fit.noise_y, model.rotary)
-    return f"{length(max(off), model.rotary)} rms of position, where the sensor's noise is {noise}"
+    return f"{length(off, model.rotary)} rms of position, where the sensor's noise is {noise}"
+
+
+def _off(model: Model) -> float | None:
+    """Largest position error of the runs (rms) [m or rad], None without runs."""
+    off = [e.position_rms for e in model.log if e.position_rms is not None]
+    return max(off, default=None)
 
 
 def to_the_noise_by_equation(model: Model) -> bool:
