@@ -25,7 +25,9 @@ EFFECT = Effect(
     params=(
         Param("a", "N", -1e6, 1e6, 2.0, "size of the sine: weight times lever", True),
         Param("b", "N", -1e6, 1e6, 0.5, "size of the cosine: where 0 is not hanging", True, 0.0),
-        Param("turn", "m", 1e-6, 1e3, 1.0, "motion per radian (1 of an angle)", default=1.0),
+        Param(
+            "turn", "m", 1e-6, 1e3, 1.0, "motion per radian (1 of an angle)", False, 1.0, "known"
+        ),
     ),
     value=value,
     depends_on=("y",),

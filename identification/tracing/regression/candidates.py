@@ -140,8 +140,10 @@ def refined(start: FirstShape) -> EffectCandidate | None:
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
     best = shaped(free, start.bounds, start.shape, start.score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
-    if half != best and start.score(half) < start.score(best) + PENALTY:
-        best = half  # a harmonic had taken the whole of it
+    if half != best:
+        print("HALF", best, start.score(half), start.score(best))
+    if half != best and start.score(half) < start.score(best) + 2.0 * PENALTY:
+        best = half  # a harmonic takes all of it but what the two sizes of the wave gain by chance
     for i in range(SUBSTITUTIONS if start.by_rounds else 0):
         found = trial(start.stage, start.effect, best, start.shown_in)[1]
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else start.stage.theta
@@ -171,8 +173,9 @@ def shaped(
 
 
 def bounds_of(p: Param, tried: Array) -> tuple[float, float]:
-    """Where a parameter is refined: between the first values tried, one with a default anywhere."""
-    if p.default is not None:
+    """Where a parameter is refined: between the first values tried, one with a default anywhere,
+    unless it is known."""
+    if p.default is not None and p.role != "known":
         return p.low, p.high
     return float(np.min(tried)), float(np.max(tried))
 
