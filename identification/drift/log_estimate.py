@@ -14,9 +14,9 @@ from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.parameters import values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log
-from identification.model.estimates import Drive, KarnoppFit
+from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY, TWICE
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,8 @@ class LogEstimate:
 
     untold: parameters that the log does not identify, with the reason; they are among `names` all
     the same. chi_square: what the best fit leaves per value; allowed: up to which the structure
-    fits.
+    fits. as_usual: the equation of motion of a motor, whose run is not followed, leaves about as
+    much as that of the model's logs.
     """
 
     names: tuple[str, ...]
@@ -34,11 +35,12 @@ class LogEstimate:
     untold: Mapping[str, str]
     chi_square: float
     allowed: float
+    as_usual: bool = False
 
     @property
     def follows(self) -> bool:
         """Whether the structure of the active model follows the log."""
-        return self.chi_square <= self.allowed
+        return self.as_usual or self.chi_square <= self.allowed
 
 
 def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> LogEstimate:
@@ -58,18 +60,17 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
         found = fit_imposed(recorded, "as the active model")
         return _of_fit(found, allowed_misfit(model.chi_square))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    if found.imposed:  # the equation has less error, or no run of this structure is followed
-        found = replace(found, chi_square=_left_by_runs(model, found, log, drive))
-    return _of_fit(found, allowed_misfit(model.chi_square))
-
-
-def _left_by_runs(
-    model: ReferenceModel, found: KarnoppFit, log: Log, drive: Drive | None
-) -> float:  # fmt: skip
-    """What a run of the log leaves, of the plant found or of the active one, whichever is less."""
+    if not found.imposed:
+        return _of_fit(found, allowed_misfit(model.chi_square))
+    # The equation has less error, or no run of this structure is followed.
     recorded = recorded_logs([log], model.rig, drive)
     own = Plant(found.friction, model.plant.actuator, found.effects)
-    return min(misfit(one, recorded.logs, recorded.drive) for one in (own, model.plant))
+    left = min(misfit(one, recorded.logs, recorded.drive) for one in (own, model.plant))
+    estimate = _of_fit(replace(found, chi_square=left), allowed_misfit(model.chi_square))
+    usual = model.force_relative
+    if not recorded.held or usual is None or found.left is None:
+        return estimate
+    return replace(estimate, as_usual=found.left[0] <= TWICE * usual)
 
 
 def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array]:

@@ -58,8 +58,9 @@ class ReferenceModel:
     its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is evaluated, 0
     where it is not known. own_logs: how far its own logs lie from it, None where a single one
-    leaves noise alone, or that is not known. key: names the model in a `DriftState`. Raises
-    BadModel where sizes differ.
+    leaves noise alone, or that is not known. key: names the model in a `DriftState`.
+    force_relative: share of the force that the equation of motion leaves, None where not known.
+    Raises BadModel where sizes differ.
     """
 
     plant: Plant
@@ -74,6 +75,7 @@ class ReferenceModel:
     key: str = ""
     fastest: float = 0.0
     own_logs: OwnLogs | None = None
+    force_relative: float | None = None
 
     def __post_init__(self) -> None:
         d = len(self.names)

@@ -81,7 +81,7 @@ class HeldOut:
         plain = self.plain.model
         if self.model is plain:
             return self.now
-        return on_test(plain, self.before["test"], self.unseen, self.drive)
+        return on_test(plain, self.before["test"], self.unseen, self.drive, self.model)
 
     @cached_property
     def now(self) -> OnTest:

@@ -62,10 +62,15 @@ class OnTest:
 
 
 def on_test(
-    model: FittedStructure, errors: Errors, logs: Sequence[MotionLog], drive: Drive
-) -> OnTest:
-    """What a model of these errors leaves of the logs."""
-    return OnTest(errors, None if model.imposed else misfit(model.plant, logs, drive))
+    model: FittedStructure, errors: Errors, logs: Sequence[MotionLog], drive: Drive,
+    beside: FittedStructure | None = None,
+) -> OnTest:  # fmt: skip
+    """What a model of these errors leaves of the logs; beside: another with which it is compared,
+    whose weights of the run's errors it has."""
+    if model.imposed:
+        return OnTest(errors, None)
+    weighed_by = None if beside is None or beside.imposed else beside.plant
+    return OnTest(errors, misfit(model.plant, logs, drive, weighed_by=weighed_by))
 
 
 def share_left(before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.0) -> float:

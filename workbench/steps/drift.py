@@ -125,6 +125,7 @@ def active_model(model: Model, key: str) -> ReferenceModel:
         key=key,
         fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),
         own_logs=model.own_logs,
+        force_relative=model.fit.force_relative,
     )
 
 

@@ -83,14 +83,17 @@ def soft(r: Array, far: float = ROBUST_FROM) -> Array:
 
 def misfit(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, bristle: float = COARSE, *,
-    every: bool = False,
+    every: bool = False, weighed_by: Plant | None = None,
 ) -> float:  # fmt: skip
     """What the free run leaves of that signal of that log which it follows worst.
 
     Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
     longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
     just reaches is a matter of chance and takes its window with it: the worst windows do not count,
-    unless every one is to. Robust as Cauchy's function (Holland, Welsch 1977); `README.md`, (4).
+    unless every one is to. weighed_by: plant whose drift by the noise of force and command weighs
+    the errors, by default the run's own: two plants are compared at the weights of one, or the one
+    that drifts more would be the better. Robust as Cauchy's function (Holland, Welsch 1977);
+    `README.md`, (4).
     """
     worst = 0.0
     free = loose(plant, drive) and not every
@@ -98,7 +101,7 @@ def misfit(
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not one.walks(drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
-            r = left_in_windows(plant, one, drive, seconds, bristle)
+            r = left_in_windows(plant, one, drive, seconds, bristle, weighed_by=weighed_by)
             if r is not None:
                 begun = starts(one, drive, seconds, bristle)
                 window = window_of(begun, len(one.log)) if free else None

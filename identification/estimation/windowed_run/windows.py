@@ -320,13 +320,14 @@ def longest_window(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> flo
 
 def left_in_windows(
     plant: Plant, one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW,
-    bristle: float = COARSE, *, even: bool = False,
+    bristle: float = COARSE, *, even: bool = False, weighed_by: Plant | None = None,
 ) -> Array | None:  # fmt: skip
     """Errors of a plant in its own windows of so many seconds, less their states' part, (k, n);
-    None: not to be followed. bristle, even: as `starts` and `freed` have them. Source: Robinson
-    (1991)."""
+    None: not to be followed. bristle, even: as `starts` and `freed` have them; weighed_by: plant of
+    the weights and states' part, by default the same. Source: Robinson (1991)."""
     begun = starts(one, drive, seconds, bristle)
-    return window_residual(plant, one, drive, freed(plant, one, drive, begun, even=even))
+    by = plant if weighed_by is None else weighed_by
+    return window_residual(plant, one, drive, freed(by, one, drive, begun, even=even))
 
 
 def window_residual(
