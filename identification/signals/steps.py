@@ -27,6 +27,7 @@ JUMP_STANDS_OUT = 2.5  # times the largest elsewhere, that a jump is
 MOST_JUMPS = 12  # of one size
 PARABOLA_SIDE = 5  # samples to either side of a spike that the parabola goes through
 LONGEST_SMALL = 3  # samples of a spike
+COMES_AND_GOES = 0.5  # of its height, by which a signal bends just before a spike and just after it
 USUAL_SHARE = 0.6  # of the neighbours, that lie as near to the parabola as counts for its own error
 NOISE_BLOCK = 96  # samples, of which the median gives the noise around one
 LOUDER = 1.5  # times the noise of the calmest, that it is to count: fewer samples give it
@@ -192,8 +193,9 @@ def _parabola(length: int) -> tuple[Array, Array]:
 
 
 def deviations(x: Array, length: int) -> tuple[Array, Array]:
-    """How far so many samples from each on lie off the parabola through their neighbours, all to
-    one side (else 0), and how far the neighbours themselves usually do, each (n,)."""
+    """How far so many samples from each on lie off the parabola through their neighbours, and how
+    far the neighbours themselves usually do, each (n,). 0 unless all are off to one side, and what
+    is off comes and goes at once: a body that sets off, or a force that lets go, does not."""
     height, own = np.zeros(len(x)), np.full(len(x), np.inf)
     if len(x) < 2 * PARABOLA_SIDE + length:
         return height, own
@@ -204,7 +206,11 @@ def deviations(x: Array, length: int) -> tuple[Array, Array]:
     one_side = np.abs(np.sum(np.sign(off), axis=1)) == length
     left = np.partition(np.abs(beside @ leaves.T), int(USUAL_SHARE * 2 * PARABOLA_SIDE), axis=1)
     here = slice(PARABOLA_SIDE, PARABOLA_SIDE + len(view))
-    height[here] = np.where(one_side, np.min(np.abs(off), axis=1), 0.0)
+    size, bend = np.min(np.abs(off), axis=1), np.sign(off[:, 0])[:, np.newaxis] * np.diff(view, 2)
+    first, last = PARABOLA_SIDE - 1, PARABOLA_SIDE + length - 2  # columns of its own bends
+    comes_and_goes = np.minimum(bend[:, first - 1], bend[:, last + 1]) > COMES_AND_GOES * size
+    turns = np.maximum(bend[:, first], bend[:, last]) < 0.0  # as no acceleration of a body does
+    height[here] = np.where(one_side & comes_and_goes & turns, size, 0.0)
     own[here] = left[:, int(USUAL_SHARE * 2 * PARABOLA_SIDE)]
     return height, own
 

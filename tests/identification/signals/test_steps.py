@@ -76,3 +76,14 @@ def test_a_clock_that_jitters_makes_no_spikes(seed: int) -> None:
     assert 1.0 < np.max(local_noise(y)) / (0.05 * 1.3 * 2.0 * np.pi * 1e-6) < 1.7
     y[1990:1993] += 20.0 * np.max(local_noise(y))
     assert np.flatnonzero(small_spikes(y)).tolist() == [1990, 1991, 1992]
+
+
+def test_a_body_that_sticks_for_a_moment_as_it_turns_has_no_spike() -> None:
+    """Coarsely sampled, it lies off the parabola of its motion; a spike comes and goes at once."""
+    turning = [3.17, 2.62, 2.045, 1.46, 0.855, 0.24, -0.045, -0.695, -1.45, -1.995, -2.465, -2.885]
+    before, after = 3.17 + 0.5 * np.arange(50.0, 0.0, -1.0), -2.885 - 0.35 * np.arange(1.0, 50.0)
+    turned = np.round(np.cumsum([*before, *turning, *after]) / 0.015) * 0.015
+    assert not np.any(small_spikes(turned))
+    spoilt = turned.copy()
+    spoilt[80] += 2.0
+    assert np.flatnonzero(small_spikes(spoilt)).tolist() == [80]
