@@ -16,7 +16,6 @@ from identification.errors import UserError
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.structure_fit import plain_structure
 from identification.estimation.surroundings import (
-    explains,
     explains_most,
     lag_explains,
     surroundings,
@@ -25,7 +24,7 @@ from identification.log import Log, Rig
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
-from identification.thresholds import ADEQUATE
+from identification.thresholds import ADEQUATE, ASTRAY
 
 SLOW_LOG = (
     6e-3  # s between samples, from which the equation's windows are too long to identify a lag
@@ -61,11 +60,11 @@ def what_acts_beside(
         return tried[samples]
 
     def follows(samples: float) -> bool:
-        """Whether a run follows with that lag where it does not without."""
+        """Whether a run follows with that lag where it clearly does not without."""
         without, with_it = left(0.0), left(samples)
-        if without <= ADEQUATE or not np.isfinite(with_it):
+        if without <= ASTRAY or not np.isfinite(with_it):
             return False
-        return explains(without - 1.0, with_it - 1.0)
+        return explains_most(without - 1.0, with_it - 1.0)
 
     def believed(samples: float) -> bool:
         """Whether a run bears the equation's lag out, or does well with one that explains most of

@@ -44,7 +44,7 @@ from identification.model.surroundings import (
 from identification.thresholds import BEYOND_CHANCE, EARNS, FAR_LESS, HALF, MATERIAL
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
-LEAD, LAG = -6.0, 12.0  # samples, between which they are
+LEAD, LAG = -12.0, 12.0  # samples, between which they are
 FEWEST_WINDOWS = 40  # windows of sliding
 SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
