@@ -456,8 +456,8 @@ def test_seen() -> None:
     One that would not judges nothing.
     """
     for margin in (0.0, 0.02, 0.08):
-        assert says_none(margin + 0.024, DriftSettings(margin=margin))
-        assert not says_none(margin + 0.0375, DriftSettings(margin=margin))
+        assert says_none(margin + 0.06, DriftSettings(margin=margin))
+        assert not says_none(margin + 0.1, DriftSettings(margin=margin))
 
 
 def test_nearly_all() -> None:

@@ -79,7 +79,7 @@ def test_what_could_not_have_been_seen_is_status_0_and_loud(
     assert "minimum detectable change: none; inconclusive: m (" in shown
     found = json.loads((tmp_path / "d/drift.json").read_text(encoding="utf-8"))
     assert found["verdict"] == found["log"][0]["verdict"] == "not_judged"
-    assert found["settings"]["to_be_seen"] == 0.05
+    assert found["settings"]["to_be_seen"] == pytest.approx(0.10)
     assert found["log"][0]["could_have_seen"]["F_cp"] > 0.05
     assert set(NAMES) <= set(found["log"][0]["parameters"])
 
