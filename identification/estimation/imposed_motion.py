@@ -78,6 +78,7 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
     logs, (noise_y, noise_F) = recorded.plain, recorded.noise
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
+    squares = [(left / part.sd) ** 2 for left, part in zip(fit.residuals, rows, strict=True)]
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
     nine = _assumed(center, recorded, _slightest_mass(rows))
@@ -93,7 +94,7 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
         drive="command" if recorded.held else "force",
         noise_y=noise_y,
         noise_F=noise_F,
-        chi_square=(fit.rms / noise_F) ** 2,
+        chi_square=float(np.mean(np.concatenate(squares))),
         adequate=False,
         logs=tuple(
             LogFit(
@@ -101,9 +102,9 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
                 start=measured_start(log),
                 position_rms=float("nan"),
                 force_rms=float(np.std(part)),
-                chi_square=float(np.mean(part**2)) / noise_F**2,
+                chi_square=float(np.mean(square)),
             )
-            for log, part in zip(logs, fit.residuals, strict=True)
+            for log, part, square in zip(logs, fit.residuals, squares, strict=True)
         ),
         breakaways=(0, 0),
         remarks=(

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from identification.effects._base import Param
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
-from identification.thresholds import ADEQUATE, ASTRAY, OF_ACCOUNT
+from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
@@ -153,14 +153,15 @@ def summary(model: Model, missing: LatentForces | None) -> str:
     """What was found, in a few sentences; missing: the force that the model lacks on its logs."""
     share = None if missing is None else missing.share(max(model.karnopp.F_cp, model.karnopp.F_cn))
     if missing is None or share is None:
-        return _found(model, shows=False)
-    shows = share > OF_ACCOUNT and not missing.is_a_bound
+        return _found(model, None)
     said = share_of_friction(share, missing)
-    return f"{_found(model, shows)} Force missing: {said} of friction."
+    known = None if missing.is_a_bound else share
+    return f"{_found(model, known)} Force missing: {said} of friction."
 
 
-def _found(model: Model, shows: bool) -> str:
-    """What was identified and what is left; shows: whether a force of account is missing."""
+def _found(model: Model, missing: float | None) -> str:
+    """What was identified and what is left; missing: share of friction, None where none shows."""
+    shows = missing is not None and missing > OF_ACCOUNT
     known = [name for name, e in model.friction.items() if e.value is not None]
     many = "All nine" if len(known) == len(model.friction) else f"{len(known)} of the nine"
     logs = "one log" if len(model.log) == 1 else f"{len(model.log)} logs"
@@ -173,6 +174,10 @@ def _found(model: Model, shows: bool) -> str:
     if model.resonance is not None:
         hertz = number(used(model.resonance["frequency"]), 4)
         return f"{text} Two masses with a spring between them swing at {hertz} Hz."
+    by_equation = all(e.position_rms is None for e in model.log)
+    if by_equation and missing is not None and missing <= MATERIAL:
+        times_noise = times(model.fit.chi_square**0.5)
+        return f"{text} The equation of motion leaves {times_noise} the sensors' noise."
     if to_the_noise_by_equation(model):
         leaves = "little more than noise, but a force is missing" if shows else "nothing but noise"
         return f"{text} The equation of motion leaves {leaves}; no free run follows."

@@ -9,9 +9,10 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadLog
 from identification.estimation.latent_force import LatentForces, latent_forces
-from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.recorded_logs import RecordedLogs, plain_share, with_share
 from identification.estimation.structure_fit import ABOVE_BAND
 from identification.log import Log, Rig
+from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.karnopp import VISCOUS_NAMES
 from identification.model.plant import Motor, Plant
@@ -69,16 +70,14 @@ def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
     which friction falls with speed is no viscous friction, so it is among what is missing."""
     if model.resonance is not None:
         return None
-    held, imposed = model.rig.kind == "motor", model.prescribed_motion
     given = [of_one_instant(with_applied_force(log, model.rig), model) for log in logs]
-    moved = [
-        motion_log(log, held=held, by_command=False, rotary=model.rotary, imposed=imposed)
-        for log in given
-    ]
+    drive: Drive = "command" if model.rig.kind == "motor" else "force"
+    read = RecordedLogs((), model.rig, drive, imposed=model.prescribed_motion).of(given)
+    recorded = with_share(read, plain_share(read))
     plants = [seen_moving(model, log) for log in given]
     plant = max(plants, key=lambda one: one.friction.dv_p - one.friction.dv_n)
     p = plant.friction
-    found = latent_forces(plant, moved, ABOVE_BAND * max(p.dv_p, -p.dv_n))
+    found = latent_forces(plant, recorded.logs, ABOVE_BAND * max(p.dv_p, -p.dv_n))
     return found if any(np.any(one.slides) for one in found.logs) else None
 
 
