@@ -140,8 +140,6 @@ def refined(start: FirstShape) -> EffectCandidate | None:
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
     best = shaped(free, start.bounds, start.shape, start.score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
-    if half != best:
-        print("HALF", best, start.score(half), start.score(best))
     if half != best and start.score(half) < start.score(best) + 2.0 * PENALTY:
         best = half  # a harmonic takes all of it but what the two sizes of the wave gain by chance
     for i in range(SUBSTITUTIONS if start.by_rounds else 0):
