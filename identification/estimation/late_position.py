@@ -16,6 +16,7 @@ from identification.errors import UserError
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.structure_fit import plain_structure
 from identification.estimation.surroundings import (
+    explains,
     explains_most,
     lag_explains,
     surroundings,
@@ -64,7 +65,7 @@ def what_acts_beside(
         without, with_it = left(0.0), left(samples)
         if without <= ASTRAY or not np.isfinite(with_it):
             return False
-        return explains_most(without - 1.0, with_it - 1.0)
+        return explains(without - 1.0, with_it - 1.0)
 
     def believed(samples: float) -> bool:
         """Whether a run bears the equation's lag out, or does well with one that explains most of

@@ -110,6 +110,8 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     # Of a run that is not followed, windows may identify next to nothing.
     if surer or not fit.adequate:
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
+        if left is None and other is not None and is_no_run(other.chi_square):
+            other = None  # of few rows, of which far more than noise is left
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)

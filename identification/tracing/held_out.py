@@ -116,6 +116,18 @@ class HeldOut:
         """Whether something of account is missing on the training logs."""
         return lacks(self.model, self.after["train"], self.noise)
 
+    @cached_property
+    def lacks_force(self) -> bool:
+        """Whether the plain model, with the parameters that have changed, lacks a force of account
+        on the test logs, however noisy the rows of its equation are; with effects, whether they
+        leave one says their evidence."""
+        if self.model is not self.plain.model:
+            return False
+        found = self._missing(self.changed) if self.changed else self.missing
+        if found is None or found.after.is_a_bound:
+            return False
+        return (found.after.share(self.coulomb) or 0.0) > OF_ACCOUNT
+
     @property
     def hides_friction(self) -> bool:
         """Whether what is left of the force, however much of it is noise, is larger than friction

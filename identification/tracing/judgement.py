@@ -32,9 +32,10 @@ def judgement(held: HeldOut) -> Trace:
     logs."""
     plain, choice, after, changed = held.plain, held.choice, held.model, held.changed
     before, rows, terms = plain.model, plain.rows, held.evidence
-    left = strongest(choice, after, held.logs, held.drive) if held.lacking else NOTHING
+    lacking = held.lacking or held.lacks_force
+    left = strongest(choice, after, held.logs, held.drive) if lacking else NOTHING
     doubts = [*_doubts(held)]
-    known = not doubts and (bool(choice.steps) or not held.lacking)
+    known = not doubts and (bool(choice.steps) or not lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
     if held.lacking and held.seen and not (doubts or choice.steps or after.imposed):
         told = before.plant.friction if after.fit is None else after.fit.friction

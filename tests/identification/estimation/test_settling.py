@@ -1,0 +1,51 @@
+"""Stick limits of a motor whose loop is faster than its log: between what two ways find."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from identification.estimation import settling
+from identification.model.estimates import Estimate
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.model.size import Size
+
+PLANT = Plant(Karnopp(1.0, 8.0, 8.0, 1.0, 1.0, 1e-3, -1e-3, 10.0, -10.0))
+NOISY: Any = SimpleNamespace(by_noisy_command=True, logs=(), name="log")
+COULOMB = {"F_cp": Estimate(8.0, "N", 0.1, 7.8, 8.2), "F_cn": Estimate(8.0, "N", 0.1, 7.8, 8.2)}
+
+
+def limits(
+    monkeypatch: pytest.MonkeyPatch, found: dict[str, Estimate], risen: dict[str, Size]
+) -> dict[str, Estimate]:
+    monkeypatch.setattr(settling, "risen_to", lambda logs, plant: risen)
+    return settling._of_both({**COULOMB, **found}, PLANT, NOISY)
+
+
+def test_a_limit_lies_midway_between_the_run_s_and_the_force_at_breakaway(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = {
+        "F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2),
+        "F_sn": Estimate(-9.0, "N", 0.1, -9.2, -8.8),
+    }
+    found = limits(monkeypatch, run, {"F_sp": Size(12.0, 0.5), "F_sn": Size(-11.0, 0.5)})
+    for name, low, high in (("F_sp", 9.8, 12.98), ("F_sn", -11.98, -8.8)):
+        one = found[name]
+        assert (one.low, one.high) == pytest.approx((low, high), abs=0.01)
+        assert one.value == pytest.approx(0.5 * (low + high), abs=0.01)
+
+
+def test_where_the_run_has_none_it_lies_above_the_coulomb_level(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    none = {"F_sp": Estimate(None, "N", reason="2 breakaways", assumed=9.0)}
+    found = limits(monkeypatch, none, {"F_sp": Size(12.0, 0.5)})
+    assert (found["F_sp"].low, found["F_sp"].high) == pytest.approx((7.8, 12.98), abs=0.01)
+
+
+def test_without_a_rest_that_ends_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = {"F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2)}
+    found = limits(monkeypatch, run, {})
+    assert found["F_sp"].value is None and "starts from rest" in (found["F_sp"].reason or "")
