@@ -1,7 +1,7 @@
 """In words: gravity, a constant force, a position and a force that are not of one instant."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, Estimate
@@ -45,12 +45,20 @@ def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def unequal_friction(friction: Mapping[str, Estimate]) -> tuple[str, ...]:
-    """A line where Coulomb friction of one direction is at least twice that of the other: in motion
-    it acts as equal friction beside a constant force of half the difference."""
+def unequal_friction(friction: Mapping[str, Estimate], effects: Collection[str]) -> tuple[str, ...]:
+    """A line where a constant force may be in F_cp and F_cn, in motion the same as half of their
+    difference: where one is at least twice the other, or beside a spring, which has a preload.
+
+    effects: keys of those in the model.
+    """
     up, down = friction["F_cp"], friction["F_cn"]
     if up.value is None or down.value is None:
         return ()
+    if "spring" in effects:
+        return (
+            "spring: its force is 0 at y = 0; a preload stands in F_cp and F_cn, as unequal friction"
+            " would, so their intervals are those of both together",
+        )
     low, high = sorted((up.value, down.value))
     if high < TWICE * low or high - low < NORMAL_95 * math.hypot(up.sd or 0.0, down.sd or 0.0):
         return ()

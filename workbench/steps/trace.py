@@ -98,7 +98,7 @@ def trace_sources(
     bad = (*train.bad, *(test.bad if test else ()))
     now = present_of_card(train.card, train.rig, model.period)
     model = replace(model, bad_samples=train.bad, controller=now)
-    remarks = (*remarks, *unequal_friction(model.friction), *model_remarks(model))
+    remarks = (*remarks, *unequal_friction(model.friction, model.effects), *model_remarks(model))
     return Traced(found, model, train.runs, seen, remarks, bad)
 
 

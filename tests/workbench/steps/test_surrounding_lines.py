@@ -11,7 +11,7 @@ def levels(up: float | None, down: float | None, sd: float) -> dict[str, Estimat
 
 
 def test_a_weight_that_makes_friction_unequal_is_said() -> None:
-    (line,) = unequal_friction(levels(150.0, 18.0, 1.0))
+    (line,) = unequal_friction(levels(150.0, 18.0, 1.0), ())
     assert "84 N in both directions and a constant force of -66 N" in line
 
 
@@ -21,4 +21,9 @@ def test_a_weight_that_makes_friction_unequal_is_said() -> None:
     ids=["nearly equal", "not significant", "not identifiable"],
 )
 def test_else_nothing_is_said(up: float | None, down: float | None, sd: float) -> None:
-    assert unequal_friction(levels(up, down, sd)) == ()
+    assert unequal_friction(levels(up, down, sd), ()) == ()
+
+
+def test_a_preload_of_a_spring_is_said_to_be_in_friction() -> None:
+    (line,) = unequal_friction(levels(20.0, 15.0, 0.1), ("spring",))
+    assert "a preload stands in F_cp and F_cn" in line
