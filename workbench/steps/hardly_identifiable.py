@@ -8,13 +8,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.check import work_share
 from identification.signals.differentiate import differentiate, low_pass
 from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
+from identification.thresholds import ASTRAY, HALF
+from workbench.cards.readable import length
 
 INFORMATIVE_RATE = 50.0  # Hz, below which starts and stops lie between two samples
 NEARLY_ONE_WAY = 0.05  # of the motion, that goes the other way at most
@@ -24,6 +26,7 @@ NO_FRICTION_IN_IT = 0.03  # of such a force's spread, that friction is at most
 ALL_FOLLOWED = 0.8  # of a command, that is the velocity
 SPEED_LEFT = 0.7  # of its speed at first, that a body which slows down keeps at most
 GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a drive that is idle
+AT_AN_END = 0.02  # of the travel, within which a body is at its end
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -62,7 +65,9 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
     if logged is None:
         return
-    drive = low_pass(logged, log.h, motion.cutoff)[sure]
+    whole = low_pass(logged, log.h, motion.cutoff)
+    drive = whole[sure]
+    yield from _against_stops(log["y"], whole, sure, name, rotary=rig.motion == "rotary")
     if one_way and _is_idle(drive, v, a):
         yield _said_of_coasting(name, np.abs(v))
         return
@@ -82,6 +87,24 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
         return
     if rig.kind == "motor" and (share := derivative(motion, logged).share) > ALL_FOLLOWED:
         yield _said_of_followed(name, share, of_current=rig.command_unit == "A")
+
+
+def _against_stops(
+    y: Array, drive: Array, sure: BoolArray, name: str, *, rotary: bool
+) -> Iterator[str]:
+    """Lines on an end of the travel at which a body rests though the drive (n,) pushes it on with
+    far more than what moves it elsewhere; sure (n,): samples in motion."""
+    usual, travel = float(np.median(np.abs(drive[sure]))), float(np.ptp(y))
+    for end, way in ((float(np.max(y)), 1.0), (float(np.min(y)), -1.0)):
+        pushed = way * drive[~sure & (np.abs(y - end) < AT_AN_END * travel)]
+        hard = pushed > ASTRAY * usual
+        if len(pushed) >= FEWEST_MOVING and np.mean(hard) > HALF:
+            times = f"{np.median(pushed[hard]) / usual:.2g} times"
+            yield (
+                f"the body rests at {length(end, rotary)} though the {name} pushes it on with"
+                f" {times} what moves it elsewhere: an end stop (leave those rows out, or log"
+                " strokes that stay off it), or a strong spring"
+            )
 
 
 def _said_of_followed(name: str, share: float, *, of_current: bool) -> str:

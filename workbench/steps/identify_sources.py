@@ -76,7 +76,8 @@ def identify_sources(
         model = replace(model, posterior=_posterior(posterior_samples, fit))
     remarks = (
         *looks_like_velocity(logs, sources.rig, model),
-        *surrounding_lines(fit.surroundings, sources.rig), *unequal_friction(model.friction, model.effects),
+        *surrounding_lines(fit.surroundings, sources.rig),
+        *unequal_friction(model.friction, model.effects),
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip
     return Identified(model, fit, sources.runs, remarks, posterior_samples)

@@ -56,8 +56,8 @@ def unequal_friction(friction: Mapping[str, Estimate], effects: Collection[str])
         return ()
     if "spring" in effects:
         return (
-            "spring: its force is 0 at y = 0; a preload stands in F_cp and F_cn, as unequal friction"
-            " would, so their intervals are those of both together",
+            "spring: its force is 0 at y = 0; a preload stands in F_cp and F_cn as unequal friction"
+            " does, and their intervals are those of both together",
         )
     low, high = sorted((up.value, down.value))
     if high < TWICE * low or high - low < NORMAL_95 * math.hypot(up.sd or 0.0, down.sd or 0.0):

@@ -26,6 +26,8 @@ def said(rig: Rig, t: Array, y: Array, drive: Array) -> str:
 
 
 SWING: Array = 0.9 * np.sin(1.9 * T) + 0.5 * np.sin(4.8 * T + 1.0)
+STOPPED: Array = np.clip(1.4 * np.sin(1.9 * T), -1.0, 1.0)  # by stops, against which it is pushed
+PUSHED: Array = np.cos(1.9 * T) + np.where(np.abs(STOPPED) < 1.0, 0.0, 8.0 * np.sign(STOPPED))
 ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
 
 
@@ -35,6 +37,7 @@ ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
         ("hardly anything moves", FORCE, T, noise(1e-5), noise(0.1)),
         ("slower than 50 Hz", FORCE, 15.0 * T, SWING, np.gradient(SWING, T)),
         ("motion in one direction", FORCE, T, ONWARDS + noise(1e-5), np.cos(4.4 * T)),
+        ("rests at 1 rad though the force pushes it on", FORCE, T, STOPPED + noise(1e-5), PUSHED),
         ("coasts:", MOTOR, T, np.cumsum(np.maximum(9.0 - 0.8 * T, 0.4)) * 2e-3, noise(0.02)),
         ("at one speed", MOTOR, T, 50.0 * T + 0.01 * np.sin(300.0 * T), 0.1 + noise(0.04)),
         ("perhaps by hand", FORCE, T, SWING + noise(1e-5), 2.5 * np.sin(SWING) + noise(0.01)),
