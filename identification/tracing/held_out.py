@@ -9,7 +9,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
-from identification.thresholds import OF_ACCOUNT, WORSE
+from identification.thresholds import ADEQUATE, OF_ACCOUNT, WORSE
 from identification.tracing.model_errors import (
     OnTest,
     errors_of,
@@ -103,7 +103,10 @@ class HeldOut:
     @cached_property
     def share(self) -> float:
         """Share of what was missing on the test logs, that is left."""
-        return share_left(self.was, self.now, self.noise, self.coulomb)
+        plain = self.plain.model
+        lacks_by_run = plain is not self.model and not plain.imposed and plain.misfit > ADEQUATE
+        by_run = lacks_by_run and not self.model.imposed
+        return share_left(self.was, self.now, self.noise, self.coulomb, by_run)
 
     @cached_property
     def changed(self) -> tuple[Change, ...]:

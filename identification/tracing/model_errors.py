@@ -73,10 +73,13 @@ def on_test(
     return OnTest(errors, misfit(model.plant, logs, drive, weighed_by=weighed_by))
 
 
-def share_left(before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.0) -> float:
+def share_left(
+    before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.0, by_run: bool = False
+) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
-    Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. An equation that
+    Of squares, beyond what noise alone leaves; 0 where nothing stood out of that, but 1 where a run
+    is what the effects were found by: one that drifts more hides what was missing. An equation that
     lacks much comes first: one stop that a run loses by chance is more than all the rest of it.
     Then the run, by its misfit, which knows how far the noise of force and command drifts. Force
     that is nothing beside the Coulomb level [N] does not count. Ours: `README.md`, (6).
@@ -85,11 +88,11 @@ def share_left(before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.
     by_equations = [
         _equation_share(before, after, noise, least, beside) for least in (ASTRAY, ADEQUATE)
     ]
-    by_run = None
+    of_run = None
     if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
-        by_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
-    known = (share for share in (by_equations[0], by_run, by_equations[1]) if share is not None)
-    return next(known, 0.0)
+        of_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
+    known = (share for share in (by_equations[0], of_run, by_equations[1]) if share is not None)
+    return next(known, 1.0 if by_run else 0.0)
 
 
 def follows(before: OnTest, after: OnTest) -> bool:
