@@ -46,6 +46,7 @@ DRIVEN_BY = {
     "velocity": "the velocity follows u",
 }
 VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
+COLUMN = "column"  # before a column that a signal would be otherwise, beside units
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AMBIENT = 1e5  # Pa
@@ -356,18 +357,23 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         sure = bool(odds >= SURE and unit.sure) and name not in exchanged
         rival = "" if sure else _rival(name, odds, unit, roles)
         if name in exchanged:
-            rival = str(found[exchanged[name]].raw.key)
+            rival = _named(found[exchanged[name]])
         out.append(
             SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival)
         )
     return out
 
 
+def _named(one: Column) -> str:
+    """A column as an answer names it."""
+    return f"{COLUMN} {one.raw.key}"
+
+
 def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
     """What a signal would be otherwise: the next column where that is likely, else a unit."""
     other = roles.rivals.get(name)
     if other is not None and (odds < COLUMN_OPEN or not unit.rival):
-        return str(other.raw.key)
+        return _named(other)
     return unit.rival
 
 

@@ -14,6 +14,16 @@ SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force 
 
 def no_body(columns: Columns) -> BadLog:
     """The one line for a log of which no column moves as a body that is driven."""
+    speeds = [one for one in columns.signals if one.header.speed]
+    if speeds and all(said(one, "y") < 0.0 for one in columns.signals):
+        one = min(speeds, key=lambda one: one.header.purpose == "reference")
+        turns = one.header.unit is not None and one.header.unit.card == "rpm"
+        how = " (1 rpm for 1 s is 6 deg)" if turns else ""
+        return BadLog(
+            f"{columns.log.path}: column {one.shown} is a speed, and there is no position, which"
+            " every card needs; log the position too, or add a column of it, the speed summed over"
+            f" time{how}"
+        )
     there = ", ".join(one.shown for one in columns.signals) or "none"
     left_out = "; ".join(
         f"left out: column {one.shown}: {why}"

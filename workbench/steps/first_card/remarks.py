@@ -9,7 +9,7 @@ import numpy as np
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
 from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.pairs import ONE_SIGNAL
+from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
@@ -60,7 +60,7 @@ def behind_reference(roles: Roles) -> float | None:
     if "r" not in roles.columns:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)
-    return found.samples if abs(found.likeness) >= ONE_SIGNAL else None
+    return found.samples if follows(found) else None
 
 
 def are_exchanged(behind: float) -> bool:

@@ -23,16 +23,16 @@ from identification.signals.relations import (
     force_laws,
 )
 from workbench.steps.first_card.columns import Column
-from workbench.steps.first_card.pairs import MOST_CONSTANT, ONE_SIGNAL, Pairs, Seen
+from workbench.steps.first_card.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, Seen, follows
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
     FORCE_LIKENESS,
     LEAST_SCORE,
     MIRRORED,
+    OF_A_CONTROLLER,
     RULED_OUT,
     SURE,
-    SURELY_TURNED,
     acts,
     ahead_of,
     among_derivatives,
@@ -168,7 +168,7 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     derived = among_derivatives(pairs)
     for k, one in enumerate(pairs.signals):
         head = said(one, "y")
-        if (only is not None and one is not only) or (head <= -4.0 and one is not only):
+        if one is not only and (only is not None or head <= -4.0 or one.header.speed):
             continue
         if one.motion is not None:
             found.append((head + moves_like_a_body(one) + derived[k], k))
@@ -176,6 +176,10 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     if named:  # beside a position that is called one no reference or model is any
         beside = ("reference", "model")
         found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
+    if only is None and any(one.header.speed for one in pairs.signals):
+        found = [one for one in found if said(pairs.signals[one[1]], "y") >= 0.0]
+    if not found:
+        return []
     first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
     found = sorted(
         ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)
@@ -207,6 +211,7 @@ def _ways(
             continue
         v_share = 0.0 if one is alone else float(seen.v_share[k])
         physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
+        physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
@@ -281,7 +286,7 @@ def _gain_of_reference(seen: Seen, k: int) -> float:
     """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
     if k not in seen.as_reference:
         one = seen.pairs.signals[k]
-        head = said(one, "r")
+        head = max(0.0, said(one, "r")) if k in seen.controlled else said(one, "r")
         more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
         seen.as_reference[k] = head + more
     return seen.as_reference[k]
@@ -383,8 +388,9 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
-        follows = role != "r" or abs(_lead_of(best).likeness) >= ONE_SIGNAL
-        out[role] = odds if named and moves and follows else min(odds, SURE - 1.0)
+        found = _lead_of(best) if role == "r" else None
+        known = found is None or (follows(found) and not found.either)
+        out[role] = odds if named and moves and known else min(odds, SURE - 1.0)
     return out
 
 
@@ -419,10 +425,11 @@ def _reasons(best: _Choice) -> dict[str, str]:
     )
     if "r" in best.others:
         found = _lead_of(best)
-        follows = abs(found.likeness) >= ONE_SIGNAL
+        turned = ", turned in sign" if found.likeness < 0.0 else ""
+        late = ", or unturned half a period later" if found.either else ""
         out["r"] = (
-            f"the position follows it ({found.likeness:.0%} alike)"
-            if follows
+            f"the position follows it{turned} ({abs(found.likeness):.0%} alike){late}"
+            if follows(found)
             else "its header says so; the position does not follow it"
         )
     if "u" in best.others:
