@@ -224,3 +224,40 @@ def test_the_sign_of_a_reference_that_comes_back_is_open(tmp_path: Path, sign: f
     assert one.sure == (sign > 0.0)
     late = next(text for text in found.remarks if text.startswith("the position follows"))
     assert float(late.split()[-2]) == pytest.approx(29.0, abs=4.0)
+
+
+def test_noise_that_nothing_follows_is_no_command(joint: dict[str, Array], tmp_path: Path) -> None:
+    noise = 2e-3 * np.random.default_rng(1).standard_normal(len(T))
+    found = propose(tmp_path, "t,angle_deg,torque_Nm,motor_current_A", T, joint["y"], joint["F"],
+                    noise)  # fmt: skip
+    assert found.kind == "force" and found.signal("u") is None
+    assert "noise" in found.unused["'motor_current_A'"]
+
+
+@pytest.mark.parametrize("headers", ["commanded_steps,encoder_mm", "target_mm,position_mm"])
+def test_a_reference_and_a_position_alone_are_refused(
+    joint: dict[str, Array], tmp_path: Path, headers: str
+) -> None:
+    y = joint["y"]
+    late = np.concatenate([np.full(6, y[0]), y[:-6]])
+    with pytest.raises(BadLog, match="follows its reference") as refused:
+        propose(tmp_path, f"time_s,{headers}", T, np.round(4e3 * y), late)
+    assert "log its current, torque or force too" in str(refused.value)
+
+
+@pytest.mark.parametrize(("header", "told"), [("PI_output_A", True), ("current_A", False)])
+def test_a_controllers_output_may_lack_what_is_fed_forward(
+    joint: dict[str, Array], tmp_path: Path, header: str, told: bool
+) -> None:
+    found = propose(tmp_path, f"time_s,angle_deg,{header}", T, joint["y"], joint["u"])
+    assert found.kind == "motor"
+    assert any("feedforward of its own" in one for one in found.remarks) == told
+
+
+def test_a_column_that_stands_twice_is_in_no_other_unit(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    y = joint["y"]
+    found = propose(tmp_path, "t,a,b,c,torque_Nm", T, y, y, 57.3 * y, joint["F"])
+    said = sorted(found.unused[f"'{one}'"] for one in "abc" if f"'{one}'" in found.unused)
+    assert [one.partition("'")[0] for one in said] == ["equals ", "is "]

@@ -399,6 +399,8 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
         if name not in CARD_ORDER:
             of_another = one.axis not in ("", roles.columns["y"].axis)
             other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
+            if one.noisy and said(one, "u") >= SAID_SO:
+                other = "noise, which nothing follows: no command"
             out[one.shown] = roles.why.get(name, other)
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():

@@ -58,6 +58,7 @@ WORK_GIVES_SIGN = 0.3  # share of the exchanged work, the same of what its law h
 COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
+MOVES_NOTHING = 0.05  # share of a force's change, that noise explains at most
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
 EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
 MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
@@ -215,11 +216,18 @@ def _ways(
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
-        if as_command > -3.0:
+        if as_command > -3.0 and not _is_set_point(seen, k):
             score = as_command + physics + of_a_motor(one) + acting[k]
             yield _Way(seen, "motor", {"u": one}, law, force, score)
     if laws:
         yield from _chambers(seen, own)
+
+
+def _is_set_point(seen: Seen, k: int) -> bool:
+    """Whether a column in counts, as those of a stepper, is where the position goes."""
+    unit = seen.pairs.signals[k].header.unit
+    counts = unit is not None and unit.quantity in ("count", "position")
+    return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
 
 
 def _chambers(seen: Seen, own: float) -> Iterator[_Way]:
@@ -340,6 +348,8 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
         most = MOST_BY_CHANGE if head >= HEADER_SAYS else MOST_UNNAMED
         if head < HEADER_SAYS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
             return -3.0  # one more position, of a model or another sensor
+        if one.noisy and moved < MOVES_NOTHING:
+            return -3.0
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     return head + 1.0 if role == "F" else head - 1.0
 
