@@ -234,6 +234,18 @@ def test_speeds_and_rests_are_those_of_the_log(motor: tuple[Card, Table]) -> Non
     assert found.ways.rests > 5
 
 
+def test_what_a_coarse_sensor_calls_rest_is_told_by_its_speed(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+
+    def hidden(step: float) -> float:
+        found = look(card, {**table, "y": step * np.round(table["y"] / step)})
+        text = " ".join(doctor_view(found, None).text().split())
+        return float(text.partition("at rest (slower than ")[2].split()[0])
+
+    fine, coarse = hidden(1e-6), hidden(1e-3)
+    assert 0.0 < fine < coarse / 4.0
+
+
 def test_times_that_are_no_numbers_are_refused_and_no_fault(motor: tuple[Card, Table]) -> None:
     card, table = motor
     table["t"][::50] = np.inf

@@ -48,8 +48,8 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
     if "u" in roles.columns and set(words_of(roles.columns["u"].raw.header)) & CONTROLLERS:
         yield (
             f"by its header {roles.columns['u'].shown} is a controller's output: where the drive"
-            " adds a feedforward of its own, this is missing here, and friction comes out too small; log"
-            " what drives the motor, the sum of both (total current or torque)"
+            " adds a feedforward of its own, this is missing here, and friction comes out too"
+            " small; log what drives the motor, the sum of both (total current or torque)"
         )
     behind = behind_reference(roles)
     if behind is not None:
