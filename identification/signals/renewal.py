@@ -20,7 +20,12 @@ MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
 LONGEST_HOLD = 20  # samples for which a logger repeats a value; a command has longer steps
 RENEWED_AT, HELD_FOR = "the position is renewed at", "is renewed every"
-HELD = {"u": "the command", "F": "the force", "p_p": "the pressure p_p", "p_n": "the pressure p_n"}
+HELD_SIGNALS = {
+    "u": "the command",
+    "F": "the force",
+    "p_p": "the pressure p_p",
+    "p_n": "the pressure p_n",
+}
 COMMAND_COLUMN = "u"
 
 
@@ -56,9 +61,9 @@ def renewed(log: Log) -> Renewed:
 def held_drives(log: Log) -> tuple[str, ...]:
     """What is said of commands, forces and pressures renewed more slowly than the position."""
     least = max(USUAL_FROM - 1, held_for(log["y"]) if "y" in log else 1)
-    held = {name: held_for(log[name]) for name in HELD if name in log}
+    held = {name: held_for(log[name]) for name in HELD_SIGNALS if name in log}
     return tuple(
-        f"{log.name}: {HELD[name]} {HELD_FOR} {step} rows, at {1.0 / (step * log.h):.3g} Hz"
+        f"{log.name}: {HELD_SIGNALS[name]} {HELD_FOR} {step} rows, at {1.0 / (step * log.h):.3g} Hz"
         f" (zero-order hold), the log is written at {1.0 / log.h:.3g} Hz: a measured one is up to"
         f" {1e3 * step * log.h:.3g} ms old, which looks like a delay; log it in every row"
         for name, step in held.items()

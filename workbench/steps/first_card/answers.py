@@ -10,8 +10,8 @@ from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale
-from workbench.steps.first_card.columns import Column
-from workbench.steps.first_card.proposal import COLUMN, Proposal, SignalGuess
+from workbench.steps.first_card.columns import COLUMN, Column
+from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"

@@ -23,6 +23,7 @@ from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
 
+COLUMN = "column"
 MOST_ROWS_READ = 10_000
 MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
@@ -65,6 +66,11 @@ class Column:
         if not header:
             return f"number {number}"
         return repr(header) if header == self.raw.key else f"{header!r} (number {number})"
+
+    @property
+    def answer(self) -> str:
+        """The column as an answer names it, beside units."""
+        return f"{COLUMN} {self.raw.key}"
 
     @cached_property
     def numbers(self) -> Array:

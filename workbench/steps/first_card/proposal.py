@@ -23,12 +23,7 @@ from workbench.steps.first_card.refusals import (
     refuse_sign_bits,
     refuse_undriven,
 )
-from workbench.steps.first_card.remarks import (
-    BALANCED,
-    are_exchanged,
-    behind_reference,
-    remarks_on,
-)
+from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
@@ -46,7 +41,6 @@ DRIVEN_BY = {
     "velocity": "the velocity follows u",
 }
 VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
-COLUMN = "column"  # before a column that a signal would be otherwise, beside units
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AMBIENT = 1e5  # Pa
@@ -357,23 +351,18 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         sure = bool(odds >= SURE and unit.sure) and name not in exchanged
         rival = "" if sure else _rival(name, odds, unit, roles)
         if name in exchanged:
-            rival = _named(found[exchanged[name]])
+            rival = found[exchanged[name]].answer
         out.append(
             SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival)
         )
     return out
 
 
-def _named(one: Column) -> str:
-    """A column as an answer names it."""
-    return f"{COLUMN} {one.raw.key}"
-
-
 def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
     """What a signal would be otherwise: the next column where that is likely, else a unit."""
     other = roles.rivals.get(name)
     if other is not None and (odds < COLUMN_OPEN or not unit.rival):
-        return _named(other)
+        return other.answer
     return unit.rival
 
 
