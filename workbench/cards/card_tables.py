@@ -189,7 +189,8 @@ class RigSection(CardTable):
             with suppress(BadCard):
                 in_unit_of(self.force_per_command, over(force_unit(other), command), "")
                 said = f', which motion = "{self.motion}" needs; write motion = "{other}" in [rig]'
-                said += " if the machine is one, or correct this unit"
+                said += f" if the machine {'slides' if other == 'linear' else 'turns'}, or"
+                said += " correct this unit"
             raise BadCard(f"{error}{said}") from None
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:

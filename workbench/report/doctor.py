@@ -170,7 +170,10 @@ def _delay(one: Delay) -> str:
     what += one.on if one.of == "u" else ""
     if one.seconds is None:
         return f"{what}: none found"
-    return f"{what}{' after' if one.of == 'u' else ' by'} {1e3 * one.seconds:.3g} ms"
+    late = f"{1e3 * one.seconds:.3g} ms"
+    return (
+        f"{what} after {late}" if one.alike is None else f"{what} by {late} ({one.alike:.0%} alike)"
+    )
 
 
 def _way(found: Examined, one: Way) -> str:

@@ -146,6 +146,7 @@ def test_a_position_ahead_of_its_reference_is_told(
     said = "the columns of r and y look exchanged; exchange them in the card"
     text = doctor_view(found, None).text()
     assert any(said in one for one in found.remarks) == exchanged
+    assert ("behind its reference by" in text and "(100% alike)" in text) == (not exchanged)
     assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
 
 

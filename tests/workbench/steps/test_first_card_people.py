@@ -226,6 +226,13 @@ def test_the_sign_of_a_reference_that_comes_back_is_open(tmp_path: Path, sign: f
     assert float(late.split()[-2]) == pytest.approx(29.0, abs=4.0)
 
 
+def test_what_a_model_says_is_no_reference(joint: dict[str, Array], tmp_path: Path) -> None:
+    y = joint["y"]
+    late = np.concatenate([np.full(6, y[0]), y[:-6]])
+    with pytest.raises(BadLog, match="no column moves as a body"):
+        propose(tmp_path, "time_s,position_simulated,position_measured", T, y, late)
+
+
 def test_noise_that_nothing_follows_is_no_command(joint: dict[str, Array], tmp_path: Path) -> None:
     noise = 2e-3 * np.random.default_rng(1).standard_normal(len(T))
     found = propose(tmp_path, "t,angle_deg,torque_Nm,motor_current_A", T, joint["y"], joint["F"],

@@ -50,7 +50,7 @@ def no_body(columns: Columns) -> BadLog:
 def _followed(signals: Sequence[Column]) -> tuple[Column, Column] | None:
     """A position and the reference that it follows; None where there are no such two."""
     for y, r in permutations(signals, 2):
-        other = said(r, "F") <= NO_DRIVE and said(r, "p") <= NO_DRIVE
+        other = max(said(r, "F"), said(r, "p")) <= NO_DRIVE and r.header.purpose != "model"
         if said(y, "y") >= SAID_SO and other and lead(r.x, y.x).likeness > FOLLOWED:
             return y, r
     return None
