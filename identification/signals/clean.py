@@ -25,6 +25,7 @@ from identification.signals.even_clock import (
 from identification.signals.frozen import clipped, frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
+from identification.signals.renewal import held_for, new_values
 from identification.signals.steps import beside_gaps, small_spikes, white_noise
 
 LONGEST_REPAIR = 3
@@ -269,16 +270,20 @@ def _within_range(log: Log, first_row: int) -> tuple[Log, list[BadSamples]]:
 def limits(log: Log, name: str, done: Done = "kept") -> list[BadSamples]:
     """Where a signal stands at its largest or smallest value for several samples, a finding each.
 
-    Of a sensor of a force or pressure that is its range's end; a position may rest there.
+    Of a sensor of a force or pressure that is its range's end; a position may rest there. Of a
+    signal that the logger holds only new values count: the next has to be the same.
     """
     x = log[name]
+    step = held_for(x)
+    new = x if step == 1 else x[new_values(x, step)]
     low, high = float(x.min()), float(x.max())
     if low == high or len(np.unique(x)) < _LEVELS:
         return []
     out = []
     for limit in (low, high):
-        at = x == limit
-        if np.count_nonzero(at[1:] & at[:-1]) >= LONGEST_REPAIR:
+        again = new == limit
+        if np.count_nonzero(again[1:] & again[:-1]) >= LONGEST_REPAIR:
+            at = x == limit
             t, count = log["t"][at], int(at.sum())
             first, last = float(t[0]), float(t[-1])
             out.append(BadSamples(log.name, name, "saturated", first, last, count, None, done))

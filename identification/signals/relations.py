@@ -20,6 +20,7 @@ LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
 FEWEST_MOVING, FEWEST_OF_A_WAY = 60, 6  # samples in all, and in each direction
 ALIKE_CHANGES = 0.7  # correlation of two signals' changes, from which these give the lead
 LONGEST_LEAD = 0.1  # of the log, that one signal may be ahead of another
+AS_ALIKE = 0.1  # of a likeness, that another shift's is behind for the two to be as likely
 GIVES_SIGN = 0.1  # share of the exchanged work, from which its sign is that of the force
 
 
@@ -50,10 +51,12 @@ class ForceLaw(NamedTuple):
 
 
 class Lead(NamedTuple):
-    """By how many samples one signal is ahead of another, and how alike they then are (-1 to 1)."""
+    """By how many samples one signal is ahead of another, and how alike they then are (-1 to 1);
+    either: turned in sign, and about as alike unturned half a period on."""
 
     samples: float
     likeness: float
+    either: bool = False
 
 
 def motion_of(x: Array) -> Motion | None:
@@ -134,7 +137,9 @@ def lead(first: Array, second: Array) -> Lead:
     """By how many samples `first` is ahead of `second` (negative: behind).
 
     By the changes of both where these are alike, else, where noise hides the changes, by the
-    signals themselves: the largest correlation over shifts, by a parabola between samples.
+    signals themselves: the largest correlation over shifts, by a parabola between samples. Of a
+    periodic motion every half period is a match: the nearest unturned one counts, a turned one only
+    where `second` then follows by less.
     """
     by_change = _ahead(np.diff(first), np.diff(second))
     if by_change.likeness > ALIKE_CHANGES:
@@ -158,9 +163,26 @@ def _ahead(first: Array, second: Array) -> Lead:
     other = square_b[n - behind] - square_b[ahead]
     size = np.sqrt(np.maximum(own * other, 1e-300))
     likeness = np.concatenate([both[-reach:], both[: reach + 1]]) / size
-    best = int(np.argmax(np.abs(likeness)))
+    best, either = _nearest_match(likeness, reach)
     part = _vertex(np.abs(likeness), best)
-    return Lead(best - reach + part, float(np.clip(likeness[best], -1.0, 1.0)))
+    return Lead(best - reach + part, float(np.clip(likeness[best], -1.0, 1.0)), either)
+
+
+def _nearest_match(likeness: Array, none: int) -> tuple[int, bool]:
+    """The place of the match in likenesses over shifts (k,), of which `none` is that of no shift,
+    and whether its sign is open. Between two matches the likeness changes its sign."""
+    size = np.abs(likeness)
+    cuts = np.flatnonzero(np.diff(np.sign(likeness))) + 1
+    tops = [int(part[np.argmax(size[part])]) for part in np.split(np.arange(len(size)), cuts)]
+    near = [at for at in tops if size[at] >= (1.0 - AS_ALIKE) * size.max()]
+    near.sort(key=lambda at: abs(at - none))
+    turned = next((at for at in near if likeness[at] < 0.0 and at >= none), None)
+    plain = next((at for at in near if likeness[at] > 0.0), None)
+    if plain is None:
+        return int(np.argmax(size)), False
+    if turned is not None and turned - none < abs(plain - none):
+        return turned, True
+    return plain, False
 
 
 def _vertex(x: Array, at: int) -> float:

@@ -18,7 +18,14 @@ IN_STEP = 0.85  # of the times between new values, that are the usual one (or ne
 FEWEST_NEW = 40  # new values, which give the step
 MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
-RENEWED_AT = "the position is renewed at"
+LONGEST_HOLD = 20  # samples for which a logger repeats a value; a command has longer steps
+RENEWED_AT, HELD_FOR = "the position is renewed at", "is renewed every"
+HELD_SIGNALS = {
+    "u": "the command",
+    "F": "the force",
+    "p_p": "the pressure p_p",
+    "p_n": "the pressure p_n",
+}
 COMMAND_COLUMN = "u"
 
 
@@ -38,7 +45,7 @@ def renewed(log: Log) -> Renewed:
     step = held_for(log["y"]) if "y" in log else 1
     if step < USUAL_FROM:
         return Renewed(log, ())
-    at = _new(log["y"], step)
+    at = new_values(log["y"], step)
     signals = {
         key: x[at] if key in ("t", "y") or not np.all(np.isfinite(x)) else _mean(key, x, at)
         for key, x in log.signals.items()
@@ -51,8 +58,21 @@ def renewed(log: Log) -> Renewed:
     return Renewed(Log(log.name, signals), (said,))
 
 
+def held_drives(log: Log) -> tuple[str, ...]:
+    """What is said of commands, forces and pressures renewed more slowly than the position."""
+    least = max(USUAL_FROM - 1, held_for(log["y"]) if "y" in log else 1)
+    held = {name: held_for(log[name]) for name in HELD_SIGNALS if name in log}
+    return tuple(
+        f"{log.name}: {HELD_SIGNALS[name]} {HELD_FOR} {step} rows, at {1.0 / (step * log.h):.3g} Hz"
+        f" (zero-order hold), the log is written at {1.0 / log.h:.3g} Hz: a measured one is up to"
+        f" {1e3 * step * log.h:.3g} ms old, which looks like a delay; log it in every row"
+        for name, step in held.items()
+        if least < step <= LONGEST_HOLD
+    )
+
+
 def held_for(y: Array) -> int:
-    """Samples for which a position is held, 1 where it is not."""
+    """Samples for which a position or another signal is held, 1 where it is not."""
     if not np.all(np.isfinite(y)):
         return 1
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1
@@ -70,8 +90,8 @@ def held_for(y: Array) -> int:
     return usual if in_step and counts >= MANY_COUNTS else 1
 
 
-def _new(y: Array, step: int) -> IntArray:
-    """Samples at which the position is new; where it stays, as often as it is renewed."""
+def new_values(y: Array, step: int) -> IntArray:
+    """Samples at which a signal is new; where it stays, as often as it is renewed."""
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1
     ends = np.append(changes, len(y))
     parts = [

@@ -72,10 +72,11 @@ def test_a_card_that_is_there_stays(shop: Path, capsys: pytest.CaptureFixture[st
     assert (shop / "card.toml").read_text("utf-8") != "mine"
 
 
-def test_a_folder_gets_the_card(shop: Path) -> None:
+def test_a_folder_gets_the_card_though_it_is_not_there_yet(shop: Path) -> None:
     (shop / "bench").mkdir()
-    assert main(["init", "run.csv", "--out", "bench"]) == 0
-    assert (shop / "bench/card.toml").is_file()
+    for folder in ("bench", "new/"):
+        assert main(["init", "run.csv", "--out", folder]) == 0
+        assert (shop / folder / "card.toml").is_file()
 
 
 @pytest.mark.slow

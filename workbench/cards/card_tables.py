@@ -6,6 +6,7 @@ of texts with a unit, as `["10 N", "16 N"]`.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
@@ -178,14 +179,19 @@ class RigSection(CardTable):
         )
 
     def _per_command(self, per: str, command: str) -> float | None:
-        """The force per command in `per`; raises BadCard, naming the command's unit, where it is of
-        another."""
+        """The force per command in `per`; raises BadCard, naming the command's unit, or the motion,
+        where it is of another."""
         try:
             return in_unit_of(self.force_per_command, per, "rig.force_per_command")
         except BadCard as error:
-            raise BadCard(
-                f"{error}: by signals.u the command is in {command!r}; correct its unit, or this"
-            ) from None
+            other: Literal["linear", "rotary"] = "linear" if self.motion == "rotary" else "rotary"
+            said = f": by signals.u the command is in {command!r}; correct its unit, or this"
+            with suppress(BadCard):
+                in_unit_of(self.force_per_command, over(force_unit(other), command), "")
+                said = f', which motion = "{self.motion}" needs; write motion = "{other}" in [rig]'
+                said += f" if the machine {'slides' if other == 'linear' else 'turns'}, or"
+                said += " correct this unit"
+            raise BadCard(f"{error}{said}") from None
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
         """The unit of the command's column; a force where none is logged but its limit is given."""

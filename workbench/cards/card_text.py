@@ -1,11 +1,12 @@
 """A card written by a program, with a remark on each line."""
 
 import json
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-LONGEST_REMARK = 150  # characters; a reason longer than that is cut at a word
+LONGEST_REMARK = 150  # characters on a line; what is longer goes on below it
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ def card_text(
 
 
 def _line(one: Line, width: int) -> str:
-    remark = f"  # {_short(one.remark)}" if one.remark else ""
+    said = textwrap.wrap(_one_line(one.remark), LONGEST_REMARK)
+    remark = "  # " + "\n#     ".join(said) if said else ""
     if one.value is None:
         return f"# {one.key} = ...{remark}"
     return f"{one.key:{width}} = {toml(one.value)}{remark}"
@@ -58,10 +60,3 @@ def toml(value: Any) -> str:
 def _one_line(text: str) -> str:
     """The text without what no remark may hold."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
-
-
-def _short(text: str) -> str:
-    plain = _one_line(text)
-    if len(plain) <= LONGEST_REMARK:
-        return plain
-    return plain[:LONGEST_REMARK].rpartition(" ")[0] + " ..."

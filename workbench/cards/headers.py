@@ -46,6 +46,13 @@ class Header:
     doubtful: bool = False
     turning: float = 0.0
 
+    @property
+    def speed(self) -> bool:
+        """Whether it says that the column is a speed, and no position."""
+        if self.unit is not None and not self.doubtful:
+            return self.unit.quantity == "velocity"
+        return self.means.get("velocity", 0.0) >= _TWO_WEIGHTS and "position" not in self.means
+
 
 _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
     "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis 毫秒"
@@ -227,6 +234,8 @@ def written_unit(text: str) -> WrittenUnit | None:
 
 def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     """Name, unit, and whether the unit is doubtful."""
+    if (found := written_unit(text)) and found.quantity == "velocity":  # "rpm"
+        return text, found, False
     if _INDEX.search(text):  # "position[1]" of an array
         return text, None, False
     if inside := _BRACKETS.match(text):

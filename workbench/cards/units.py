@@ -32,6 +32,9 @@ _NAMES = {
 # Logs of forces are often in pounds: as a force they are read as pounds-force.
 _POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
 _POUND = re.compile(r"\b(lbs?|klb)\b")
+# As data sheets write them, without a sign between: Nm, Nms, kgm2, gcm^2.
+_RUN_TOGETHER = re.compile(r"(?<![^\W\d_])([Mkmµμu]?N|k?g)([cm]?m)?(s)?(?=[\d²³^*/·.\s()]|$)")
+_POWER = re.compile(r"(?<=[a-z])([234])(?![\w.])")  # of m2
 LONGEST_UNIT = 100  # characters of a unit
 MOST_POWERS = 6  # in a unit, as in kg^2 m^4 s^-6 A^-2
 _DIGIT = r"[+-]?\d(?:\.\d{1,3})?"
@@ -120,10 +123,12 @@ def conversion(unit: str, target: str | None, per: str | None = None) -> Scale |
 
 
 def _parsed(unit: str) -> "pint.Unit":
-    if len(unit) > LONGEST_UNIT or not _powers_are_small(unit):
+    parted = _RUN_TOGETHER.sub(lambda found: " ".join(filter(None, found.groups())), unit)
+    plain = _POWER.sub(r"^\1", parted)
+    if len(unit) > LONGEST_UNIT or not _powers_are_small(plain):
         raise _unknown(unit)
     try:
-        return _registry().Unit("dimensionless" if unit.strip() in ("", "1") else unit)
+        return _registry().Unit("dimensionless" if plain.strip() in ("", "1") else plain)
     except Exception as error:  # pint raises tokenizer and attribute errors on odd text
         raise _unknown(unit) from error
 

@@ -46,7 +46,8 @@ def command(
     from workbench.steps.first_card.written import checked_proposal, written
 
     card = out or Path(CARD)
-    card = card / CARD if card.is_dir() else card
+    if card.is_dir() or not (card.suffix or card.exists()):  # a folder that may not be there yet
+        card = card / CARD
     asking = not (yes or is_given(JSON)) and sys.stdin.isatty() and sys.stdout.isatty()
     _refuse_existing(card, force, asking)
     with progress("looking"):

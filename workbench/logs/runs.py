@@ -16,7 +16,7 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
-from identification.signals.renewal import renewed
+from identification.signals.renewal import held_drives, renewed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
@@ -75,7 +75,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
 def prepared(log: Log, first_row: int, path: Path, card: Card) -> Prepared:
     """The runs on an even clock of one log as it stands in a file from this row on."""
     fresh = renewed(log)
-    period, read = log.h if fresh.remarks else None, fresh.remarks
+    period, read = log.h if fresh.remarks else None, (*held_drives(log), *fresh.remarks)
     repaired = _repaired(fresh.log, first_row, path, card)
     del log, fresh  # of a long log a gigabyte
     rig = card.rig(path.name)

@@ -224,13 +224,13 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
     if at is None or not above:
         return spec, (), ()
     width = len(rows[at])
-    units = _units(rows[above[-1]], width) if len(above) > 1 else ()
-    head = above[-2] if units else above[-1]
+    below = above[-1]
+    units = _units(_uncommented(rows[below], spec), width)
+    if len(above) < 2 or len(_uncommented(rows[above[-2]], spec)) != width:
+        units = ()  # of no names: what looks like units is names of letters
+    head = above[-2] if units else below
     commented = rows[head][0].startswith(spec.comment)
-    names = [one.strip() for one in rows[head]]
-    if commented:
-        names[0] = names[0].lstrip("# ")
-        names = names if names[0] else names[1:]
+    names = _uncommented(rows[head], spec)
     by_number = spec.model_copy(update={"skip_rows": at, "header": False})
     if len(names) != width or all(map(is_number, names)):
         return by_number, (), ()
@@ -238,6 +238,15 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
         return by_number, tuple(names), units
     before = [k for k in above[:-1] if not rows[k][0].startswith(spec.comment)]
     return (spec.model_copy(update={"skip_rows": head}) if before else spec), (), ()
+
+
+def _uncommented(row: Sequence[str], spec: FileSpec) -> list[str]:
+    """The fields of a line, the sign of a comment before them taken off."""
+    fields = [one.strip() for one in row]
+    if not row[0].startswith(spec.comment):
+        return fields
+    fields[0] = fields[0].lstrip("# ")
+    return fields if fields[0] else fields[1:]
 
 
 def _first_of_data(rows: Sequence[Sequence[str]]) -> int | None:

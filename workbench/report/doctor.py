@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.log import Log
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
@@ -45,7 +46,8 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
     ways, can = list[tuple[str, str]](), list[str]()
     if found.ways is not None:
         own = found.ways
-        rests = f"reversals: {own.reversals}, rests: {own.rests}, at rest {own.rested:.3g} s"
+        rests = f"reversals: {own.reversals}, rests: {own.rests}, at rest{_slower(found)}"
+        rests += f" {own.rested:.3g} s"
         ways = [("direction +", _way(found, own.positive)),
                 ("direction -", _way(found, own.negative)),
                 ("motion", rests)]  # fmt: skip
@@ -168,7 +170,10 @@ def _delay(one: Delay) -> str:
     what += one.on if one.of == "u" else ""
     if one.seconds is None:
         return f"{what}: none found"
-    return f"{what}{' after' if one.of == 'u' else ' by'} {1e3 * one.seconds:.3g} ms"
+    late = f"{1e3 * one.seconds:.3g} ms"
+    return (
+        f"{what} after {late}" if one.alike is None else f"{what} by {late} ({one.alike:.0%} alike)"
+    )
 
 
 def _way(found: Examined, one: Way) -> str:
@@ -177,6 +182,15 @@ def _way(found: Examined, one: Way) -> str:
         f"{one.seconds:.3g} s in motion at {factor * one.slow:.3g} to {factor * one.fast:.3g}"
         f" {unit}; starts from rest: {one.starts}, with a breakaway force: {one.breakaways}"
     )
+
+
+def _slower(found: Examined) -> str:
+    """Below which speed rest and motion are not distinguished: that which the noise and the step of
+    the position may show."""
+    if found.motion is None:
+        return ""
+    factor, unit = speed_unit(found)
+    return f" (slower than {factor * SURE_OF_DIRECTION * found.motion.v_noise:.3g} {unit})"
 
 
 def _together(said: Iterable[tuple[str, str]]) -> list[str]:

@@ -68,11 +68,13 @@ class SensorState:
 
 @dataclass(frozen=True)
 class Delay:
-    """By how much one signal acts late on another [s]; None where none shows."""
+    """By how much one signal acts late on another [s], None where none shows; alike: of a
+    reference, the correlation that it then has with the position."""
 
     of: str
     on: str
     seconds: float | None
+    alike: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +265,8 @@ def _delays(log: Log, motion: Motion, late_command: float | None) -> tuple[Delay
             out.append(Delay("u", "motion", late_command or None))
     if "r" in log and np.ptp(log["r"]) > 0.0:
         found = lead(log["r"], log["y"])
-        out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))
+        shown = found.samples * log.h if found.likeness > 0.5 else None
+        out.append(Delay("r", "y", shown, found.likeness))
     return tuple(out)
 
 

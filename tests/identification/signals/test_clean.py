@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.errors import BadLog, BadSpecification
 from identification.log import Log, Rig
 from identification.signals.check import work_share
-from identification.signals.clean import applied_force, check, prepare, repair
+from identification.signals.clean import applied_force, check, limits, prepare, repair
 from identification.signals.differentiate import resolution
 from identification.signals.even_clock import even_clock, rows_lost
 from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
@@ -363,6 +363,19 @@ def test_a_command_at_its_limit_is_told_and_kept() -> None:
     made = prepare(log.with_signals(u=u), RIG)
     assert {(one.kind, one.done) for one in made.bad} == {("saturated", "kept")}
     np.testing.assert_array_equal(made.runs[0]["u"], u)
+
+
+def test_a_value_that_a_logger_repeats_is_no_limit() -> None:
+    """The largest value of a held command is a limit where the next new one is the same."""
+    log = sliding_log()
+    loop = np.random.default_rng(2).standard_normal(len(log)) + 10.0 * np.sin(
+        0.37 * log["t"] ** 1.1
+    )
+    for step in (6, 8):
+        u = np.repeat(loop[::step], step)[: len(log)]
+        assert limits(log.with_signals(u=u), "u") == []
+        told = limits(log.with_signals(u=np.clip(u, -9.0, 9.0)), "u")
+        assert {one.kind for one in told} == {"saturated"}
 
 
 def noisy_force(log: Log) -> Log:

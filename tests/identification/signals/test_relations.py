@@ -93,6 +93,27 @@ def test_a_reference_is_ahead_by_its_lag(late: int, seed: int) -> None:
     assert lead(y, r).samples == pytest.approx(-late, abs=1.0)
 
 
+@pytest.mark.parametrize("late", [0, 20, 36])
+@pytest.mark.parametrize("period", [250.0, 400.0])
+def test_half_a_period_is_no_lag(late: int, period: float) -> None:
+    phase = 2.0 * np.pi * (T / 1e-3 + 3e-4 * np.arange(N) ** 2 / 8.0) / period
+    r = np.sin(phase)
+    y = np.concatenate([np.full(late, r[0]), r])[:N] * (1.0 + 0.3 * np.sin(phase / 2.0) ** 2)
+    found = lead(r, y)
+    assert found.samples == pytest.approx(late, abs=0.03 * period)
+    assert found.likeness > 0.9 and not found.either
+    turned = lead(r, -y)
+    assert turned.samples == pytest.approx(late, abs=0.03 * period)
+    assert turned.likeness < -0.9 and turned.either
+    assert lead(y, r).likeness > 0.9
+
+
+def test_a_reference_that_never_comes_back_has_one_sign() -> None:
+    y = np.cumsum(np.cumsum(np.random.default_rng(5).standard_normal(N)))
+    found = lead(-y, y)
+    assert found.likeness < -0.9 and not found.either
+
+
 def test_what_is_constant_is_ahead_of_nothing() -> None:
     assert lead(np.ones(N), swing(np.random.default_rng(4))).likeness == 0.0
 

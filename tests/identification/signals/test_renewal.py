@@ -5,7 +5,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.log import Log
-from identification.signals.renewal import held_for, renewed
+from identification.signals.renewal import held_drives, held_for, renewed
 
 H = 2e-3
 T = H * np.arange(6000, dtype=np.float64)
@@ -54,3 +54,13 @@ def test_new_positions_are_kept_with_the_mean_command_until_the_next() -> None:
 def test_a_log_without_renewals_is_the_same() -> None:
     log = Log("a", {"t": T, "y": motion(2)})
     assert renewed(log).log is log and renewed(log).remarks == ()
+
+
+def test_a_command_that_is_renewed_less_often_than_the_position_is_told() -> None:
+    rng = np.random.default_rng(5)
+    log = Log("a", {"t": T, "y": motion(2), "u": held(rng.standard_normal(len(T)), 7)})
+    (said,) = held_drives(log)
+    assert "the command is renewed every 7 rows, at 71.4 Hz" in said and "14 ms old" in said
+    assert held_drives(log.with_signals(y=held(motion(2), 7))) == ()  # which it waits for
+    assert held_drives(log.with_signals(u=held(log["u"], 100))) == ()  # steps of a command
+    assert held_drives(log.with_signals(u=rng.standard_normal(len(T)))) == ()

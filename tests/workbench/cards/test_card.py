@@ -127,6 +127,28 @@ def test_a_force_of_another_command_names_the_commands_unit(tmp_path: Path) -> N
     assert said in refusal(tmp_path, text)
 
 
+@pytest.mark.parametrize(
+    ("motion", "other", "unit"), [("rotary", "linear", "N/A"), ("linear", "rotary", "Nm/A")]
+)
+def test_a_force_of_the_other_motion_names_it(
+    tmp_path: Path, motion: str, other: str, unit: str
+) -> None:
+    text = f"""[card]
+name = "a"
+[rig]
+kind = "motor"
+motion = "{motion}"
+force_per_command = "3 {unit}"
+[signals]
+t = {{ column = "t", unit = "s" }}
+y = {{ column = "y", unit = "count", gain = 100 }}
+u = {{ column = "i", unit = "A" }}
+"""
+    said = f'which motion = "{motion}" needs; write motion = "{other}" in [rig]'
+    assert said in refusal(tmp_path, text)
+    load_card(write(tmp_path, text.replace(f'"{motion}"', f'"{other}"')))
+
+
 def test_split_names_known_files_once(tmp_path: Path) -> None:
     files = CONTRACT + '[[files]]\nname = "run1.csv"\n[split]\n'
     assert "'run1.csv'?" in refusal(tmp_path, files + 'train = ["run2.csv"]')

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.errors import BadCard
-from workbench.cards.units import Motion, column_scale
+from workbench.cards.units import Motion, column_scale, conversion, in_unit_of
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,19 @@ def test_known_conversions(unit: str, signal: str, motion: Motion, factor: float
     found = column_scale(unit, None, signal, motion)
     assert found.factor == pytest.approx(factor, rel=1e-10)
     assert found.shift == 0.0
+
+
+@pytest.mark.parametrize(
+    ("sheet", "factor", "unit"),
+    [("Nm", 1.0, "N m"), ("mNm", 1e-3, "N m"), ("Ncm", 1e-2, "N m"), ("Nm/A", 1.0, "N m/A"),
+     ("mNm/A", 1e-3, "N m/A"), ("kgm2", 1.0, "kg m^2"), ("kg*m^2", 1.0, "kg m^2"),
+     ("gcm²", 1e-7, "kg m^2"), ("kgcm^2", 1e-4, "kg m^2"), ("kg m2", 1.0, "kg m^2"),
+     ("Nms/rad", 1.0, "N m s/rad"), ("Nm/(rad/s)", 1.0, "N m s/rad"), ("Ns/m", 1.0, "N s/m")],
+)  # fmt: skip
+def test_units_of_data_sheets_are_read(sheet: str, factor: float, unit: str) -> None:
+    found = conversion(sheet, unit)
+    assert found is not None and found.factor == pytest.approx(factor)
+    assert in_unit_of(f"2 {sheet}", unit, "rig.number") == pytest.approx(2.0 * factor)
 
 
 def test_temperature_has_an_offset() -> None:

@@ -35,6 +35,17 @@ def test_a_plain_header_needs_no_layout(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.columns[1].values, S["y"], rtol=1e-8)
 
 
+@pytest.mark.parametrize("above", ["#Bench OL_Test", "# made by a logger, 2009", ""])
+def test_names_stand_in_the_last_comment_though_they_look_like_units(
+    tmp_path: Path, above: str
+) -> None:
+    found = read_unknown(write(tmp_path, text([above, "#t\tu\tv"], "\t")))
+    assert [one.header for one in found.columns] == ["t", "u", "v"]
+    below = read_unknown(write(tmp_path, text([above, "# t\ty\tF", "# s\tmm\tN"], "\t")))
+    assert [one.header for one in below.columns] == ["t", "y", "F"]
+    assert [one.unit_below for one in below.columns] == ["s", "mm", "N"]
+
+
 def test_without_a_header_columns_go_by_number(tmp_path: Path) -> None:
     found = read_unknown(write(tmp_path, text([])))
     assert [one.key for one in found.columns] == [0, 1, 2]

@@ -146,6 +146,7 @@ def test_a_position_ahead_of_its_reference_is_told(
     said = "the columns of r and y look exchanged; exchange them in the card"
     text = doctor_view(found, None).text()
     assert any(said in one for one in found.remarks) == exchanged
+    assert ("behind its reference by" in text and "(100% alike)" in text) == (not exchanged)
     assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
 
 
@@ -232,6 +233,18 @@ def test_speeds_and_rests_are_those_of_the_log(motor: tuple[Card, Table]) -> Non
     moved = found.ways.positive.seconds + found.ways.negative.seconds
     assert 0.2 * found.clock.duration < moved < found.clock.duration
     assert found.ways.rests > 5
+
+
+def test_what_a_coarse_sensor_calls_rest_is_told_by_its_speed(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+
+    def hidden(step: float) -> float:
+        found = look(card, {**table, "y": step * np.round(table["y"] / step)})
+        text = " ".join(doctor_view(found, None).text().split())
+        return float(text.partition("at rest (slower than ")[2].split()[0])
+
+    fine, coarse = hidden(1e-6), hidden(1e-3)
+    assert 0.0 < fine < coarse / 4.0
 
 
 def test_times_that_are_no_numbers_are_refused_and_no_fault(motor: tuple[Card, Table]) -> None:

@@ -10,10 +10,11 @@ from benchmarks.init_people import KINDS, make_file
 from benchmarks.init_real_tables import fewest_wrong, machine
 from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
+from identification.errors import BadLog
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
 from workbench.page.card_form import OTHER_FIELD, form_of, stored_form
-from workbench.steps.first_card.answers import BadAnswer, with_rig
+from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
 from workbench.steps.first_card.proposal import Proposal, proposed
 from workbench.steps.first_card.written import checked_proposal, written
 
@@ -168,3 +169,102 @@ def test_a_proposal_keeps_its_other_through_answers(
     found = propose(tmp_path, "t,a1,a2", T, joint["y"], joint["F"])
     assert replace(found, name="b").other is found.other
     assert with_rig(found, "kind", "").kind == found.kind
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        "time,rpm,voltage",
+        "time_s,Speed actual,torque_Nm",
+        "t,omega [rad/s],Force_N",
+        "t,deg/s,iq_A",
+    ],
+)
+def test_a_speed_is_no_position(joint: dict[str, Array], tmp_path: Path, headers: str) -> None:
+    with pytest.raises(BadLog, match="is a speed, and there is no position") as refused:
+        propose(tmp_path, headers, T, joint["v"], joint["F"])
+    assert ("1 rpm for 1 s is 6 deg" in str(refused.value)) == ("rpm" in headers)
+    found = propose(tmp_path, headers + ",angle_deg", T, joint["v"], joint["F"], joint["y"])
+    assert {one.name: one.column for one in found.signals}["y"] == "angle_deg"
+
+
+def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:
+    """Of r, k (r - y) and y the first is the reference, though its header says u."""
+    r = np.sin(2.0 * np.pi * (1.0 + 0.1 * T) * T)
+    y, v, held = np.zeros(len(T)), 0.0, np.zeros(len(T))
+    for k in range(1, len(T)):
+        held[k - 1] = 30.0 * (r[k - 1] - y[k - 1]) - 0.2 * v
+        v += 2e-3 * (40.0 * held[k - 1] - 25.0 * v - 15.0 * np.sign(v))
+        y[k] = y[k - 1] + 2e-3 * v
+    found = propose(tmp_path, "t,u,v,$\\theta$", T, 50.0 * r, 50.0 * held, 50.0 * y)
+    columns = {one.name: one.shown for one in found.signals}
+    assert (columns["r"], columns["u"]) == ("'u'", "'v'")
+
+
+def test_another_column_is_called_one(joint: dict[str, Array], tmp_path: Path) -> None:
+    """In a file without names a number alone beside a unit says nothing."""
+    path = tmp_path / "run.csv"
+    np.savetxt(path, np.column_stack([T, joint["y"], joint["u"], joint["F"]]), delimiter=",")
+    found = proposed(path)
+    one = next(one for one in found.signals if one.rival.startswith("column "))
+    after = with_signal(found, one.name, "+").signal(one.name)
+    assert after is not None and f"column {after.column}" == one.rival
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_sign_of_a_reference_that_comes_back_is_open(tmp_path: Path, sign: float) -> None:
+    """Half a period on it is as alike: unturned it counts, turned it is a guess."""
+    phase = 2.0 * np.pi * (2.0 + 0.02 * T) * T
+    y = np.sin(phase - 0.4) * (1.0 + 0.2 * np.sin(0.3 * phase))
+    drive = np.gradient(np.gradient(y)) + 2e-4 * np.sign(np.gradient(y))
+    found = propose(tmp_path, "time_s,target_mm,position_mm,current_A", T, sign * np.sin(phase), y,
+                    1e4 * drive)  # fmt: skip
+    one = found.signal("r")
+    assert one is not None and one.gain == (None if sign > 0.0 else -1.0)
+    assert one.sure == (sign > 0.0)
+    late = next(text for text in found.remarks if text.startswith("the position follows"))
+    assert float(late.split()[-2]) == pytest.approx(29.0, abs=4.0)
+
+
+def test_what_a_model_says_is_no_reference(joint: dict[str, Array], tmp_path: Path) -> None:
+    y = joint["y"]
+    late = np.concatenate([np.full(6, y[0]), y[:-6]])
+    with pytest.raises(BadLog, match="no column moves as a body"):
+        propose(tmp_path, "time_s,position_simulated,position_measured", T, y, late)
+
+
+def test_noise_that_nothing_follows_is_no_command(joint: dict[str, Array], tmp_path: Path) -> None:
+    noise = 2e-3 * np.random.default_rng(1).standard_normal(len(T))
+    found = propose(tmp_path, "t,angle_deg,torque_Nm,motor_current_A", T, joint["y"], joint["F"],
+                    noise)  # fmt: skip
+    assert found.kind == "force" and found.signal("u") is None
+    assert "noise" in found.unused["'motor_current_A'"]
+
+
+@pytest.mark.parametrize("headers", ["commanded_steps,encoder_mm", "target_mm,position_mm"])
+def test_a_reference_and_a_position_alone_are_refused(
+    joint: dict[str, Array], tmp_path: Path, headers: str
+) -> None:
+    y = joint["y"]
+    late = np.concatenate([np.full(6, y[0]), y[:-6]])
+    with pytest.raises(BadLog, match="follows its reference") as refused:
+        propose(tmp_path, f"time_s,{headers}", T, np.round(4e3 * y), late)
+    assert "log its current, torque or force too" in str(refused.value)
+
+
+@pytest.mark.parametrize(("header", "told"), [("PI_output_A", True), ("current_A", False)])
+def test_a_controllers_output_may_lack_what_is_fed_forward(
+    joint: dict[str, Array], tmp_path: Path, header: str, told: bool
+) -> None:
+    found = propose(tmp_path, f"time_s,angle_deg,{header}", T, joint["y"], joint["u"])
+    assert found.kind == "motor"
+    assert any("feedforward of its own" in one for one in found.remarks) == told
+
+
+def test_a_column_that_stands_twice_is_in_no_other_unit(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    y = joint["y"]
+    found = propose(tmp_path, "t,a,b,c,torque_Nm", T, y, y, 57.3 * y, joint["F"])
+    said = sorted(found.unused[f"'{one}'"] for one in "abc" if f"'{one}'" in found.unused)
+    assert [one.partition("'")[0] for one in said] == ["equals ", "is "]

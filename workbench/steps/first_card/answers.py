@@ -10,7 +10,7 @@ from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale
-from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.columns import COLUMN, Column
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"
@@ -115,6 +115,7 @@ def _other(text: str, rival: str) -> str:
 def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
     """The signal from a column, a unit, or both."""
     names = _names(of)
+    text = text if text in names else text.removeprefix(f"{COLUMN} ")
     given = replace(one, sure=True, why="given on the terminal")
     before, _, last = text.rpartition(" ")
     if column := names.get(text) or names.get(before.strip()):

@@ -23,11 +23,13 @@ from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
 
+COLUMN = "column"
 MOST_ROWS_READ = 10_000
 MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
+MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
@@ -65,6 +67,11 @@ class Column:
             return f"number {number}"
         return repr(header) if header == self.raw.key else f"{header!r} (number {number})"
 
+    @property
+    def answer(self) -> str:
+        """The column as an answer names it, beside units."""
+        return f"{COLUMN} {self.raw.key}"
+
     @cached_property
     def numbers(self) -> Array:
         """The first values that are numbers, as many as are looked at."""
@@ -80,6 +87,11 @@ class Column:
     def noise(self) -> float:
         """White noise and rounding of the column, one sigma."""
         return local_noise(self.x)
+
+    @cached_property
+    def noisy(self) -> bool:
+        """Whether it is white noise, and next to nothing else."""
+        return self.noise > MOSTLY_NOISE * float(np.std(self.x))
 
     @cached_property
     def levels(self) -> Array:
@@ -335,7 +347,11 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
         if same is None:
             distinct.append(one)
         else:
-            twice[one.raw.number] = f"is {same.shown} in another unit"
+            equal = np.array_equal(one.values, same.values, equal_nan=True)
+            said = (
+                f"equals {same.shown} in every row" if equal else f"is {same.shown} in another unit"
+            )
+            twice[one.raw.number] = said
     return sorted(distinct, key=lambda one: one.raw.number), twice
 
 

@@ -26,7 +26,10 @@ DIFFERENCE, SAME_FACTOR = 0.9995, 0.02  # share of an error that two signals' di
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
 SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+OF_TWO, OF_ONE = 0.9, 0.5  # share of a controller's output that its error explains, and one of both
+LIKE_GAINS = 2.0  # times the one's gain in it, that the other's is at most
 ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
+SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
@@ -47,14 +50,19 @@ class Pairs:
         self.bodies = dict[int, Seen]()
 
     @cached_property
+    def gram(self) -> Array:
+        """Products of the signals about their means, (k, k)."""
+        centred = self.x - self.x.mean(axis=0)
+        return np.asarray(centred.T @ centred)
+
+    @cached_property
     def errors(self) -> dict[int, set[tuple[int, int]]]:
         """Signals that are the difference of two others, as a following error is, by their place:
         the places of the two, the first before the second.
 
         Of three such the smallest is the error; what is fed forward goes less with either.
         """
-        centred = self.x - self.x.mean(axis=0)
-        gram = centred.T @ centred
+        gram = self.gram
         square = np.maximum(np.diag(gram), 1e-300)
         out: dict[int, set[tuple[int, int]]] = {}
         for i in range(len(self.signals) - 1):
@@ -88,6 +96,11 @@ class Pairs:
             elif i not in out and (part := _added(self.signals, i, j)) is not None:
                 out |= {i: j, part: j}
         return out
+
+
+def follows(found: Lead) -> bool:
+    """Whether a position so alike follows a reference, or one of the other sign."""
+    return found.likeness >= ONE_SIGNAL or found.likeness < -SURELY_TURNED
 
 
 def _rates(x: Array) -> tuple[Array, Array]:
@@ -190,6 +203,24 @@ class Seen:
     def laws(self) -> list[ForceLaw]:
         """What of each column is the force along the position; empty where too little moves."""
         return force_laws(self.motion, self.y.x, self.pairs.x, self.smooth)
+
+    @cached_property
+    def controlled(self) -> set[int]:
+        """Columns called a command, by their place, whose difference from the position another one
+        follows: they command a controller, whose output that is, and not the motor."""
+        gram, at = self.pairs.gram, self.at
+        square, with_y = np.maximum(np.diag(gram), 1e-300), gram[at]
+        det = square[at] * square - with_y**2
+        det = np.where(det > 1e-9 * square[at] * square, det, np.inf)[:, None]
+        own = (square[at] * gram - with_y[:, None] * with_y) / det  # of each, in each other one
+        of_y = (square[:, None] * with_y - with_y[:, None] * gram) / det
+        share = (own * gram + of_y * with_y) / square
+        alone = np.maximum(gram**2 / square[:, None], with_y**2 / square[at]) / square
+        gains = -of_y / np.where(own == 0.0, np.inf, own)
+        like = (gains > 1.0 / LIKE_GAINS) & (gains < LIKE_GAINS)
+        found = np.any(like & (share > OF_TWO) & (alone < OF_ONE), axis=1)
+        called = (one.header.means for one in self.pairs.signals)
+        return {k for k, means in enumerate(called) if found[k] and "command" in means}
 
     def lead(self, k: int) -> Lead:
         """By how much a column is ahead of the position."""

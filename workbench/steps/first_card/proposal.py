@@ -23,12 +23,7 @@ from workbench.steps.first_card.refusals import (
     refuse_sign_bits,
     refuse_undriven,
 )
-from workbench.steps.first_card.remarks import (
-    BALANCED,
-    are_exchanged,
-    behind_reference,
-    remarks_on,
-)
+from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
@@ -356,7 +351,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         sure = bool(odds >= SURE and unit.sure) and name not in exchanged
         rival = "" if sure else _rival(name, odds, unit, roles)
         if name in exchanged:
-            rival = str(found[exchanged[name]].raw.key)
+            rival = found[exchanged[name]].answer
         out.append(
             SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival)
         )
@@ -367,7 +362,7 @@ def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
     """What a signal would be otherwise: the next column where that is likely, else a unit."""
     other = roles.rivals.get(name)
     if other is not None and (odds < COLUMN_OPEN or not unit.rival):
-        return str(other.raw.key)
+        return other.answer
     return unit.rival
 
 
@@ -393,6 +388,8 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
         if name not in CARD_ORDER:
             of_another = one.axis not in ("", roles.columns["y"].axis)
             other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
+            if one.noisy and said(one, "u") >= SAID_SO:
+                other = "noise, which nothing follows: no command"
             out[one.shown] = roles.why.get(name, other)
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():

@@ -1,19 +1,39 @@
 """Logs of which no card is proposed, each with its reason; and the columns of one axis."""
 
 from collections.abc import Sequence
+from itertools import permutations
 
 from identification.errors import BadLog
+from identification.signals.relations import lead
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import Column, Columns
 from workbench.steps.first_card.motion_guess import is_current
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.weights import SURE, said
 
+FOLLOWED = 0.95  # likeness of a position and its reference in a log without a drive
+NO_DRIVE = 0.0  # log-odds of a force by its header, of what may be a reference at most
 SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
 
 
 def no_body(columns: Columns) -> BadLog:
     """The one line for a log of which no column moves as a body that is driven."""
+    speeds = [one for one in columns.signals if one.header.speed]
+    if speeds and all(said(one, "y") < 0.0 for one in columns.signals):
+        one = min(speeds, key=lambda one: one.header.purpose == "reference")
+        turns = one.header.unit is not None and one.header.unit.card == "rpm"
+        how = " (1 rpm for 1 s is 6 deg)" if turns else ""
+        return BadLog(
+            f"{columns.log.path}: column {one.shown} is a speed, and there is no position, which"
+            " every card needs; log the position too, or add a column of it, the speed summed over"
+            f" time{how}"
+        )
+    if (pair := _followed(columns.signals)) is not None:
+        return BadLog(
+            f"{columns.log.path}: column {pair[0].shown} follows its reference {pair[1].shown}, and"
+            " no force and no command of the motor is logged; log its current, torque or force too:"
+            " reference and position alone identify no friction"
+        )
     there = ", ".join(one.shown for one in columns.signals) or "none"
     left_out = "; ".join(
         f"left out: column {one.shown}: {why}"
@@ -25,6 +45,15 @@ def no_body(columns: Columns) -> BadLog:
         " beside it a force, two pressures or a motor's command; or write the card by hand"
         " (manual: The card, key by key)"
     )
+
+
+def _followed(signals: Sequence[Column]) -> tuple[Column, Column] | None:
+    """A position and the reference that it follows; None where there are no such two."""
+    for y, r in permutations(signals, 2):
+        other = max(said(r, "F"), said(r, "p")) <= NO_DRIVE and r.header.purpose != "model"
+        if said(y, "y") >= SAID_SO and other and lead(r.x, y.x).likeness > FOLLOWED:
+            return y, r
+    return None
 
 
 def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Column | None]:

@@ -8,12 +8,14 @@ import numpy as np
 
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
+from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.pairs import ONE_SIGNAL
+from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
 
+CONTROLLERS = {"controller", "pid", "pi", "pd", "regler", "regulator"}  # in a header
 BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
 
 
@@ -43,14 +45,23 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
             f"inertia and friction explain only {roles.law.share:.0%} of what drives: a weight or a"
             " spring is in it, or it is not what drives this position"
         )
+    if "u" in roles.columns and set(words_of(roles.columns["u"].raw.header)) & CONTROLLERS:
+        yield (
+            f"by its header {roles.columns['u'].shown} is a controller's output: where the drive"
+            " adds a feedforward of its own, this is missing here, and friction comes out too"
+            " small; log what drives the motor, the sum of both (total current or torque)"
+        )
     behind = behind_reference(roles)
     if behind is not None:
         late = 1e3 * behind * h * columns.grid
         said = f"the position follows the reference by {late:.3g} ms"
         if late < 0.0:
-            said = f"the position is ahead of the reference by {-late:.3g} ms"
+            said = "the position follows the reference within a sample"
         if are_exchanged(behind):
-            said += ", as no loop makes it: the two columns may be the other way round"
+            said = (
+                f"the position is ahead of the reference by {-late:.3g} ms, as no loop makes it:"
+                " the two columns may be the other way round"
+            )
         yield said
 
 
@@ -60,7 +71,7 @@ def behind_reference(roles: Roles) -> float | None:
     if "r" not in roles.columns:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)
-    return found.samples if abs(found.likeness) >= ONE_SIGNAL else None
+    return found.samples if follows(found) else None
 
 
 def are_exchanged(behind: float) -> bool:

@@ -43,7 +43,6 @@ FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so 
 MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
 BEHIND = -6.0  # for a reference that is behind the position, as another sensor or a model is
 ROUGHER = 3.0  # times the position's noise, that a reference hardly has
-SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 FORCE_LIKENESS = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
@@ -53,6 +52,7 @@ ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
+OF_A_CONTROLLER = -6.0  # for a drive whose difference from the position another column follows
 STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
@@ -250,7 +250,7 @@ def ahead_of(seen: Seen, k: int) -> float:
     if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
         score = min(score, 0.0)
     pair = (min(k, seen.at), max(k, seen.at))
-    if any(pair in of for of in seen.pairs.errors.values()):
+    if k in seen.controlled or any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
     return score + _named_for(seen, k)
 

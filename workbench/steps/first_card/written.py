@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from identification.errors import UserError
-from identification.signals.renewal import RENEWED_AT
+from identification.signals.renewal import HELD_FOR, RENEWED_AT
 from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
@@ -90,5 +90,7 @@ def checked_proposal(of: Proposal) -> Proposal:
     except UserError as error:
         return replace(of, refused=str(error))
     before = f"{of.path.name}: "
-    renewed = [one.removeprefix(before) for one in found.remarks if RENEWED_AT in one]
+    renewed = [
+        one.removeprefix(before) for one in found.remarks if RENEWED_AT in one or HELD_FOR in one
+    ]
     return replace(of, hardly=tuple(dict.fromkeys([*lines, *renewed])))

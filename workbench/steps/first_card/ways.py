@@ -1,0 +1,191 @@
+"""What may be the position, and what may drive it: a force, two pressures, or a motor's command."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.log import RigKind
+from identification.signals.relations import ForceLaw, force_laws
+from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.weights import (
+    AREA_RATIOS,
+    FORCE_LIKENESS,
+    MIRRORED,
+    OF_A_CONTROLLER,
+    ahead_of,
+    among_derivatives,
+    driving,
+    in_one_unit,
+    less_way,
+    moves_like_a_body,
+    of_a_motor,
+    said,
+    together,
+    turned,
+)
+
+MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
+FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
+FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
+SAME_POSITION = 0.95  # correlation with the position, that no command has
+EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
+MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
+HEADER_SAYS = 2.0  # log-odds by a header, without which no role is sure
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A body and what drives it: the columns by role, their law, the force (n,), log-odds."""
+
+    seen: Seen
+    kind: RigKind
+    columns: Mapping[str, Column]
+    law: ForceLaw
+    force: Array
+    score: float
+    area_ratio: float = 1.0
+
+    @property
+    def y(self) -> Column:
+        return self.seen.y
+
+
+def bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
+    """The columns that may be the position, likeliest first, with their log-odds so far."""
+    found = []
+    derived = among_derivatives(pairs)
+    for k, one in enumerate(pairs.signals):
+        head = said(one, "y")
+        if one is not only and (only is not None or head <= -4.0 or one.header.speed):
+            continue
+        if one.motion is not None:
+            found.append((head + moves_like_a_body(one) + derived[k], k))
+    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_SAYS]
+    if named:  # beside a position that is called one no reference or model is any
+        beside = ("reference", "model")
+        found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
+    if only is None and any(one.header.speed for one in pairs.signals):
+        found = [one for one in found if said(pairs.signals[one[1]], "y") >= 0.0]
+    if not found:
+        return []
+    first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
+    found = sorted(
+        ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)
+         for own, k in found),
+        reverse=True,
+    )  # fmt: skip
+    likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
+    pairs.bodies = {k: Seen(pairs, k) for _, k in likely}
+    return [(pairs.bodies[k], score) for score, k in likely]
+
+
+def ways_of(
+    seen: Seen, own: float, drive: Sequence[float], acting: Sequence[float]
+) -> Iterator[Way]:
+    """What may drive the body: a force, the difference of two pressures, or the command itself.
+
+    drive, acting: log-odds of each signal as either, by what it is of the others.
+    """
+    laws, y, pairs = seen.laws, seen.y, seen.pairs
+    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_SAYS]
+    # what the velocity follows may well drive a valve, where nothing else is said to drive
+    alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
+    for k, law in enumerate(laws):
+        one = pairs.signals[k]
+        if one is y:
+            continue
+        as_force, as_command = said(one, "F"), said(one, "u")
+        if max(as_force, as_command) <= -3.0:
+            continue
+        v_share = 0.0 if one is alone else float(seen.v_share[k])
+        physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
+        physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
+        force = law.way * seen.smooth[:, k]
+        if as_force > -3.0:
+            yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
+        if as_command > -3.0 and not _is_set_point(seen, k):
+            score = as_command + physics + of_a_motor(one) + acting[k]
+            yield Way(seen, "motor", {"u": one}, law, force, score)
+    if laws:
+        yield from _chambers(seen, own)
+
+
+def _is_set_point(seen: Seen, k: int) -> bool:
+    """Whether a column in counts, as those of a stepper, is where the position goes."""
+    unit = seen.pairs.signals[k].header.unit
+    counts = unit is not None and unit.quantity in ("count", "position")
+    return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
+
+
+def _chambers(seen: Seen, own: float) -> Iterator[Way]:
+    """Two pressures of one size as a drive, with the ratio of areas that explains most."""
+    signals, x = seen.pairs.signals, seen.pairs.x
+    likely = [
+        (said(one, "p"), k)
+        for k, one in enumerate(signals)
+        if one is not seen.y and said(one, "p") > -3.0 and one.x.min() >= 0.0
+    ]
+    likely = sorted(likely, reverse=True)[:MOST_CHAMBERS]
+    for i, j in combinations(sorted(k for _, k in likely), 2):
+        a, b = in_one_unit(signals[i], signals[j])
+        first, second = a * x[:, i], b * x[:, j]
+        if not 0.2 < first.mean() / max(float(second.mean()), 1e-300) < 5.0:
+            continue
+        f = np.column_stack([first - ratio * second for ratio in AREA_RATIOS])
+        smooth = np.column_stack(
+            [a * seen.smooth[:, i] - ratio * b * seen.smooth[:, j] for ratio in AREA_RATIOS]
+        )
+        laws = force_laws(seen.motion, seen.y.x, f, smooth)
+        at = int(np.argmax([law.share for law in laws]))
+        law, ratio = laws[at], AREA_RATIOS[at]
+        way = driving(turned(law), float(seen.v_share[i]), False) - 1.0
+        way += MIRRORED if _mirrored(seen.laws[i], seen.laws[j]) else 0.0
+        way += 0.5 * (said(signals[i], "p") + said(signals[j], "p"))
+        way += together(seen.y, signals[i]) + together(signals[i], signals[j])
+        pair = (signals[i], signals[j]) if law.way > 0 else (signals[j], signals[i])
+        yield Way(
+            seen, "electro-pneumatic", dict(zip(("p_p", "p_n"), pair, strict=True)), law,
+            law.way * smooth[:, at], own + way, ratio if law.way > 0 else 1.0 / ratio,
+        )  # fmt: skip
+
+
+def _mirrored(one: ForceLaw, other: ForceLaw) -> bool:
+    """Whether each of two columns alone looks like the force, but with opposite signs.
+
+    Of two chambers the one is filled as the other is emptied; a force beside a pressure is no such.
+    """
+    alike = min(one.share, other.share) > FORCE_LIKENESS
+    return alike and one.way * other.way < 0.0
+
+
+def with_reference(way: Way) -> float:
+    """Log-odds of a way with the likeliest reference of its position beside it."""
+    taken = [way.y, *way.columns.values()]
+    gains = [gain_of_reference(way.seen, k) for k, one in enumerate(way.seen.pairs.signals)
+             if one not in taken and not moves_rather(way, k)]  # fmt: skip
+    return way.score + max([0.0, *gains])
+
+
+def moves_rather(way: Way, k: int) -> bool:
+    """Whether what drives the body drives another column far more exactly: then that is the
+    position, and the body here a copy of it, late or by a model."""
+    other = way.seen.pairs.bodies.get(k)
+    if other is None or len(way.columns) != 1 or not other.laws:
+        return False
+    (drive,) = way.columns.values()
+    left = 1.0 - other.laws[way.seen.pairs.signals.index(drive)].share
+    return left < min(EXACTLY, MORE_EXACTLY * (1.0 - way.law.share))
+
+
+def gain_of_reference(seen: Seen, k: int) -> float:
+    """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
+    if k not in seen.as_reference:
+        one = seen.pairs.signals[k]
+        head = max(0.0, said(one, "r")) if k in seen.controlled else said(one, "r")
+        more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
+        seen.as_reference[k] = head + more
+    return seen.as_reference[k]
