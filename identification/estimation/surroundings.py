@@ -33,7 +33,7 @@ from identification.estimation.regression.weighted_rows import (
 )
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
-from identification.model.estimates import Estimate
+from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import (
@@ -41,7 +41,14 @@ from identification.model.surroundings import (
     Order,
     Surroundings,
 )
-from identification.thresholds import BEYOND_CHANCE, EARNS, FAR_LESS, HALF, MATERIAL
+from identification.thresholds import (
+    BEYOND_CHANCE,
+    EARNS,
+    FAR_LESS,
+    HALF,
+    MATERIAL,
+    OF_ACCOUNT,
+)
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LEAD, LAG = -12.0, 12.0  # samples, between which they are
@@ -140,7 +147,10 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
     both = bool(np.any(ways) and not np.all(ways))
     if both and larger_than_friction(up, down):
         always = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
-        force = always if stands_out(always.value, always.sd) else NOT_SHOWN
+        if stands_out(always.value, always.sd):
+            # As far as friction is equal in both directions, which it is about.
+            unequal = OF_ACCOUNT * 0.5 * abs(up + down) / NORMAL_95
+            force = replace(always, sd=float(np.hypot(always.sd, unequal)))
     h = logs[0].h
     gives = rig.force_per_command if held else None
     lag = Size(lag.value * h, lag.sd * h)

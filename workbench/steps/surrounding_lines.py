@@ -30,7 +30,7 @@ def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
             f"constant force: {number(around.force.value)} {unit} ({_interval(around.force)}) acts"
             " beside the applied one and is larger than friction (a weight, a tilt, a sensor's"
             " offset, a wrong area or supply pressure): F_cp and F_cn are estimated with it, as"
-            " equal"
+            " equal within a tenth"
         )
     if around.lag.value:
         lag, behind = around.lag, around.lag.value > 0.0
