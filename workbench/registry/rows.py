@@ -24,6 +24,7 @@ from workbench.registry.tables import (
     VersionRow,
 )
 from workbench.registry.values import (
+    MOVES,
     Candidate,
     Decision,
     DecisionKind,
@@ -116,7 +117,7 @@ def decide(
     session.add(row)
     session.flush()
     session.expire(row)  # so that it is told as the database keeps it
-    if kind in ("promoted", "rolled_back"):
+    if kind in MOVES:
         pointer = session.get(ActiveVersionRow, version.machine)
         pointer = pointer or ActiveVersionRow(machine=version.machine)
         pointer.version_id, pointer.decision_id = version.id, row.id
@@ -161,6 +162,22 @@ def active_version(session: Session, machine: str) -> VersionRow | None:
     """The row of the active version."""
     pointer = session.get(ActiveVersionRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
+
+
+def accepted_version(session: Session, machine: str) -> VersionRow | None:
+    """The version that a person has activated last: the machine as somebody has accepted it.
+
+    What a worker has activated since is not accepted; the machine's first version is.
+    """
+    moves = (
+        select(VersionRow)
+        .join(DecisionRow, DecisionRow.version_id == VersionRow.id)
+        .where(DecisionRow.machine == machine, DecisionRow.kind.in_(MOVES))
+    )
+    by_person = moves.where(DecisionRow.log_id.is_(None)).order_by(DecisionRow.id.desc())
+    return session.scalar(by_person.limit(1)) or session.scalar(
+        moves.order_by(DecisionRow.id).limit(1)
+    )
 
 
 def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:

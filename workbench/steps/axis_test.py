@@ -269,7 +269,7 @@ def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> st
     if estimate.unit == "1":
         unit, factor = "%", 100.0
     side = "above" if above else "below"
-    last = f"its last {allowed.logs} logs'"
+    last = f"its last {allowed.logs} sound logs'"
     whose = {"card": "the card's", "registry": last, "usual": "the usual"}
     moved = ""
     if allowed.mean and estimate.unit not in ("1", "") and "constant" not in meaning:

@@ -60,6 +60,15 @@ def test_one_worker_at_a_time_until_its_lease_ends(queue: Queue) -> None:
     assert claimed(queue, "y", NOW + 2 * LEASE).owner == "y"
 
 
+def test_a_dead_workers_lease_ends_at_once(queue: Queue) -> None:
+    claimed(queue, "dead")
+    assert queue.holder("m") == "worker dead has it until 00:01:00Z"
+    said = {"owner": "x", "lease": LEASE, "now": NOW}
+    assert queue.claim("m", gone=lambda owner: owner != "dead", **said) is None
+    taken = queue.claim("m", gone=lambda owner: owner == "dead", **said)
+    assert taken is not None and taken.owner == "x"
+
+
 def test_a_result_has_all_that_belongs_to_it_or_nothing(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
     late = claimed(queue, "x", NOW + 2 * LEASE)
