@@ -17,6 +17,7 @@ from workbench.report.chart import Band, Chart, Line, Mark, Panel, Part
 from workbench.report.missing_force import force_line, range_of
 from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
+from workbench.steps.predict import FORCE_WINDOW, in_windows
 from workbench.steps.predicted_force import force_by_model
 
 NOISE_BAND = "±2σ of the sensor's noise"
@@ -111,9 +112,12 @@ def _fit_caption(model: Model) -> str:
     if model.by_equation:
         return f"No free run follows these logs, so no position is simulated.{inverse}"
     if model.fit.drive == "command":
+        anew = "from the start of the log; it never sees the measured position"
+        if in_windows(model):
+            anew = f"anew from the measured state every {FORCE_WINDOW:g} s"
         return (
-            "The model is driven by the logged command alone, from the start of the log; it never"
-            f" sees the measured position.{inverse if model.rig.kind == 'motor' else ''}"
+            f"The model is driven by the logged command alone, {anew}."
+            f"{inverse if model.rig.kind == 'motor' else ''}"
         )
     return (
         f"The model is driven by the measured force, {run_coupling(model)}: a free run on a"
@@ -179,7 +183,13 @@ def _residual_caption(model: Model) -> str:
         )
     if model.fit.adequate:
         how = times(float(np.sqrt(model.fit.chi_square)))
-        return f"What is left of the run is {how} the sensors' noise."
+        if not in_windows(model):
+            return f"What is left of the run is {how} the sensors' noise."
+        return (
+            f"What is left of the run is {how} what the noise of all signals makes of it: in each"
+            f" window of {FORCE_WINDOW:g} s the error of the state from which it begins adds up, so"
+            " that it is wider than the band of the position sensor alone."
+        )
     return (
         f"What is left is {left_of(model)}: the machine has an effect that the model has not, or"
         " another structure. The command `workbench trace` finds which."

@@ -284,6 +284,9 @@ def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> st
 
 def _whole(meaning: str) -> str:
     """A meaning as it stands in a sentence."""
+    name, _, what = meaning.partition(": ")
+    if what:
+        return f"{name} ({what})"
     name, _, way = meaning.partition(", ")
     return f"{name} in {way} direction" if way else name
 
