@@ -170,6 +170,7 @@ MACHINE_ROUTES = [
 MOST_PARAMETERS = 8
 FEWEST_LOGS = 2
 PARAMETER_HEIGHT = 190
+STEP_WIDTH = 1e-6  # of the time that the chart shows
 SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 
@@ -203,12 +204,14 @@ def _panel(name: str, history: Mapping[int, Mapping[str, Any]], x: Array, label:
 
     unit, factor = shown_unit(str(history[int(at[0])].get("unit", "")))
     before, after, low, high = (factor * column(key) for key in ("before", "after", "low", "high"))
+    # Each log was tested against the model that is active since the log before it; a step has two
+    # places, since the chart draws one value at each.
+    steps = np.repeat(place, 2)[:-1]
+    steps[1::2] += STEP_WIDTH * (place[-1] - place[0])
     return Panel(
         label, f"{name} [{unit}]",
-        # Each log was tested against the model that is active since the log before it.
-        [Line("active model", np.repeat(place, 2)[:-1], np.repeat(before, 2)[1:], "reference",
-              "dashed"),
-         Line("by each log", place, after, "measured")],
+        [Line("active model", steps, np.repeat(before, 2)[1:], "reference", "dashed"),
+         Line("by each log", place, after, "measured", "dots")],
         areas=[Area("95 %", place, low, high, "band")], height=PARAMETER_HEIGHT,
     )  # fmt: skip
 

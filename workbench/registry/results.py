@@ -125,11 +125,12 @@ class AxisLine(NamedTuple):
 @dataclass(frozen=True)
 class AxisShown:
     """The axis test of the newest log that gives parameters: its file, its lines, and what to know
-    of the limits and of later logs, a sentence each."""
+    of the limits, a sentence each; newer: logs after it, which gave none."""
 
     file: str
     lines: Sequence[AxisLine]
     said: Sequence[str]
+    newer: str
 
 
 def newest_lights(
@@ -141,7 +142,7 @@ def newest_lights(
     """
     identified = [one for one in logs if one.parameters]
     if not identified:
-        return AxisShown("", (), ())
+        return AxisShown("", (), (), "")
     newest = identified[0]
     older = [one for one in sound if one.parameters and one.sha256 != newest.sha256][:LAST_ON_PAGE]
     past = history(list(reversed(older)))
@@ -157,13 +158,10 @@ def newest_lights(
     said = [f"limits: mean ± 3 sd of {len(older)} sound logs (wider of few)"]
     if len(older) < FEWEST_EARLIER:
         said = [f"no limits: {few_sound_logs(len(older), accepted)}"]
-    others = [one for one in identified if one is not newest]
+    out = left_out([one for one in identified if one is not newest], accepted)
     silent = [one.file for one in logs[: logs.index(newest)] if one.verdict is not None]
-    unseen = f"newer, without parameters: {_few(silent)}" if silent else ""
     lines = [found[name] for name in MEANING_OF if name in found]
-    return AxisShown(
-        newest.file, lines, [*said, *filter(None, (left_out(others, accepted), unseen))]
-    )
+    return AxisShown(newest.file, lines, [*said, out] if out else said, _few(silent))
 
 
 def few_sound_logs(count: int, accepted: int | None) -> str:

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from workbench.cards.readable import number
 from workbench.registry.difference import Line, Number, as_read
-from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState
+from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled
 from workbench.verdicts import in_words
 
@@ -30,10 +30,13 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
 
 
 def machine_view(
-    state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
+    state: MachineState,
+    decisions: Sequence[Decision],
+    outcomes: Sequence[LogOutcome],
+    accepted: Version | None,
 ) -> Screen:
     """A machine: the active version and why, the latest decisions and results of logs; with
-    --verbose all of them."""
+    --verbose all of them. accepted: the version that somebody has accepted last."""
     if state.in_force is None or state.since is None:
         first = f"{state.name}: no active version; 'workbench registry promote {state.name} N'"
     else:
@@ -42,6 +45,12 @@ def machine_view(
             f" {moment(state.since.at)}, by {state.since.made_by}: {state.since.reason}"
         )
     parts: list[Part | str] = [first]
+    if state.in_force and accepted and state.in_force.model != accepted.model:
+        number = state.in_force.number
+        parts.append(
+            f"nobody has accepted version {number}: the axis test's limits are those of version"
+            f" {accepted.number}; 'workbench registry promote {state.name} {number}' accepts it"
+        )
     head = ("decision", "version", "at", "by", "log", "reason")
     rows = [
         (in_words(d.kind), str(d.number), moment(d.at), d.made_by, short(d.log), d.reason)

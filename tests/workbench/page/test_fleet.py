@@ -205,7 +205,7 @@ def test_a_drift_stays_until_somebody_accepts_it(page: Page) -> None:
         "run9.csv; limits: mean ± 3 sd of 7 sound logs (wider of few); the limits leave out" in text
     )
     assert "run8.csv (alarm)" in text
-    assert "newer, without parameters: run11.csv, run10.csv" in text
+    assert text.count("Newer logs gave no parameters: run11.csv, run10.csv") == 2
     assert 'class="state failed">red' in text
     assert "Nobody has accepted it yet" in text and "<td>excluded</td>" in text.replace(
         '<td class="nowrap">', "<td>"
@@ -242,7 +242,7 @@ def test_the_active_model_is_drawn_in_steps_and_what_moved_comes_first() -> None
     assert (first.y, second.y) == ("F_cp [N]", "dv_p [mm/s]")
     active = first.lines[0]
     assert list(active.y) == [17.0, 17.0, 17.0, 21.0, 21.0]
-    assert active.x[2] == active.x[3]
+    assert active.x[2] < active.x[3] < active.x[2] + 1e-3
     assert second.lines[1].y[0] == pytest.approx(40.02)
 
 
