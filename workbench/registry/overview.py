@@ -127,10 +127,11 @@ def summary_tested(
     row.moved_trend = values.get(row.moved, [])
 
 
-def summary_moved(session: Session, machine: str) -> None:
-    """Somebody has activated another version: the next log shows how that fits."""
+def summary_moved(session: Session, machine: str, then: MachineCondition) -> None:
+    """Somebody has activated another version: the next log shows how that fits; or has accepted the
+    active one. then: the state of a machine that has had logs."""
     own = MachineNowRow.machine == machine
-    state = case((MachineNowRow.logs == 0, "no_log"), else_="not_judged")
+    state = case((MachineNowRow.logs == 0, "no_log"), else_=then)
     changed(session, MachineNowRow, own, state=state, moved=None, moved_by=None,
             moved_trend=None)  # fmt: skip
 

@@ -120,12 +120,19 @@ def decide(
     if kind in MOVES:
         pointer = session.get(ActiveVersionRow, version.machine)
         pointer = pointer or ActiveVersionRow(machine=version.machine)
+        was_active = pointer.version_id == version.id
         pointer.version_id, pointer.decision_id = version.id, row.id
         session.add(pointer)
         session.flush()
-        if log_id is None:
-            summary_moved(session, version.machine)
+        if log_id is None and not (was_active and _changed_since(session, version)):
+            summary_moved(session, version.machine, "in_tune" if was_active else "not_judged")
     return row
+
+
+def _changed_since(session: Session, version: VersionRow) -> bool:
+    """Whether a log shows another machine than the version's model."""
+    own = (OutcomeRow.version_id == version.id, OutcomeRow.verdict.in_(("structure", "refused")))
+    return session.scalar(select(OutcomeRow.log_id).where(*own).limit(1)) is not None
 
 
 def turn() -> ColumnElement[int]:

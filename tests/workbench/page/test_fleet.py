@@ -210,10 +210,14 @@ def test_a_drift_stays_until_somebody_accepts_it(page: Page) -> None:
     assert "Nobody has accepted it yet" in text and "<td>excluded</td>" in text.replace(
         '<td class="nowrap">', "<td>"
     )
-    registry.promote("a", 2, reason="new guide", by="anna", now=NOW)
-    assert condition(registry.database, "a") == "not_judged"
-    judge(registry, "a", 12, "none", evidence(told("F_cp", 0.0)))
+    promoted_by_a_worker(registry, "b")
+    judge(registry, "b", 12, "refused", evidence(told("m", 0.5), verdict="drift"))
+    for name in ("a", "b"):
+        registry.promote(name, 2, reason="new guide", by="anna", now=NOW)
     assert condition(registry.database, "a") == "in_tune"
+    assert condition(registry.database, "b") == "drifting"  # since that version, too
+    judge(registry, "b", 13, "none", evidence(told("F_cp", 0.0)))
+    assert condition(registry.database, "b") == "in_tune"
 
 
 def test_a_bad_or_inconclusive_log_hides_no_change() -> None:
