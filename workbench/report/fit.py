@@ -9,8 +9,9 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.latent_force import LatentForces
 from identification.model.inverse_model import Smoothing
+from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
-from workbench.cards.readable import times, units_of
+from workbench.cards.readable import force, times, units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Band, Chart, Line, Mark, Panel, Part
@@ -127,10 +128,10 @@ def _fit_caption(model: Model) -> str:
 
 def residual(
     model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None],
-    missing: LatentForces | None,
+    missing: LatentForces | None, friction: Karnopp,
 ) -> list[Section]:  # fmt: skip
     """Position's and force's residual over time, with the noise that a perfect model leaves; none
-    where neither is known."""
+    where neither is known. friction: of the runs."""
     row, panels = in_a_row(sources), []
     unit, factor = units_of(model.rotary).position
     known = [run for run in runs if run]
@@ -144,10 +145,11 @@ def residual(
                 bands=[Band(NOISE_BAND, -noise, noise)], marks=row.marks,
             )
         )  # fmt: skip
-    force = _force_panel(model, sources, known, row, missing)
-    panels += [force] if force else []
+    panel = _force_panel(model, sources, known, row, missing)
+    panels += [panel] if panel else []
     what = "residual of position and force over time, with the band of the sensors' noise"
-    parts, caption = row.parts if len(sources) > 1 else (), _residual_caption(model)
+    parts = row.parts if len(sources) > 1 else ()
+    caption = f"{_residual_caption(model)}{_own_limits(model, friction)}"
     chart = Chart("residual", what, panels, parts=parts, caption=caption)
     return [Section("What the model leaves", chart)] if panels else []
 
@@ -173,6 +175,18 @@ def _force_panel(
         row.label, label, [line], areas=[band], marks=row.marks, y_range=range_of(missing, level),
         x_range=(float(row.t[0]), float(row.t[-1])),
     )  # fmt: skip
+
+
+def _own_limits(model: Model, friction: Karnopp) -> str:
+    """What to say of a run whose stick limits are not those of the model."""
+    own, used = (friction.F_sp, friction.F_sn), (model.karnopp.F_sp, model.karnopp.F_sn)
+    if model.by_equation or np.allclose(own, used):
+        return ""
+    first, second = (force(one, model.rotary) for one in own)
+    return (
+        f" The run has its own stick limits, {first} and {second}; the table's stand midway to the"
+        " force at the breakaways."
+    )
 
 
 def _residual_caption(model: Model) -> str:

@@ -71,5 +71,9 @@ def test_a_run_in_windows_says_so_in_its_line_and_under_its_pictures() -> None:
         (whole, "it never sees the measured position", "0.89 times the sensors' noise"),
     ):
         assert anew in fit_chart(one, [source], [run]).caption
-        (section,) = residual(one, [source], [run], None)
+        (section,) = residual(one, [source], [run], None, one.karnopp)
         assert isinstance(section.content, Chart) and left in section.content.caption
+        assert "stick limits" not in section.content.caption
+    (section,) = residual(windowed, [source], [run], None, replace(EMPS, F_sp=1.5 * EMPS.F_sp))
+    assert isinstance(section.content, Chart)
+    assert "The run has its own stick limits, 37.5 N and -19 N" in section.content.caption
