@@ -198,9 +198,9 @@ def picture(told: list[Told], path: Path) -> None:
         "promoted": ("^", MODEL, "new model put in force"),
         "effect": ("*", "#cc79a7", "missing effect named and added"),
         "refused": ("v", "#56b4e9", "challenger refused"),
-        "structure": ("s", "#e69f00", "another structure: no model follows"),
-        "set_aside": ("x", "#000000", "log set aside"),
-        "not_judged": ("d", "#999999", "not judged"),
+        "structure": ("s", "#e69f00", "structure changed: no model follows"),
+        "set_aside": ("x", "#000000", "log excluded"),
+        "not_judged": ("d", "#999999", "inconclusive"),
     }
     week = [one.day.week for one in told]
     with style():

@@ -229,7 +229,7 @@ def reidentify() -> Iterator[Screen]:
         for n, log in enumerate(LOGS)
     )
     done: Any = SimpleNamespace(machines=40, outcomes=outcomes, growing=3, busy=LOGS,
-                                without_model=LOGS)  # fmt: skip
+                                without_model=LOGS, no_logs=LOGS)  # fmt: skip
     yield pass_view(done)
 
 

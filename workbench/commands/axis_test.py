@@ -23,7 +23,7 @@ def command(
     log: str = options.LOG_ARGUMENT,
     card: str = options.CARD_OPTION,
     where: str | None = option(
-        "SQLite file or postgresql://... whose last 30 logs of the machine give its limits.",
+        "SQLite file or postgresql://... whose last 30 sound logs of the machine give its limits.",
         "--registry", metavar="FILE|URL",
     ),
     machine: str | None = option(
@@ -32,11 +32,11 @@ def command(
     seed: int = options.SEED_OPTION,
     out: Path | None = options.OUT_OPTION,
 ) -> int:  # fmt: skip
-    """Test an axis by one log: friction and breakaway each way, mass, constant force, backlash.
+    """Test an axis by one log: friction and breakaway each way, their difference, mass, backlash.
 
     Each number has its limits, of the card's [limits], else the mean +- 3 sd of the machine's last
-    logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side, or
-    nothing to test against. Writes axis_test.json, and report.html to be printed on one page.
+    sound logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side,
+    or nothing to test against. Writes axis_test.json, and report.html to be printed on one page.
     """
     from workbench.interface.logs import axis_test
     from workbench.report.next_steps import check_of_refused

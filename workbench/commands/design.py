@@ -217,7 +217,8 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
 
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
-    from workbench.registry.store import MOVES, Registry
+    from workbench.registry.store import Registry
+    from workbench.registry.values import MOVES
     from workbench.steps.robust.outcomes import drift_found
 
     with Registry(location(where), create=False) as store:

@@ -128,10 +128,13 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
     from workbench.fleet.run import per_core
     from workbench.screen import screen, tabled
+    from workbench.verdicts import in_words
 
-    counted = ", ".join(f"{count} {name}" for name, count in sorted(done.verdicts.items()))
+    counted = ", ".join(
+        f"{count} {in_words(name)}" for name, count in sorted(done.verdicts.items())
+    )
     left = f"{done.later} log(s) left: their machines are in another worker's hands"
-    rows = [(one.log.machine, one.verdict, one.reason) for one in done.bad]
+    rows = [(one.log.machine, in_words(one.verdict), one.reason) for one in done.bad]
     each, used = per_core(done), f"at most {done.memory / 2**20:.0f} MiB a worker"
     return screen(
         f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before",

@@ -66,13 +66,16 @@ def show(
     with _open(where) as found:
         state, decisions = found.machine(machine), found.decisions(machine)
         outcomes = Queue(found.database).outcomes(machine)
+        accepted = found.accepted_version(machine)
         if number is not None or out is not None:
             version = _version(found, machine, number)
             decisions = tuple(d for d in decisions if number is None or d.number == number)
             if out is not None:
                 _write(found, version, out)
-    shown = {"machine": state, "decisions": decisions, "logs": outcomes}
-    emit(shown, lambda: machine_view(state, decisions, outcomes))
+    number_accepted = None if accepted is None else accepted.number
+    shown = {"machine": state, "decisions": decisions, "logs": outcomes,
+             "accepted": number_accepted}  # fmt: skip
+    emit(shown, lambda: machine_view(state, decisions, outcomes, accepted))
 
 
 @options.command(command, epilog="Example: workbench registry diff bench-a 1 2")
@@ -159,7 +162,10 @@ def promote(
     by: str | None = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
-    """Activate a version of a machine."""
+    """Activate a version of a machine, or accept the one that a worker has activated.
+
+    The limits of `axis-test` by the machine's own logs begin anew with its model.
+    """
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         decision = found.promote(machine, number, reason=reason, by=who, now=now)

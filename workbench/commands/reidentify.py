@@ -19,7 +19,7 @@ MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 
 
 @options.command(
-    refusal="an alarm: drift, another structure, an excluded log",
+    refusal="an alarm: drift, a changed structure, an excluded log",
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
 def command(given: JobOptions) -> int:
@@ -27,13 +27,13 @@ def command(given: JobOptions) -> int:
 
     ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
     tested against the active model ('workbench registry add' puts the first there); on drift a
-    new model and design are made, on another structure the log is traced; what is new replaces the
-    old only if it wins on held-out data and in simulation. Safe to run at any time and many at
-    once; what a killed run left, the next does. A log older than one behind the active model is
-    tested and recorded, and changes nothing. Progress is written as JSON lines on standard error.
-    Exit status 2 also where a machine could not be handled, the registry is away, or the webhook
-    has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
-    given up after a day.
+    new model and design are made, where the structure has changed the log is traced; what is new
+    replaces the old only if it wins on held-out data and in simulation. Safe to run at any time
+    and many at once; what a killed run left, the next does. A log older than one behind the active
+    model is tested and recorded, and changes nothing. Progress is written as JSON lines on standard
+    error. Exit status 2 also where a machine could not be handled or is in another worker's hands,
+    the registry is away, or the webhook has not taken an alarm. Such an alarm is tried again by
+    later passes, less and less often, and given up after a day.
     """
     from workbench.jobs.worker import worker
 
@@ -43,6 +43,7 @@ def command(given: JobOptions) -> int:
     then = after_pass(judged, given.where)
     emit({**vars(judged), "alarms": alarms}, lambda: pass_view(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]
+    errors += [f"{name}: not tested, {line}; run again" for name, line in judged.held.items()]
     if alarms is not None and (alarms.waiting or alarms.given_up):
         errors.append(undelivered(alarms))
     for line in errors:
@@ -100,8 +101,8 @@ def remarks(done: "PassReport") -> Sequence[str]:
     out = []
     if done.growing:
         out.append(f"{done.growing} file(s) still being written (--settle), left for later")
-    if done.busy:
-        out.append(f"in another worker's hands: {', '.join(done.busy)}")
+    if done.no_logs:
+        out.append(f"no log, without a line of numbers: {', '.join(done.no_logs)}")
     for name in done.without_model:
         out.append(f"{name}: no active model; 'workbench registry add {name} ...', or --first")
     return out

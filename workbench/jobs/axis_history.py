@@ -11,7 +11,14 @@ from workbench.documents.reading import Stored
 from workbench.jobs.drift_by_chart import Reading, drift_by_chart
 from workbench.logs.sources import Sources
 from workbench.registry import results
-from workbench.registry.results import LAST_ON_PAGE, history, last_logs
+from workbench.registry.results import (
+    LAST_ON_PAGE,
+    TestedLog,
+    few_sound_logs,
+    history,
+    last_logs,
+    left_out,
+)
 from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
@@ -22,25 +29,36 @@ TAKEN_OUT_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", 
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
-    """The machine's last logs, and this log by the active model where that has further effects.
+    """The machine's last sound logs, and this log by the active model where that has further
+    effects.
 
     Raises BadRegistry where there is no such machine.
     """
     state = registry.machine(machine)
     own = {source.sha256 for source in sources.runs}
-    logs = [one for one in last_logs(registry.database, machine, LAST_LOGS_READ)
-            if one.sha256 not in own and one.parameters]  # fmt: skip
+    accepted = registry.accepted_version(machine)
+    number = None if accepted is None else accepted.number
+
+    def earlier(sound: bool) -> list[TestedLog]:
+        found = last_logs(registry.database, machine, LAST_LOGS_READ, sound=sound)
+        return [one for one in found if one.sha256 not in own and one.parameters]
+
+    logs = earlier(sound=True)
     values = history(list(reversed(logs[:LAST_ON_PAGE])))
     said = ""
     if len(logs) < FEWEST_EARLIER:
-        said = (
-            f"{machine} has {len(logs)} tested logs with identified parameters, at least"
-            f" {FEWEST_EARLIER} needed"
-        )
+        said = f"{machine} has {few_sound_logs(len(logs), number)}"
+    remarks = list(filter(None, [left_out(earlier(sound=False), number)]))
     if state.in_force is None:
-        return Earlier(machine, values, None, None, said)
+        return Earlier(machine, values, None, None, said, tuple(remarks))
+    if accepted is not None and state.in_force.model != accepted.model:
+        remarks.append(
+            f"nobody has accepted the active version {state.in_force.number}; `workbench registry"
+            f" promote {machine} {state.in_force.number} --reason ...` does, and the limits begin"
+            " anew with it"
+        )
     model = read_model(Stored("model.json", registry.document(state.in_force, "model")))
-    estimates, remarks = None, list[str]()
+    estimates = None
     further = [key.replace("_", " ") for key in model.effects if not _taken_out(key)]
     if further:
         remarks.append(

@@ -15,6 +15,7 @@ import numpy as np
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
+from workbench.cards.readable import force, length
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import driven_loop, run_driven
@@ -101,12 +102,14 @@ def challenge(
     }
     loop = _loops(champion, challenger, rng)
     old, new = loop["champion"], loop["challenger"]
-    lost = _lost_held_out(errors["champion"], errors["challenger"], terms)
+    rotary = challenger.model.rotary
+    lost = _lost_held_out(errors["champion"], errors["challenger"], terms, rotary)
     if lost:
         return Contest(False, False, lost, errors, loop)
-    lost = _lost_loop(old, new, terms)
+    held = _held_out_words(errors["champion"], errors["challenger"], rotary)
+    lost = _lost_loop(old, new, terms, rotary)
     champion_passes = old is not None and old.rms is not None and not old.missed
-    said = _won(errors, loop) if not lost else f"{_held_out_words(errors)}; {lost}"
+    said = f"{held}; {lost}" if lost else _won(held, loop, rotary)
     return Contest(not lost, bool(lost) and champion_passes, said, errors, loop)
 
 
@@ -135,27 +138,22 @@ def _pooled(found: Sequence[tuple[int, float | None]]) -> float | None:
         return float(np.sqrt(sum(n * value**2 for n, value in known) / total))
 
 
-def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms) -> str:
+def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms, rotary: bool) -> str:
     """Why the challenger does not win on held-out logs; empty where it does."""
     better = False
-    for name, before, after in (
-        ("free run", old.position_rms, new.position_rms),
-        ("force", old.force_rms, new.force_rms),
-    ):
-        if before is None or after is None:
-            continue
+    for name, before, after, said in _compared(old, new, rotary):
         if not after <= before * (1.0 + terms.worse):
-            return f"held out, {name}: {after:.4g} against {before:.4g}, worse than the active one"
+            return f"held out, {name}: {said}, worse than the active one"
         better = better or after <= before * (1.0 - terms.held_out)
     if better:
         return ""
     return (
-        f"held out: {_figures(new)} against {_figures(old)}; one of them has to fall by"
+        f"{_held_out_words(old, new, rotary)}; one of them has to fall by"
         f" {100 * terms.held_out:g} % at least"
     )
 
 
-def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
+def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms, rotary: bool) -> str:
     """Why the challenger does not win in simulation; empty where it does."""
     if new is None:
         return "simulation: no design"
@@ -166,31 +164,44 @@ def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
     if new.rms <= old.rms * (1.0 - terms.loop):
         return ""
     return (
-        f"simulation: tracking error {new.rms:.4g} against {old.rms:.4g} of the active design on"
-        f" the same machine, at least {100 * terms.loop:g} % less needed"
+        f"simulation: {_tracking_words(new.rms, rotary)} against {length(old.rms, rotary)} of the"
+        f" active design on the same machine, at least {100 * terms.loop:g} % less needed"
     )
 
 
-def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
-    text = _held_out_words(errors)
+def _won(held_out: str, loop: dict[str, Tracking | None], rotary: bool) -> str:
     new, old = loop["challenger"], loop["champion"]
     if new is None or new.rms is None:
-        return text
-    text += f"; simulation: tracking error {new.rms:.4g}"
+        return held_out
+    text = f"{held_out}; simulation: {_tracking_words(new.rms, rotary)}"
     if old is None:
         return f"{text}, no design before"
     if old.missed or old.rms is None:
         return f"{text}, the active design misses: {'; '.join(old.missed)}"
-    return f"{text} against {old.rms:.4g}"
+    return f"{text} against {length(old.rms, rotary)} of the active design"
 
 
-def _held_out_words(errors: dict[str, HeldOut]) -> str:
-    return f"held out: {_figures(errors['challenger'])} against {_figures(errors['champion'])}"
+def _tracking_words(rms: float, rotary: bool) -> str:
+    return f"tracking error {length(rms, rotary)} rms"
 
 
-def _figures(found: HeldOut) -> str:
-    parts = [("free run", found.position_rms), ("force", found.force_rms)]
-    return ", ".join(f"{name} {value:.4g}" for name, value in parts if value is not None)
+def _compared(old: HeldOut, new: HeldOut, rotary: bool) -> list[tuple[str, float, float, str]]:
+    """What both have an error of: its name, that of the active model, the new one, in words."""
+    pairs = (
+        ("free run", old.position_rms, new.position_rms, length),
+        ("force", old.force_rms, new.force_rms, force),
+    )
+    return [
+        (name, before, after, f"{shown(after, rotary)} rms against {shown(before, rotary)}")
+        for name, before, after, shown in pairs
+        if before is not None and after is not None
+    ]
+
+
+def _held_out_words(old: HeldOut, new: HeldOut, rotary: bool) -> str:
+    """The errors of the new model against those of the active one."""
+    found = ", ".join(f"{name} {said}" for name, _, _, said in _compared(old, new, rotary))
+    return f"held out: {found or 'nothing to compare'}"
 
 
 def _loops(

@@ -81,9 +81,10 @@ class Chain:
         try:
             traced = trace_sources(train, _as_test(train, held_out), library, self.seed)
         except UserError as error:
-            return Judgement("structure", f"{found.reason}; trace: {error}", evidence=evidence)
+            said = _then(found.reason, f"the trace: {error}")
+            return Judgement("structure", said, evidence=evidence)
         evidence = {**evidence, "trace": _summary(traced)}
-        reason = f"{found.reason}; {trace_sentence(traced)}"
+        reason = _then(found.reason.removesuffix("; trace it"), trace_sentence(traced))
         if traced.trace.verdict not in ("effect", "none"):
             return Judgement("structure", reason, evidence=evidence)
         # "none": other parameters do, which the test did not find.
@@ -91,7 +92,7 @@ class Chain:
         made = self._designed(traced.model) if effect else self._made(train)
         challenger, candidate, refused = made
         if challenger is None or challenger.design is None:
-            return Judgement("refused", f"{reason}; {refused}", candidate, evidence)
+            return Judgement("refused", _then(reason, refused), candidate, evidence)
         return self._challenge(champion, challenger, candidate, held_out, reason, evidence)
 
     def _challenge(
@@ -107,7 +108,7 @@ class Chain:
         rng = np.random.default_rng(self.seed)
         contest = challenge(champion, challenger, held_out, rng, self.terms)
         evidence = {**evidence, "contest": contest_document(contest)}
-        reason = f"{said}; {contest.reason}"
+        reason = _then(said, contest.reason)
         if contest.won:
             return Judgement("promoted", reason, candidate, evidence)
         model_alone = contest.model_won and self._with_active_controllers(champion, challenger)
@@ -166,6 +167,11 @@ class Chain:
         if made.recommended == "none":
             refused = "no controller keeps its goals"
         return Contender(model, made), candidate, refused
+
+
+def _then(said: str, more: str) -> str:
+    """Two sentences, of which the first may have its full stop or not."""
+    return f"{said.removesuffix('.')}. {more[:1].upper()}{more[1:]}"
 
 
 def divided(sources: Sources) -> tuple[Sources, list[Log]]:

@@ -70,6 +70,16 @@ def worker_name() -> str:
     return f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
 
 
+def is_gone(owner: str) -> bool:
+    """Whether a worker of that name ran on this computer and does not any more.
+
+    False where that is not known: of another computer, or of a system without /proc.
+    """
+    host, pid = ["", "", *owner.split(":")][-3:-1]
+    here = host == socket.gethostname() and pid.isdigit() and Path("/proc/self").exists()
+    return here and not Path(f"/proc/{pid}").exists()
+
+
 def clock() -> datetime:
     """The time now, in UTC."""
     return datetime.now(UTC)

@@ -15,6 +15,7 @@ from typing import Any
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import SHARE, Clock, Patience, renewed
+from workbench.jobs.options import is_gone
 from workbench.jobs.scan import MachineFolder, Scan, machine_folders, refuse_name, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.queue import Queue
@@ -71,16 +72,20 @@ class PassSettings:
 class PassReport:
     """What a pass has done so far.
 
-    busy: machines in another worker's hands; failed: machine and why it could not be handled;
-    growing: files that are still being written; without_model: machines whose logs wait for one.
+    busy: machines in another worker's hands, held: in whose, and until when unless it goes on;
+    failed: machine and why it could not be handled; growing: files that are still being written;
+    without_model: machines whose logs wait for one; no_logs: text files without a line of numbers,
+    which are left out.
     """
 
     machines: int
     outcomes: tuple[LogOutcome, ...] = ()
     busy: tuple[str, ...] = ()
+    held: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     growing: int = 0
     without_model: tuple[str, ...] = ()
+    no_logs: tuple[str, ...] = ()
 
 
 Report = Callable[..., None]  # event, then what belongs to it by name
@@ -138,6 +143,7 @@ class Pass:
             marker=settings.marker,
         )  # fmt: skip
         done.growing += found.growing
+        done.no_logs += tuple(f"{name}/{file}" for file in found.no_logs)
         for file in found.later:
             self.report("log_from_the_future", machine=name, file=file)
         seen = set(known.values())
@@ -152,10 +158,12 @@ class Pass:
             done.without_model += (name,)
             return
         claim = retry(
-            self.queue.claim, name, owner=settings.owner, lease=settings.lease, now=self.clock()
-        )
+            self.queue.claim, name, owner=settings.owner, lease=settings.lease, now=self.clock(),
+            gone=is_gone,
+        )  # fmt: skip
         if claim is None:
             done.busy += (name,)
+            done.held[name] = retry(self.queue.holder, name) or "another worker has it"
             return
 
         def renew() -> None:
@@ -167,6 +175,7 @@ class Pass:
         except LostClaim as error:
             self.report("claim_lost", machine=name, reason=str(error))
             done.busy += (name,)
+            done.held[name] = "another worker has taken it over"
         except RegistryAway:
             raise  # no use to ask it to release: the lease ends by itself
         except BaseException:

@@ -12,11 +12,16 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
+from workbench.cards.card_tables import FileSpec
 from workbench.files import CARD_FILE, LOGS, sha256_of
+from workbench.logs.layout import is_number
 from workbench.logs.runs import shown_name
+from workbench.logs.text import first_lines
+from workbench.logs.times import is_time
 from workbench.registry.values import SeenLog
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".h5", ".hdf5", ".json")
+NOTES = ".txt"  # ending of logs, but of notes too
 Known = Mapping[tuple[str, int, int], str]
 
 
@@ -41,12 +46,14 @@ class MachineFolder:
 class Scan:
     """Complete log files by fingerprint, and how many are still being written.
 
-    later: files whose time of change lies in the future, by the clock here.
+    later: files whose time of change lies in the future, by the clock here; no_logs: texts without
+    a line of numbers, such as notes.
     """
 
     complete: Mapping[str, tuple[Path, SeenLog]]
     growing: int
     later: tuple[str, ...]
+    no_logs: tuple[str, ...] = ()
 
 
 def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
@@ -83,7 +90,8 @@ def scan(
     marker: ending of a file beside each log that its writer has finished; None: none is needed.
     """
     complete: dict[str, tuple[Path, SeenLog]] = {}
-    growing, later = 0, []
+    growing, later, no_logs = 0, [], []
+    names = {name for name, _, _ in known}
     for path in _files(folder.logs):
         try:
             before = path.stat()
@@ -96,12 +104,26 @@ def scan(
         if not marked or age < settle.total_seconds() or open_for_writing(path):
             growing += 1
             continue
+        if path.suffix.lower() == NOTES and shown_name(path) not in names and not has_rows(path):
+            no_logs.append(shown_name(path))
+            continue
         found = _seen(path, before, known)
         if found is None:
             growing += 1
         else:
             complete.setdefault(found.sha256, (path, found))
-    return Scan(complete, growing, tuple(later))
+    return Scan(complete, growing, tuple(later), tuple(no_logs))
+
+
+def has_rows(path: Path) -> bool:
+    """Whether most fields of a line are numbers or times, as in every log; True where it cannot be
+    read, which is said when it is tested."""
+    try:
+        rows = first_lines(path, FileSpec())
+    except (UserError, OSError):
+        return True
+    filled = ([field for field in row if field] for row in rows)
+    return any(2 * sum(is_number(x) or is_time(x) for x in row) > len(row) for row in filled)
 
 
 def unchanged(path: Path, log: SeenLog) -> bool:

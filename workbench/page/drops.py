@@ -78,10 +78,13 @@ def columns(asked: Asked) -> Response:
 def card(asked: Asked) -> Response:
     """The card as a form: as it was corrected, else as `init` proposes it."""
     form, said = stored_form(asked.drop.folder), ""
-    if form is None:
-        form, said = _proposed(asked)
-        said = said or _store_card(asked, form)
-    response = _form(asked, form, said)
+    try:
+        if form is None:
+            form, said = _proposed(asked)
+            said = said or _store_card(asked, form)
+        response = _form(asked, form, said)
+    except UserError:  # which stands where the columns would
+        response = _said(asked, "No card: the log cannot be read.", bad=False)
     response.headers["HX-Trigger-After-Settle"] = "card-ready"
     return response
 
@@ -104,7 +107,7 @@ def picture(asked: Asked) -> Response:
     """The doctor's picture of the log by its card."""
     path, place = asked.drop.log, asked.drop.card
     if not place.exists():
-        return _said(asked, "The card does not read the log yet.", bad=False)
+        return _said(asked, "Nothing to show until a card reads the log.", bad=False)
     try:
         html = asked.server.helpers(looks.doctor_chart, path, place)
     except UserError as error:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 MOST_COLUMNS = 12  # that the first picture shows
 FIRST_POINTS = 8000  # of each column's line, every peak kept
 LOGS_REMEMBERED = 1
+FIRST_BYTES = 65_536  # by which a text is known
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
 STYLES_OF: "Mapping[str, LineStyle]" = {"rst": "line", "pid": "dashed", "p-pi": "dotted"}
 EXPORTS = {
     "c": "C99",
@@ -69,10 +71,17 @@ def warm() -> None:
 def refuse_no_log(path: Path) -> None:
     """Raises BadView where the file's first bytes are of something else than its name says."""
     from workbench.cards.card_tables import FileSpec
+    from workbench.logs.packed import text_bytes
     from workbench.logs.tables import checked_format
 
     with _without(path):
-        checked_format(path, FileSpec())
+        form = checked_format(path, FileSpec())
+        head = text_bytes(path, FIRST_BYTES) if form == "csv" else b""
+    if b"\0" in head and not head.startswith(UTF16):
+        raise BadView(
+            f"{path.name}: is a binary file, no text as its ending says; drop the log as text, or"
+            " by the ending of its format"
+        )
 
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:

@@ -15,6 +15,7 @@ from starlette.routing import Route
 
 from identification.arrays import Array
 from identification.errors import UserError
+from workbench.cards.readable import shown_unit
 from workbench.jobs.options import clock
 from workbench.page import looks
 from workbench.page.asked import Asked, download
@@ -23,7 +24,8 @@ from workbench.page.pages import part
 from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
-from workbench.registry.difference import difference
+from workbench.registry.difference import as_read, difference
+from workbench.registry.overview import INTERVAL_DEVIATIONS
 from workbench.registry.results import TestedLog, condition, last_logs, newest_lights
 from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import Area, Chart, Line, Panel, chart_html
@@ -40,7 +42,9 @@ def machine(asked: Asked) -> Response:
     last = MORE_LOGS if asked.query("logs") == "all" else LAST_LOGS
     logs = last_logs(asked.database, name, last)
     current = state.in_force.number if state.in_force else None
-    tested, lights = newest_lights(logs[:LAST_LOGS])
+    accepted = registry.accepted_version(name)
+    sound = last_logs(asked.database, name, LAST_LOGS, sound=True)
+    axis = newest_lights(logs[:LAST_LOGS], sound, accepted.number if accepted else None)
     other = next((v.number for v in reversed(versions) if v.number != current), None)
     drawn = parameter_charts(list(reversed(logs[:LAST_LOGS])))
     return asked.show(
@@ -48,7 +52,7 @@ def machine(asked: Asked) -> Response:
         decisions=list(reversed(registry.decisions(name))), logs=logs, other=other,
         alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
         condition=condition(asked.database, name), total=state.logs,
-        reports=[path.name for path in _reports(asked)], tested=tested, lights=lights,
+        reports=[path.name for path in _reports(asked)], axis=axis, accepted=accepted,
         charts="".join(str(chart_html(one)) for one in drawn),
     )  # fmt: skip
 
@@ -70,7 +74,9 @@ def compare(asked: Asked) -> Response:
         loops = asked.server.helpers(looks.loops, designs[: len(set(numbers))])
     except UserError as error:
         return asked.show("said", said=str(error), bad=True)
-    return asked.show("compare", lines=difference(before, after), numbers=numbers, loops=loops)
+    names = (f"version {numbers[0]}", f"version {numbers[1]}")
+    lines, said = as_read(difference(before, after), names)
+    return asked.show("compare", lines=lines, said=said, numbers=numbers, loops=loops)
 
 
 def report(asked: Asked) -> Response:
@@ -164,6 +170,7 @@ MACHINE_ROUTES = [
 MOST_PARAMETERS = 8
 FEWEST_LOGS = 2
 PARAMETER_HEIGHT = 190
+STEP_WIDTH = 1e-6  # of the time that the chart shows
 SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 
@@ -180,7 +187,7 @@ def parameter_charts(logs: Sequence[TestedLog]) -> list[Chart]:
     for k, one in enumerate(history):
         for parameter in one.parameters:
             found.setdefault(str(parameter["name"]), {})[k] = parameter
-    names = sorted(found, key=lambda name: -_moved(found[name]))
+    names = sorted(found, key=lambda name: _moved(found[name]), reverse=True)
     panels = [_panel(name, found[name], x, label) for name in names[:MOST_PARAMETERS]
               if len(found[name]) >= FEWEST_LOGS]  # fmt: skip
     return [Chart("parameters", "parameters over the last logs", panels, columns=2)]
@@ -195,19 +202,28 @@ def _panel(name: str, history: Mapping[int, Mapping[str, Any]], x: Array, label:
             [np.nan if history[k].get(key) is None else history[k][key] for k in at], float
         )
 
-    unit = str(history[int(at[0])].get("unit", ""))
+    unit, factor = shown_unit(str(history[int(at[0])].get("unit", "")))
+    before, after, low, high = (factor * column(key) for key in ("before", "after", "low", "high"))
+    # Each log was tested against the model that is active since the log before it; a step has two
+    # places, since the chart draws one value at each.
+    steps = np.repeat(place, 2)[:-1]
+    steps[1::2] += STEP_WIDTH * (place[-1] - place[0])
     return Panel(
         label, f"{name} [{unit}]",
-        [Line("active model", place, column("before"), "reference", "dashed"),
-         Line("by each log", place, column("after"), "measured")],
-        areas=[Area("95 %", place, column("low"), column("high"), "band")], height=PARAMETER_HEIGHT,
+        [Line("active model", steps, np.repeat(before, 2)[1:], "reference", "dashed"),
+         Line("by each log", place, after, "measured", "dots")],
+        areas=[Area("95 %", place, low, high, "band")], height=PARAMETER_HEIGHT,
     )  # fmt: skip
 
 
-def _moved(history: Mapping[int, Mapping[str, Any]]) -> float:
-    last = history[max(history)]
-    change, sd = abs(float(last.get("change") or 0.0)), float(last.get("sd") or 0.0)
-    return change / sd if sd > 0.0 else 0.0
+def _moved(history: Mapping[int, Mapping[str, Any]]) -> tuple[float, float]:
+    """How far a parameter has gone from its first active value beyond the log's interval, at most;
+    of those within it, how near they came to its edge."""
+    first = float(history[min(history)].get("before") or 0.0)
+    gone = [(abs(float(one["after"]) / first - 1.0) if first else 0.0, float(one.get("sd") or 0.0))
+            for one in history.values()]  # fmt: skip
+    beyond = max(change - INTERVAL_DEVIATIONS * sd for change, sd in gone)
+    return max(beyond, 0.0), max(change / sd if sd > 0.0 else 0.0 for change, sd in gone)
 
 
 def _times(seconds: Sequence[float]) -> tuple[Array, str]:

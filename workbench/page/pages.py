@@ -8,12 +8,16 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from workbench.cards.readable import number as written
+from workbench.steps.axis_limits import LEAST_ROOM
+from workbench.verdicts import in_words
+
 STATE_WORDS = {
     "in_tune": "in tune",
-    "drifting": "drifting",
-    "structure": "structure changed",
-    "log_bad": "log bad",
-    "not_judged": "inconclusive",
+    "drifting": "drift",
+    "structure": in_words("structure"),
+    "log_bad": f"log {in_words('set_aside')}",
+    "not_judged": in_words("not_judged"),
     "no_log": "no log yet",
     "silent": "not heard from",
 }
@@ -37,7 +41,7 @@ def environment() -> Environment:
     )
     out.filters.update(
         ago=ago, moment=moment, number=number, percent=percent, part=part, spark=spark,
-        words=lambda state: STATE_WORDS.get(state, state.replace("_", " ")), megabytes=megabytes,
+        words=lambda state: STATE_WORDS.get(state) or in_words(state), megabytes=megabytes,
     )  # fmt: skip
     return out
 
@@ -69,7 +73,8 @@ def percent(value: float | None) -> str:
     """A relative change with its sign."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{100.0 * value:+.2g} %".replace("-", "−")
+    sign = "+" if value > 0 else ""
+    return f"{sign}{written(100.0 * value, 2)} %".replace("-", "−")
 
 
 def megabytes(size: int) -> str:
@@ -78,15 +83,18 @@ def megabytes(size: int) -> str:
 
 
 def spark(values: list[float], said: str) -> Markup:
-    """Values as a small line with its last point, in their own range; said: what it is."""
+    """Values as a small line with its last point, in their own range, or that of a change which
+    does not matter; said: what it is."""
     if len(values) < 2:
         return Markup("")
     low, high = min(values), max(values)
-    span = high - low or abs(high) or 1.0
+    room = LEAST_ROOM * max(abs(low), abs(high)) - 0.5 * (high - low)
+    low, high = low - max(room, 0.0), high + max(room, 0.0)
+    span = high - low or 1.0
     step = (SPARK_WIDTH - 2 * SPARK_EDGE) / (len(values) - 1)
-    room = SPARK_HEIGHT - 2 * SPARK_EDGE
+    height = SPARK_HEIGHT - 2 * SPARK_EDGE
     at = [
-        (SPARK_EDGE + k * step, SPARK_EDGE + room * (1.0 - (value - low) / span))
+        (SPARK_EDGE + k * step, SPARK_EDGE + height * (1.0 - (value - low) / span))
         for k, value in enumerate(values)
     ]
     points = " ".join([f"{x:.1f},{y:.1f}" for x, y in at])

@@ -109,9 +109,10 @@ def _identified(sources: Sources, course: Course) -> Made:
         "errors": None,
         "report": identified_view(found).page(),
     }
-    runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
-    fit = Section("Fit over time", fit_chart(model, found.sources, runs))
-    drawn = (fit, *residual(model, found.sources, runs, missing))
+    own, fitted = found.fit.friction, found.sources
+    runs = [fitted_run(model, one.log, number, own) for number, one in enumerate(fitted)]
+    fit = Section("Fit over time", fit_chart(model, fitted, runs))
+    drawn = (fit, *residual(model, fitted, runs, missing, own))
     return model, {"model": model_document(model)}, result, drawn
 
 

@@ -1,8 +1,10 @@
 """Two versions side by side: every number of model and design, with its unit and interval."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
+
+from workbench.cards.readable import shown_unit
 
 MODEL_PARTS = ("friction", "actuator", "effects")
 DESIGN_PARTS = ("recommended", "force", "rst", "pid", "p_pi", "compensator")
@@ -50,6 +52,34 @@ def difference(
         for name in dict.fromkeys((*one, *other)):
             out.append(_line(part, name, one.get(name), other.get(name)))
     return tuple(out)
+
+
+def as_read(lines: Sequence[Line], names: tuple[str, str]) -> tuple[tuple[Line, ...], str]:
+    """The lines in the units in which people read them; a part that only one version has is left
+    out, and said."""
+    out, said = list[Line](), list[str]()
+    for part in dict.fromkeys(line.part for line in lines):
+        own = [line for line in lines if line.part == part]
+        lacking = [name for name, side in zip(names, ("before", "after"), strict=True)
+                   if all(getattr(line, side) is None for line in own)]  # fmt: skip
+        said += [f"{name} has no {part}" for name in lacking]
+        out += [] if lacking else map(_shown, own)
+    return tuple(out), "; ".join(said)
+
+
+def _shown(line: Line) -> Line:
+    unit, factor = shown_unit(line.unit)
+    before, after = (_times(one, factor) for one in (line.before, line.after))
+    return replace(line, unit=unit, before=before, after=after)
+
+
+def _times(found: Number | str | None, factor: float) -> Number | str | None:
+    if not isinstance(found, Number):
+        return found
+    value, low, high = (
+        None if one is None else factor * one for one in (found.value, found.low, found.high)
+    )
+    return Number(value, low, high, found.reason)
 
 
 def _entries(

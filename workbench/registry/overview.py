@@ -25,21 +25,38 @@ from workbench.registry.values import MachineCondition, of_row
 Trend = dict[str, list[float]]
 TREND_LOGS = 32  # logs that a trend goes back
 INTERVAL_DEVIATIONS = 1.96  # to each side, of 95 %
+WORST_FIRST: tuple[MachineCondition, ...] = (
+    "structure", "drifting", "log_bad", "silent", "not_judged", "no_log", "in_tune",
+)  # fmt: skip
+CHANGED: tuple[MachineCondition, ...] = ("structure", "drifting")
 _BY_VERDICT: Mapping[str, MachineCondition] = {
     "none": "in_tune",
-    "promoted": "in_tune",
     "structure": "structure",
     "set_aside": "log_bad",
     "drift": "drifting",
 }
 
 
-def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
-    """The machine's state after a log of that verdict ("refused": what was found stays so)."""
-    if verdict == "refused":
-        found = (evidence.get("drift") or {}).get("verdict")
-        verdict = found if found in ("drift", "structure") else verdict
-    return _BY_VERDICT.get(verdict, "not_judged")
+def state_of(
+    verdict: str,
+    evidence: Mapping[str, Any],
+    before: MachineCondition = "no_log",
+    accepted: bool = True,
+) -> MachineCondition:
+    """The machine's state after a log of that verdict ("refused", "promoted": what was found).
+
+    A drift or a changed structure stays until a log against the model that somebody has accepted
+    says otherwise. before: the state before the log; accepted: whether it was tested against that
+    model.
+    """
+    if verdict in ("refused", "promoted"):
+        first: MachineCondition = "in_tune" if verdict == "promoted" else "not_judged"
+        found = _BY_VERDICT.get((evidence.get("drift") or {}).get("verdict", ""), first)
+    else:
+        found = _BY_VERDICT.get(verdict, "not_judged")
+    if before in CHANGED and (not accepted or found in ("log_bad", "not_judged")):
+        return min(before, found, key=WORST_FIRST.index)
+    return found
 
 
 def most_moved(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
@@ -95,28 +112,32 @@ def summary_heard(session: Session, machine: str, logs: int, now: datetime) -> N
 
 
 def summary_tested(
-    session: Session, machine: str, verdict: str, evidence: Mapping[str, Any]
+    session: Session, machine: str, verdict: str, evidence: Mapping[str, Any], accepted: bool
 ) -> None:
-    """The newest log has its result."""
+    """The newest log has its result; accepted: against the model that somebody has accepted."""
     row = session.get_one(MachineNowRow, machine)
-    row.state = state_of(verdict, evidence)
+    before, row.state = row.state, state_of(verdict, evidence, row.state, accepted)
     name, change = most_moved(evidence)
-    if name is not None:
-        trend = session.get_one(MachineTrendRow, machine)
-        values = trend.trend = with_log(trend.trend, evidence)
-        row.moved, row.moved_by, row.moved_trend = name, change, values.get(name, [])
+    if name is None:
+        return
+    trend = session.get_one(MachineTrendRow, machine)
+    values = trend.trend = with_log(trend.trend, evidence)
+    if row.moved is None or before not in CHANGED or state_of(verdict, evidence) == row.state:
+        row.moved, row.moved_by = name, change  # else what had moved is what counts
+    row.moved_trend = values.get(row.moved, [])
 
 
-def summary_moved(session: Session, machine: str) -> None:
-    """Somebody has activated another version: the next log shows how that fits."""
+def summary_moved(session: Session, machine: str, then: MachineCondition) -> None:
+    """Somebody has activated another version: the next log shows how that fits; or has accepted the
+    active one. then: the state of a machine that has had logs."""
     own = MachineNowRow.machine == machine
-    changed(session, MachineNowRow, own, state="not_judged", moved=None, moved_by=None,
+    state = case((MachineNowRow.logs == 0, "no_log"), else_=then)
+    changed(session, MachineNowRow, own, state=state, moved=None, moved_by=None,
             moved_trend=None)  # fmt: skip
 
 
 FleetOrder = Literal["machine", "state", "heard", "moved"]
 FLEET_ORDERS: tuple[FleetOrder, ...] = get_args(FleetOrder)
-WORST_FIRST = ("structure", "drifting", "log_bad", "silent", "not_judged", "no_log", "in_tune")
 MAY_FALL_SILENT = ("in_tune", "not_judged")  # states that a machine loses that is not heard from
 
 

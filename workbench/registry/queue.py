@@ -7,7 +7,7 @@ back finds another's token, and its result is dropped.
 """
 
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
@@ -77,20 +77,36 @@ class Queue:
                 summary_heard(session, machine, len(new), now)
             return len(new)
 
-    def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
+    def claim(
+        self,
+        machine: str,
+        *,
+        owner: str,
+        lease: timedelta,
+        now: datetime,
+        gone: Callable[[str], bool] = lambda _owner: False,
+    ) -> Claim | None:
         """The machine for this worker until the lease ends; None while another has it.
 
-        A lease that ends later than any clock about as fast as this one could have set it is
-        not waited for: should its worker live on, its result is dropped and made again.
+        gone: whether a worker of that name is known to have died; its lease ends at once. A lease
+        that ends later than any clock about as fast as this one could have set it is not waited
+        for: should its worker live on, its result is dropped and made again.
         """
         with self.database.writing() as session:
             rows.lock_machine(session, machine, now)
             row = session.get(ClaimRow, machine)
-            if row is not None and row.until > now and not _too_late(row, now):
+            held = row is not None and row.until > now and not _too_late(row, now)
+            if row is not None and held and not gone(row.owner):
                 return None
             found = Claim(machine, secrets.token_hex(16), owner, now + lease)
             session.merge(ClaimRow(**vars(found), lease_ms=round(lease / MILLISECOND)))
             return found
+
+    def holder(self, machine: str) -> str:
+        """Who has the machine in hand, and until when unless it goes on; "" where nobody has."""
+        with self.database.reading() as session:
+            row = session.get(ClaimRow, machine)
+            return "" if row is None else f"worker {row.owner} has it until {row.until:%H:%M:%S}Z"
 
     def renew(self, claim: Claim, *, lease: timedelta, now: datetime) -> None:
         """Lengthen the lease; raises LostClaim where another has taken over."""
@@ -161,6 +177,7 @@ class Queue:
                 return _recorded(session, done)
             _hold(session, claim, now)
             current = rows.active_version(session, claim.machine)
+            accepted = rows.accepted_version(session, claim.machine)
             newer = _newer(session, claim.machine, log, order)
             if newer is not None:
                 judgement = _of_older(judgement, log, newer)
@@ -180,7 +197,12 @@ class Queue:
             )
             session.add(done)
             if newer is None:
-                summary_tested(session, claim.machine, judgement.verdict, judgement.evidence)
+                of_accepted = (
+                    accepted is None or current is None or (current.model_id == accepted.model_id)
+                )
+                summary_tested(
+                    session, claim.machine, judgement.verdict, judgement.evidence, of_accepted
+                )
             session.flush()
             session.expire(done)  # so that it is told as the database keeps it
             return _recorded(session, done)

@@ -24,6 +24,7 @@ from workbench.registry.tables import (
     VersionRow,
 )
 from workbench.registry.values import (
+    MOVES,
     Candidate,
     Decision,
     DecisionKind,
@@ -116,15 +117,22 @@ def decide(
     session.add(row)
     session.flush()
     session.expire(row)  # so that it is told as the database keeps it
-    if kind in ("promoted", "rolled_back"):
+    if kind in MOVES:
         pointer = session.get(ActiveVersionRow, version.machine)
         pointer = pointer or ActiveVersionRow(machine=version.machine)
+        was_active = pointer.version_id == version.id
         pointer.version_id, pointer.decision_id = version.id, row.id
         session.add(pointer)
         session.flush()
-        if log_id is None:
-            summary_moved(session, version.machine)
+        if log_id is None and not (was_active and _changed_since(session, version)):
+            summary_moved(session, version.machine, "in_tune" if was_active else "not_judged")
     return row
+
+
+def _changed_since(session: Session, version: VersionRow) -> bool:
+    """Whether a log shows another machine than the version's model."""
+    own = (OutcomeRow.version_id == version.id, OutcomeRow.verdict.in_(("structure", "refused")))
+    return session.scalar(select(OutcomeRow.log_id).where(*own).limit(1)) is not None
 
 
 def turn() -> ColumnElement[int]:
@@ -161,6 +169,22 @@ def active_version(session: Session, machine: str) -> VersionRow | None:
     """The row of the active version."""
     pointer = session.get(ActiveVersionRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
+
+
+def accepted_version(session: Session, machine: str) -> VersionRow | None:
+    """The version that a person has activated last: the machine as somebody has accepted it.
+
+    What a worker has activated since is not accepted; the machine's first version is.
+    """
+    moves = (
+        select(VersionRow)
+        .join(DecisionRow, DecisionRow.version_id == VersionRow.id)
+        .where(DecisionRow.machine == machine, DecisionRow.kind.in_(MOVES))
+    )
+    by_person = moves.where(DecisionRow.log_id.is_(None)).order_by(DecisionRow.id.desc())
+    return session.scalar(by_person.limit(1)) or session.scalar(
+        moves.order_by(DecisionRow.id).limit(1)
+    )
 
 
 def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:

@@ -20,10 +20,9 @@ from workbench.registry.tables import (
     RecordRow,
     VersionRow,
 )
-from workbench.registry.values import Candidate, Decision, Kind, MachineState, Version
+from workbench.registry.values import MOVES, Candidate, Decision, Kind, MachineState, Version
 
 _NAME = re.compile(r"[^/\\\x00-\x1f\x7f]+")
-MOVES = ("promoted", "rolled_back")
 
 
 class Registry:
@@ -67,12 +66,16 @@ class Registry:
     def promote(
         self, machine: str, number: int, *, reason: str, by: str, now: datetime
     ) -> Decision:
-        """Activate a version; raises BadRegistry where it already is, or is not there."""
+        """Activate a version, or accept the active one that a worker has put there.
+
+        Raises BadRegistry where it is accepted and active already, or is not there.
+        """
         with self.database.writing() as session:
             rows.need_machine(session, machine, lock=True)
             row = rows.numbered(session, machine, number)
             current = rows.active_version(session, machine)
-            if current is not None and current.id == row.id:
+            accepted = rows.accepted_version(session, machine)
+            if current is not None and accepted is not None and current.id == row.id == accepted.id:
                 raise BadRegistry(f"{machine}: version {number} is active already")
             made = rows.decide(session, "promoted", row, reason=reason, by=by, now=now)
             return rows.decisions(session, DecisionRow.id == made.id)[0]
@@ -83,10 +86,11 @@ class Registry:
             rows.need_machine(session, machine, lock=True)
             earlier = self._earlier(session, machine)
             if len(earlier) < 2:
-                have = "one version" if earlier else "no version"
-                raise BadRegistry(
-                    f"{machine}: {have} has been active, so there is none to go back to"
-                )
+                have = "no version has been active"
+                if earlier:
+                    first = session.get_one(VersionRow, earlier[0])
+                    have = f"version {first.number} is the first that was active"
+                raise BadRegistry(f"{machine}: {have}, so there is none to go back to")
             row = session.get_one(VersionRow, earlier[-2])
             made = rows.decide(session, "rolled_back", row, reason=reason, by=by, now=now)
             return rows.decisions(session, DecisionRow.id == made.id)[0]
@@ -107,6 +111,15 @@ class Registry:
         """The active version; None where nothing has been promoted."""
         with self.database.reading() as session:
             row = rows.active_version(session, machine)
+            return None if row is None else rows.version_value(session, row)
+
+    def accepted_version(self, machine: str) -> Version | None:
+        """The version that a person has activated last, else the first; None where there is none.
+
+        The axis test's limits are those of the logs that were tested against its model.
+        """
+        with self.database.reading() as session:
+            row = rows.accepted_version(session, machine)
             return None if row is None else rows.version_value(session, row)
 
     def version(self, machine: str, number: int) -> Version:
@@ -150,10 +163,10 @@ class Registry:
         query = select(DecisionRow.kind, DecisionRow.version_id).order_by(DecisionRow.id)
         own = (DecisionRow.machine == machine, DecisionRow.kind.in_(MOVES))
         for kind, version in session.execute(query.where(*own)):
-            if kind == "promoted":
-                stack.append(version)
-            else:
+            if kind == "rolled_back":
                 stack.pop()
+            elif stack[-1:] != [version]:  # else the active one was accepted
+                stack.append(version)
         return stack
 
 

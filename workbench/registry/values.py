@@ -12,6 +12,7 @@ Value = TypeVar("Value")
 Document = Mapping[str, Any]
 Kind = Literal["model", "design", "validation"]
 DecisionKind = Literal["added", "promoted", "rolled_back", "refused"]
+MOVES: tuple[DecisionKind, ...] = ("promoted", "rolled_back")  # what moves the pointer
 LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
 Role = Literal["read", "change"]
 TaskKind = Literal["identify", "trace"]

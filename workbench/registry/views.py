@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from workbench.registry.difference import Line, Number
-from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState
+from workbench.cards.readable import number
+from workbench.registry.difference import Line, Number, as_read
+from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled
+from workbench.verdicts import in_words
 
 SHORT = 12  # characters of a fingerprint that are shown
 
@@ -28,10 +30,13 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
 
 
 def machine_view(
-    state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
+    state: MachineState,
+    decisions: Sequence[Decision],
+    outcomes: Sequence[LogOutcome],
+    accepted: Version | None,
 ) -> Screen:
     """A machine: the active version and why, the latest decisions and results of logs; with
-    --verbose all of them."""
+    --verbose all of them. accepted: the version that somebody has accepted last."""
     if state.in_force is None or state.since is None:
         first = f"{state.name}: no active version; 'workbench registry promote {state.name} N'"
     else:
@@ -40,9 +45,16 @@ def machine_view(
             f" {moment(state.since.at)}, by {state.since.made_by}: {state.since.reason}"
         )
     parts: list[Part | str] = [first]
+    if state.in_force and accepted and state.in_force.model != accepted.model:
+        number = state.in_force.number
+        parts.append(
+            f"nobody has accepted version {number}: the axis test's limits are those of version"
+            f" {accepted.number}; 'workbench registry promote {state.name} {number}' accepts it"
+        )
     head = ("decision", "version", "at", "by", "log", "reason")
     rows = [
-        (d.kind, str(d.number), moment(d.at), d.made_by, short(d.log), d.reason) for d in decisions
+        (in_words(d.kind), str(d.number), moment(d.at), d.made_by, short(d.log), d.reason)
+        for d in decisions
     ]
     parts.append(tabled(head, rows, latest=True))
     if outcomes:
@@ -57,11 +69,17 @@ def outcomes_table(outcomes: Sequence[LogOutcome], *, alarms_first: bool = False
 
     def rows(of: Sequence[LogOutcome]) -> list[tuple[str, ...]]:
         return [
-            (o.machine, o.log.file, o.verdict, "-" if o.number is None else str(o.number), o.reason)
+            (
+                o.machine,
+                o.log.file,
+                in_words(o.verdict),
+                "-" if o.number is None else str(o.number),
+                o.reason,
+            )
             for o in of
         ]
 
-    head = ("machine", "log", "verdict", "version", "reason")
+    head = ("machine", "log", "verdict", "against version", "reason")
     if not alarms_first:
         return tabled(head, rows(outcomes), latest=True)
     first = sorted(outcomes, key=lambda one: one.verdict not in ALARMING)
@@ -70,6 +88,7 @@ def outcomes_table(outcomes: Sequence[LogOutcome], *, alarms_first: bool = False
 
 def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
     """Two versions side by side."""
+    shown, said = as_read(lines, names)
     head = ("parameter", names[0], "unit", "95 %", names[1], "95 %", "change")
     rows = [
         (
@@ -81,9 +100,9 @@ def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
             _interval(line.after),
             _change(line),
         )
-        for line in lines
+        for line in shown
     ]
-    return screen(tabled(head, rows))
+    return screen(tabled(head, rows), *([said] if said else ()))
 
 
 def moment(at: datetime) -> str:
@@ -109,7 +128,10 @@ def _interval(found: Number | str | None) -> str:
 
 
 def _change(line: Line) -> str:
+    if line.before == line.after:
+        return ""
     if line.change is None:
-        return "" if line.before == line.after else "changed"
+        return "changed"
     sure = " (intervals apart)" if line.apart else ""
-    return f"{100 * line.change:+.2g} %{sure}"
+    sign = "+" if line.change > 0 else ""
+    return f"{sign}{number(100 * line.change, 2)} %{sure}"

@@ -78,8 +78,8 @@ def _sections(test: AxisTest) -> list[Section]:
     if test.earlier is not None:
         many = max((len(values) for values in test.earlier.values.values()), default=0)
         facts[-1] = (
-            f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of"
-            " few logs; never nearer than 2 %, of breakaway 5 %)"
+            f"limits of the card; else the mean of the machine's last {many} sound logs +- 3 sd"
+            " (wider of few logs; never nearer than 2 %, of breakaway 5 %)"
         )
     reasons, most = list(test.reasons), MOST_REASONS
     if len(reasons) > most:

@@ -16,6 +16,7 @@ from workbench.report.model_tables import reasons_once
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
+from workbench.verdicts import in_words
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]
 LEAST_STATISTIC = 1e-3  # over its threshold, that is drawn
@@ -125,7 +126,7 @@ def _over_logs(found: Drifted) -> Panel:
     wide = most > LINEAR_UP_TO
     other = number[[one.verdict == "structure" for one in seen]]
     if len(other):
-        lines.append(Line("other structure", other, np.ones(len(other)), "model", "dots"))
+        lines.append(Line("structure changed", other, np.ones(len(other)), "model", "dots"))
     return Panel(
         "log since the model became active", "statistic over its threshold", lines,
         marks=[Mark(1.0)], x_range=(0.5, len(seen) + 0.5), log_y=wide,
@@ -140,7 +141,7 @@ def drift_sentence(found: Drifted) -> str:
         case "structure":
             names = _files(found, "structure")
             return (
-                f"Another structure: no parameters of the model follow {names}. This is no drift;"
+                f"Structure changed: no parameters of the model follow {names}. This is no drift;"
                 " trace finds the effect that joined."
             )
         case "drift":
@@ -186,10 +187,17 @@ def _all_that_moved(test: DriftTest) -> str:
     if not test.found_by:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
+    moved = [_from_to(one) for one in test.moved]
     if test.unsure:
         moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
+
+
+def _from_to(shift: Shift) -> str:
+    """A parameter before and after, in the unit in which tables show it."""
+    unit, factor = shown_unit(shift.unit)
+    before, after = (number(factor * value, 4) for value in (shift.before, shift.after))
+    return f"{shift.name} {before} -> {after} {unit}"
 
 
 def _percent(value: float) -> str:
@@ -222,7 +230,7 @@ def _run_row(one: Tested) -> Row:
     chi = "-" if test.chi_square is None else f"{test.chi_square:.3g} of {test.allowed:.3g}"
     return (
         one.source.file,
-        test.verdict.replace("_", " "),
+        in_words(test.verdict),
         _over(test.single),
         _over(test.mean),
         chi,

@@ -9,14 +9,16 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.latent_force import LatentForces
 from identification.model.inverse_model import Smoothing
+from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
-from workbench.cards.readable import times, units_of
+from workbench.cards.readable import force, times, units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Band, Chart, Line, Mark, Panel, Part
 from workbench.report.missing_force import force_line, range_of
 from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
+from workbench.steps.predict import FORCE_WINDOW, in_windows
 from workbench.steps.predicted_force import force_by_model
 
 NOISE_BAND = "±2σ of the sensor's noise"
@@ -111,9 +113,12 @@ def _fit_caption(model: Model) -> str:
     if model.by_equation:
         return f"No free run follows these logs, so no position is simulated.{inverse}"
     if model.fit.drive == "command":
+        anew = "from the start of the log; it never sees the measured position"
+        if in_windows(model):
+            anew = f"anew from the measured state every {FORCE_WINDOW:g} s"
         return (
-            "The model is driven by the logged command alone, from the start of the log; it never"
-            f" sees the measured position.{inverse if model.rig.kind == 'motor' else ''}"
+            f"The model is driven by the logged command alone, {anew}."
+            f"{inverse if model.rig.kind == 'motor' else ''}"
         )
     return (
         f"The model is driven by the measured force, {run_coupling(model)}: a free run on a"
@@ -123,10 +128,10 @@ def _fit_caption(model: Model) -> str:
 
 def residual(
     model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None],
-    missing: LatentForces | None,
+    missing: LatentForces | None, friction: Karnopp,
 ) -> list[Section]:  # fmt: skip
     """Position's and force's residual over time, with the noise that a perfect model leaves; none
-    where neither is known."""
+    where neither is known. friction: of the runs."""
     row, panels = in_a_row(sources), []
     unit, factor = units_of(model.rotary).position
     known = [run for run in runs if run]
@@ -140,10 +145,11 @@ def residual(
                 bands=[Band(NOISE_BAND, -noise, noise)], marks=row.marks,
             )
         )  # fmt: skip
-    force = _force_panel(model, sources, known, row, missing)
-    panels += [force] if force else []
+    panel = _force_panel(model, sources, known, row, missing)
+    panels += [panel] if panel else []
     what = "residual of position and force over time, with the band of the sensors' noise"
-    parts, caption = row.parts if len(sources) > 1 else (), _residual_caption(model)
+    parts = row.parts if len(sources) > 1 else ()
+    caption = f"{_residual_caption(model)}{_own_limits(model, friction)}"
     chart = Chart("residual", what, panels, parts=parts, caption=caption)
     return [Section("What the model leaves", chart)] if panels else []
 
@@ -171,6 +177,18 @@ def _force_panel(
     )  # fmt: skip
 
 
+def _own_limits(model: Model, friction: Karnopp) -> str:
+    """What to say of a run whose stick limits are not those of the model."""
+    own, used = (friction.F_sp, friction.F_sn), (model.karnopp.F_sp, model.karnopp.F_sn)
+    if model.by_equation or np.allclose(own, used):
+        return ""
+    first, second = (force(one, model.rotary) for one in own)
+    return (
+        f" The run has its own stick limits, {first} and {second}; the table's stand midway to the"
+        " force at the breakaways."
+    )
+
+
 def _residual_caption(model: Model) -> str:
     if model.by_equation:
         return (
@@ -179,7 +197,13 @@ def _residual_caption(model: Model) -> str:
         )
     if model.fit.adequate:
         how = times(float(np.sqrt(model.fit.chi_square)))
-        return f"What is left of the run is {how} the sensors' noise."
+        if not in_windows(model):
+            return f"What is left of the run is {how} the sensors' noise."
+        return (
+            f"What is left of the run is {how} what the noise of all signals makes of it: in each"
+            f" window of {FORCE_WINDOW:g} s the error of the state from which it begins adds up, so"
+            " that it is wider than the band of the position sensor alone."
+        )
     return (
         f"What is left is {left_of(model)}: the machine has an effect that the model has not, or"
         " another structure. The command `workbench trace` finds which."

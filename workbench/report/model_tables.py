@@ -223,12 +223,16 @@ def next_of_model(model: Model) -> str:
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
-    by = "the command"
+    from workbench.steps.predict import FORCE_WINDOW, in_windows
+
+    by, within = "the command", ""
     if model.fit.drive != "command":
         by = f"the applied force, {run_coupling(model)}"
+    elif in_windows(model):
+        within = f" in windows of {FORCE_WINDOW:g} s from measured states"
     lines = [
-        f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
-        f" {e.duration:.4g} s, driven by {by}"
+        f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms{within}"
+        f" over {e.duration:.4g} s, driven by {by}"
         for e in model.log
         if e.position_rms is not None
     ]

@@ -58,16 +58,16 @@ THEN_WITHOUT = (
 
 def identified_view(found: Identified) -> View:
     """What was identified, how well it follows the log, what it leaves."""
-    model, sources = found.model, found.sources
+    model, sources, friction = found.model, found.sources, found.fit.friction
 
     @cache
     def runs() -> list[FreeRun | None]:
-        return [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
+        return [fitted_run(model, one.log, number, friction) for number, one in enumerate(sources)]
 
     def sections() -> Sequence[Section]:
         said = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
         return (
-            *residual(model, sources, runs(), missing),
+            *residual(model, sources, runs(), missing, friction),
             parameters_section(model),
             friction_curve(model, found.fit, sources),
             Section("Fit over time", fit_chart(model, sources, runs())),

@@ -24,7 +24,7 @@ MEANING_OF = {
     "F_sp": "breakaway, positive",
     "F_sn": "breakaway, negative",
     "m": "moving mass",
-    "constant_force": "constant force",
+    "constant_force": "half the difference of F_cn and F_cp: unequal friction or a constant force",
     "backlash": "backlash",
     "explained": "force explained",
     "along_travel": "variation along travel",

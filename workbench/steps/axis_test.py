@@ -269,7 +269,7 @@ def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> st
     if estimate.unit == "1":
         unit, factor = "%", 100.0
     side = "above" if above else "below"
-    last = f"its last {allowed.logs} logs'"
+    last = f"its last {allowed.logs} sound logs'"
     whose = {"card": "the card's", "registry": last, "usual": "the usual"}
     moved = ""
     if allowed.mean and estimate.unit not in ("1", "") and "constant" not in meaning:
@@ -284,6 +284,9 @@ def _said(meaning: str, estimate: Estimate, allowed: Allowed, unsure: str) -> st
 
 def _whole(meaning: str) -> str:
     """A meaning as it stands in a sentence."""
+    name, _, what = meaning.partition(": ")
+    if what:
+        return f"{name} ({what})"
     name, _, way = meaning.partition(", ")
     return f"{name} in {way} direction" if way else name
 

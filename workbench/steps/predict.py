@@ -1,7 +1,7 @@
 """Model + log -> prediction: force by the inverse model, force and position by simulation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from identification.estimation.regression.held_command import with_period
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
+from identification.model.karnopp import Karnopp
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
-FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by the measured force
+FORCE_WINDOW = 2.0  # s between the fresh starts of a fit that does not follow its logs whole
 PREDICTION_COLUMNS = (
     "t",
     "force_applied",
@@ -233,17 +234,28 @@ def as_driven(model: Model, log: Log, drive: Drive) -> Log:
     return with_period(log, model.fit.command_period, model.rig.kind == "motor")
 
 
-def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
+def in_windows(model: Model) -> bool:
+    """Whether the fit compared its runs with the logs in windows from measured states; of a fit by
+    the command its remark says so, or that no run has given the force over a whole log."""
+    if model.fit.drive == "force":
+        return True
+    said = any(f"in windows of {FORCE_WINDOW:g} s" in remark for remark in model.fit.remarks)
+    without_force = all(entry.force_rms is None for entry in model.log)
+    return said or (without_force and model.rig.kind != "motor")
+
+
+def fitted_run(model: Model, log: Log, index: int, friction: Karnopp) -> FreeRun | None:
     """The run that the fit compared with one of its logs: from its start, coupled as it was.
 
-    None where the equation of motion was fitted alone.
+    friction: the fit's own, whose stick limits may be others than the model's. None where the
+    equation of motion was fitted alone.
     """
     if model.by_equation:
         return None
     drive = model.fit.drive
-    restarts = _restarts(log, FORCE_WINDOW) if drive == "force" else None
+    restarts = _restarts(log, FORCE_WINDOW) if in_windows(model) else None
     return free_run(
-        model.simulated,
+        replace(model.simulated, friction=friction),
         as_driven(model, log, drive),
         model.log[index].start,
         drive,

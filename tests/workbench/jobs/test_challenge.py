@@ -1,5 +1,6 @@
 """Who wins and who does not, on held-out logs and in the loop, each with its reason."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -46,7 +47,8 @@ def test_the_model_of_the_machine_as_it_is_wins() -> None:
     old, new = found.held_out["champion"], found.held_out["challenger"]
     assert old.position_rms is not None and new.position_rms is not None
     assert new.position_rms < 0.1 * old.position_rms
-    assert found.reason.startswith("held out: free run")
+    units = r"held out: free run [\d.]+ (mm|µm) rms against [\d.]+ mm, force [\d.]+ N rms against"
+    assert re.match(units + r" [\d.]+ N; simulation: tracking error [\d.]+ mm rms", found.reason)
     document = contest_document(found)
     assert document["won"] is True
     assert document["held_out"]["challenger"]["position_rms"] == new.position_rms

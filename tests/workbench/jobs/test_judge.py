@@ -169,7 +169,7 @@ def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
 def test_a_false_alarm_is_refused_with_its_reason(shop: Path, first: Judgement) -> None:
     found = Chain(says("drift"))(task(shop, "same", first))
     assert found.verdict == "refused"
-    assert "held out" in found.reason
+    assert "Held out" in found.reason
     assert found.candidate is not None
 
 
@@ -205,7 +205,7 @@ def test_another_structure_is_traced_and_the_effect_put_in_force(
 def test_a_structure_that_no_trace_confirms_has_to_win(shop: Path, first: Judgement) -> None:
     found = Chain(says("structure"))(task(shop, "same", first))
     assert found.verdict == "refused"
-    assert "held out" in found.reason
+    assert "Held out" in found.reason
 
 
 def test_the_log_that_made_the_model_does_not_judge_it(shop: Path, first: Judgement) -> None:

@@ -1,6 +1,8 @@
 """One pass: which files it takes, what it does with bad ones, and what it leaves for the next."""
 
 import os
+import socket
+import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
@@ -14,6 +16,7 @@ from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from tests.workbench.registry.postgres import Server
 from workbench.jobs.lease import Patience, shared_clock
+from workbench.jobs.options import is_gone
 from workbench.jobs.passes import Judge, Pass, PassReport, Task
 from workbench.jobs.scan import BadRoot, open_for_writing
 from workbench.registry.errors import RegistryAway
@@ -388,3 +391,34 @@ def test_a_root_that_is_none(run: Run, root: Path) -> None:
         run()
     root.mkdir()
     assert run().machines == 0
+
+
+def test_notes_beside_the_logs_are_no_alarm(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    logs = {"1.csv": "bad", "empty.txt": "", "notes.txt": "28.11.2026 changed the belt of axis 2\n",
+            "2.txt": "t y u\n0.0 1.0 2.0\n0.1 1.1 2.0\n"}  # fmt: skip
+    machine(root, "a", logs)
+    done = run()
+    assert verdicts(done) == {"1.csv": "set_aside", "2.txt": "none"}
+    assert done.no_logs == ("a/empty.txt", "a/notes.txt")
+    assert registry.machine("a").waiting == 0
+
+
+def test_a_machine_in_other_hands_is_said_and_a_dead_workers_is_taken(
+    run: Run, registry: Registry, root: Path
+) -> None:
+    in_force(registry, "a")
+    machine(root, "a", {"1.csv": "quiet"})
+    queue, here = Queue(registry.database), f"{socket.gethostname()}:"
+    living, minute = f"{here}{os.getpid()}:abcd", timedelta(minutes=1)
+    claim = queue.claim("a", owner=living, lease=minute, now=clock())
+    assert claim is not None
+    done = run()
+    assert (done.busy, done.outcomes) == (("a",), ())
+    assert done.held["a"].startswith(f"worker {living} has it until ")
+    queue.release(claim)
+    with subprocess.Popen(["true"]) as ended:
+        ended.wait()
+    assert queue.claim("a", owner=f"{here}{ended.pid}:abcd", lease=minute, now=clock())
+    assert verdicts(run()) == {"1.csv": "none"}
+    assert not is_gone("w") and not is_gone(f"other:{ended.pid}:abcd") and not is_gone(living)

@@ -7,6 +7,8 @@ import pytest
 
 from tests.workbench.page.conftest import NOW, Page
 from workbench.page.fleet import asked_for
+from workbench.page.machine import parameter_charts
+from workbench.registry import results
 from workbench.registry.overview import (
     TREND_LOGS,
     FleetAsked,
@@ -34,15 +36,16 @@ def evidence(*parameters: dict[str, Any], verdict: str = "none") -> dict[str, An
 
 
 def judge(
-    registry: Registry, machine: str, number: int, verdict: LogVerdict, found: dict[str, Any]
-) -> None:
+    registry: Registry, machine: str, number: int, verdict: LogVerdict, found: dict[str, Any],
+    made: Candidate | None = None,
+) -> None:  # fmt: skip
     """A further log of the machine and its result, an hour after the one before."""
     queue, now = Queue(registry.database), NOW + number * HOUR
     log = SeenLog(f"{number:064d}", f"run{number}.csv", 10, int(now.timestamp() * 1e9))
     queue.announce(machine, [log], now=now)
     claim = queue.claim(machine, owner="w", lease=HOUR, now=now)
     assert claim is not None
-    queue.finish(claim, log, Judgement(verdict, "why", evidence=found), by="w", now=now)
+    queue.finish(claim, log, Judgement(verdict, "why", made, found), by="w", now=now)
     queue.release(claim)
 
 
@@ -75,7 +78,9 @@ def test_a_state_is_that_of_the_last_log(where: str) -> None:
         later = fleet_page(registry.database, asked(silent_since=NOW + 90 * timedelta(minutes=1)))
         silent = {one.machine for one in later.lines if one.state == "silent"}
         assert silent == {"unsure"} and later.counts["silent"] == 1  # an alarm stays one
-        registry.promote("drifts", 1, reason="r", by="t", now=NOW)
+        for name in ("drifts", "new"):
+            registry.promote(name, 1, reason="r", by="t", now=NOW)
+        assert condition(registry.database, "new") == "no_log"
         assert condition(registry.database, "drifts") == "not_judged"
 
 
@@ -164,9 +169,85 @@ def test_a_machine_shows_the_lights_of_its_newest_log(page: Page) -> None:
         page.client.get(f"/machine/{name}").text for name in ("fresh", "same", "worn")
     )
     assert "No log has given its parameters yet" in fresh
-    assert "run7.csv, within the mean" in same and 'class="state done">green' in same
+    assert (
+        "run7.csv; limits: mean ± 3 sd of 6 sound logs" in same
+        and 'class="state done">green' in same
+    )
     assert 'class="state failed">red' not in same
-    assert "run8.csv, within the mean" in worn and 'class="state failed">red' in worn
+    assert (
+        "run8.csv; limits: mean ± 3 sd of 7 sound logs" in worn
+        and 'class="state failed">red' in worn
+    )
+
+
+def promoted_by_a_worker(registry: Registry, machine: str) -> None:
+    """A machine whose seven quiet logs are followed by a drift, its new model, and a quiet log."""
+    registry.add(machine, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
+    registry.promote(machine, 1, reason="first", by="t", now=NOW)
+    for k in range(1, 8):
+        judge(registry, machine, k, "none", evidence(told("F_cp", 0.001 * (k % 3)), told("m", 0.0)))
+    found = evidence(told("F_cp", 0.4), told("m", 0.001), verdict="drift")
+    judge(registry, machine, 8, "promoted", found, Candidate({"m": 2.0}))
+    after = {**told("F_cp", 0.4), "before": 14.0, "change": 0.0}
+    judge(registry, machine, 9, "none", evidence(after, told("m", 0.011)))
+    judge(registry, machine, 10, "set_aside", {})
+    judge(registry, machine, 11, "not_judged", {})
+
+
+def test_a_drift_stays_until_somebody_accepts_it(page: Page) -> None:
+    registry = page.registry
+    promoted_by_a_worker(registry, "a")
+    (line,) = fleet_page(registry.database, asked()).lines
+    assert (line.state, line.moved, line.version) == ("drifting", "F_cp", 2)
+    assert line.moved_by == pytest.approx(0.4) and line.trend[-1] == pytest.approx(14.0)
+    text = page.client.get("/machine/a").text
+    assert (
+        "run9.csv; limits: mean ± 3 sd of 7 sound logs (wider of few); the limits leave out" in text
+    )
+    assert "run8.csv (alarm)" in text
+    assert text.count("Newer logs gave no parameters: run11.csv, run10.csv") == 2
+    assert 'class="state failed">red' in text
+    assert "Nobody has accepted it yet" in text and "<td>excluded</td>" in text.replace(
+        '<td class="nowrap">', "<td>"
+    )
+    promoted_by_a_worker(registry, "b")
+    judge(registry, "b", 12, "refused", evidence(told("m", 0.5), verdict="drift"))
+    for name in ("a", "b"):
+        registry.promote(name, 2, reason="new guide", by="anna", now=NOW)
+    assert condition(registry.database, "a") == "in_tune"
+    assert condition(registry.database, "b") == "drifting"  # since that version, too
+    judge(registry, "b", 13, "none", evidence(told("F_cp", 0.0)))
+    assert condition(registry.database, "b") == "in_tune"
+
+
+def test_a_bad_or_inconclusive_log_hides_no_change() -> None:
+    for verdict in ("set_aside", "not_judged"):
+        assert state_of(verdict, {}, "structure") == "structure"
+        assert state_of(verdict, {}, "in_tune") != "in_tune"
+    assert state_of("none", {}, "drifting") == "in_tune"
+    assert state_of("none", {}, "drifting", accepted=False) == "drifting"
+    drift = evidence(verdict="drift")
+    assert state_of("refused", drift, "structure", accepted=False) == "structure"
+    assert state_of("refused", evidence(verdict="structure"), "drifting") == "structure"
+    assert state_of("promoted", {}) == "in_tune"  # the first model
+
+
+def test_the_active_model_is_drawn_in_steps_and_what_moved_comes_first() -> None:
+    def log(k: int, active: float, found: float) -> results.TestedLog:
+        dv = {**told("dv_p", 0.0005, 0.0001), "before": 0.04, "after": 0.04002, "unit": "m/s"}
+        F_cp = {**told("F_cp", 0.0), "before": active, "after": found}
+        return results.TestedLog(
+            f"{k}", f"{k}", 60.0 * k, "none", "", 1, None, (dv, F_cp), "", True
+        )
+
+    logs = [log(0, 17.0, 17.0), log(1, 17.0, 21.0), log(2, 21.0, 21.0)]
+    (drawn,) = parameter_charts(logs)
+    first, second = drawn.panels
+    assert (first.y, second.y) == ("F_cp [N]", "dv_p [mm/s]")
+    active = first.lines[0]
+    assert list(active.y) == [17.0, 17.0, 17.0, 21.0, 21.0]
+    assert active.x[2] < active.x[3] < active.x[2] + 1e-3
+    assert second.lines[1].y[0] == pytest.approx(40.02)
 
 
 @pytest.mark.parametrize(

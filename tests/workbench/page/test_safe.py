@@ -177,12 +177,26 @@ def test_what_is_no_log_is_refused_and_nothing_stays(page: Page) -> None:
         ("a.exe", CSV, "no log by its ending"),
         ("a.csv", b"", "is empty"),
         ("a.csv", b"\x1f\x8b" + CSV, "gzip"),
+        ("a.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "is a binary file, no text as its ending says"),
     ):
         answer = page.client.post("/drop", headers=changer, files={"log": (name, content)})
         assert answer.status_code == 400 and said in answer.text
         assert str(page.root) not in answer.text
     assert list(page.root.glob(".drops/*")) == []
     assert page.client.post("/drop", headers=changer, data={"x": "y"}).status_code == 400
+
+
+def test_a_log_that_cannot_be_read_is_said_once_and_nothing_waits(page: Page) -> None:
+    changer = page.token("anna", "change")
+    files = {"log": ("tiny.csv", b"t,y,u\n0,1,2\n")}
+    place = page.client.post("/drop", headers=changer, files=files).headers["location"]
+    columns, card, picture = (
+        page.client.get(f"{place}/{p}") for p in ("columns", "card", "picture")
+    )
+    assert "1 row, at least 100 rows needed" in columns.text
+    assert card.status_code == 200 and "No card: the log cannot be read." in card.text
+    assert card.headers["HX-Trigger-After-Settle"] == "card-ready"
+    assert "Nothing to show until a card reads the log" in picture.text
 
 
 @pytest.mark.parametrize(

@@ -150,7 +150,7 @@ def _drift_arrives(plant: Plant) -> None:
         assert work.run(plant.root).failed == {}
     person = plant.person
     person.go("/")
-    person.reads("drifting")
+    person.reads("drift")
     person.find("[aria-label^='F_cp over the last']")
     person.looks_right("fleet")
     person.type("#text", "nothing")

@@ -60,6 +60,18 @@ def test_one_worker_at_a_time_until_its_lease_ends(queue: Queue) -> None:
     assert claimed(queue, "y", NOW + 2 * LEASE).owner == "y"
 
 
+def test_a_dead_workers_lease_ends_at_once(queue: Queue) -> None:
+    claimed(queue, "dead")
+    assert queue.holder("m") == "worker dead has it until 00:01:00Z"
+
+    def taken(dead: str) -> Claim | None:
+        return queue.claim("m", owner="x", lease=LEASE, now=NOW, gone=lambda one: one == dead)
+
+    assert taken("another") is None
+    claim = taken("dead")
+    assert claim is not None and claim.owner == "x"
+
+
 def test_a_result_has_all_that_belongs_to_it_or_nothing(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
     late = claimed(queue, "x", NOW + 2 * LEASE)

@@ -64,9 +64,27 @@ def test_rollback_goes_back_one_by_one(registry: Registry) -> None:
     state = registry.machine("a")
     assert state.in_force is not None and state.in_force.number == 1
     assert state.since == made
-    with pytest.raises(BadRegistry, match="one version has been active"):
+    with pytest.raises(BadRegistry, match="version 1 is the first that was active"):
         registry.rollback("a", now=NOW, **WHO)
     registry.promote("a", 3, now=NOW, **WHO)
+    assert registry.rollback("a", now=NOW, **WHO).number == 1
+
+
+def test_what_a_worker_has_activated_is_accepted_by_promoting_it(registry: Registry) -> None:
+    add(registry, "a", 1.0)
+    registry.promote("a", 1, now=NOW, **WHO)
+    queue, log = Queue(registry.database), SeenLog("f" * 64, "f.csv", 1, 1)
+    queue.announce("a", [log], now=NOW)
+    claim = queue.claim("a", owner="w", lease=timedelta(minutes=1), now=NOW)
+    assert claim is not None
+    queue.finish(claim, log, Judgement("promoted", "r", Candidate({"m": 2.0})), by="w", now=NOW)
+    active, accepted = registry.active_version("a"), registry.accepted_version("a")
+    assert active is not None and accepted is not None
+    assert (active.number, accepted.number) == (2, 1)
+    assert registry.promote("a", 2, now=NOW, **WHO).kind == "promoted"
+    assert registry.accepted_version("a") == active
+    with pytest.raises(BadRegistry, match="version 2 is active already"):
+        registry.promote("a", 2, now=NOW, **WHO)
     assert registry.rollback("a", now=NOW, **WHO).number == 1
 
 

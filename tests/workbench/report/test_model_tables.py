@@ -3,14 +3,20 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from identification.model.karnopp import Karnopp
-from tests.chain import EMPS, model_of
+from identification.simulation.free_run import FreeRun
+from tests.chain import EMPS, model_of, short_recipe
 from tests.workbench.trace_values import missing_force
 from workbench.documents.model import Model
-from workbench.report.model_tables import summary
+from workbench.logs.sources import Source
+from workbench.report.chart import Chart
+from workbench.report.fit import fit_chart, residual
+from workbench.report.model_tables import fit_lines, summary
 from workbench.report.next_steps import after_identify
+from workbench.steps.simulate import record
 
 
 def by_equation(left: float, friction: Karnopp = EMPS) -> Model:
@@ -43,3 +49,31 @@ def test_a_force_that_shows_is_not_called_noise() -> None:
     said = summary(by_equation(1.0, replace(EMPS, F_cp=2.0, F_cn=2.0)), found.before)
     assert "little more than noise, but a force is missing" in said
     assert "Force missing: " in said
+
+
+WINDOWED = "the model follows the logs in windows of 2 s from measured states, but not the whole"
+
+
+def test_a_run_in_windows_says_so_in_its_line_and_under_its_pictures() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    entry = replace(model.log[0], position_rms=2.9e-4, duration=30.0)
+    fit = replace(model.fit, drive="command", adequate=True, chi_square=0.8)
+    whole = replace(model, log=(entry,), fit=fit)
+    windowed = replace(whole, fit=replace(fit, remarks=(WINDOWED,)))
+    (line, *_), (other, *_) = fit_lines(windowed), fit_lines(whole)
+    assert "within 0.29 mm rms in windows of 2 s from measured states over 30 s" in line
+    assert "windows" not in other
+    log = record("short", short_recipe()[1], 7)
+    source = Source(log, "short.csv", "0" * 64, len(log))
+    run = FreeRun(log["y"], log["y"], log["F"], np.zeros(len(log), np.int64), log["y"])
+    for one, anew, left in (
+        (windowed, "anew from the measured state every 2 s", "0.89 times what the noise of all"),
+        (whole, "it never sees the measured position", "0.89 times the sensors' noise"),
+    ):
+        assert anew in fit_chart(one, [source], [run]).caption
+        (section,) = residual(one, [source], [run], None, one.karnopp)
+        assert isinstance(section.content, Chart) and left in section.content.caption
+        assert "stick limits" not in section.content.caption
+    (section,) = residual(windowed, [source], [run], None, replace(EMPS, F_sp=1.5 * EMPS.F_sp))
+    assert isinstance(section.content, Chart)
+    assert "The run has its own stick limits, 37.5 N and -19 N" in section.content.caption

@@ -108,10 +108,19 @@ def test_a_past_of_other_friction_is_red_and_the_card_goes_first() -> None:
     past = earlier(F_cp=10.0, F_cn=15.0)
     test = axis_test(sources(), past)
     assert test.light == "red" and lights(test)["F_cn"] == "green"
-    assert (
-        "above its last 30 logs' limit" in test.reasons[0] and "% of their mean" in test.reasons[0]
-    )
+    assert "above its last 30 sound logs' limit" in test.reasons[0]
+    assert "% of their mean" in test.reasons[0]
     assert axis_test(sources({"F_cp": (11.0, 13.0)}), past).light == "green"
+
+
+def test_unequal_friction_is_not_called_a_constant_force() -> None:
+    test = axis_test(sources({"constant_force": (-0.5, 0.5)}))
+    one = test.of("constant_force")
+    assert one.meaning.startswith("half the difference of F_cn and F_cp: unequal friction or")
+    assert one.light == "red" and test.reasons[0].startswith(
+        "half the difference of F_cn and F_cp (unequal friction or a constant force) is 1.5"
+    )
+    assert one.meaning in axis_view(test).page()
 
 
 def test_without_limits_it_is_yellow_and_says_what_to_give() -> None:
