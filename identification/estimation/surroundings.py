@@ -51,7 +51,7 @@ from identification.thresholds import (
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
-LEAD, LAG = -12.0, 12.0  # samples, between which they are
+LEAD, LAG = -6.0, 12.0  # samples, between which they are; a current may be as late as a position
 FEWEST_WINDOWS = 40  # windows of sliding
 SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
@@ -351,7 +351,8 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
     """
     if not any(len(one.speed) for one in moved):
         return None
-    lags = np.arange(LEAD, LAG + LAG_STEP / 2, LAG_STEP)
+    lead = -LAG if moved[0].held else LEAD
+    lags = np.arange(lead, LAG + LAG_STEP / 2, LAG_STEP)
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
     for one in moved:
@@ -363,7 +364,7 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
             X = np.column_stack([X, w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y)])
         own_lags = lags * (moved[0].log.h / one.log.h)  # lags are in samples of the first log
         B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in own_lags])
-        inside = (w.start >= LAG) & (w.start + w.length < len(F) + LEAD) & (plain.speed >= slow)
+        inside = (w.start >= LAG) & (w.start + w.length < len(F) + lead) & (plain.speed >= slow)
         block = _blocks_of_each_way(one.up, inside)
         for k in range(BLOCKS):
             in_block = inside & (block == k)
