@@ -409,6 +409,7 @@ class Design:
     drive takes, present: the controller that it has now, recommendation: the same with its reason;
     None in older files. read: what to say of its file, a line for each value in another unit than
     ours. schedule: the controllers over place, load or direction, where that was asked for.
+    lacks: what its model lacks, in words, "" where nothing.
     """
 
     card: str
@@ -431,6 +432,7 @@ class Design:
     schedule: Annotated[GainSchedule | None, Through(ScheduleFile, _schedule, _schedule_file)] = (
         None
     )
+    lacks: str = ""
     read: Annotated[tuple[str, ...], *NOT_WRITTEN] = field(default=(), compare=False)
     schema: Literal["design/2"] = "design/2"
 

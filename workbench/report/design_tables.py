@@ -11,8 +11,8 @@ from workbench.output import Row
 from workbench.report.view import notes
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
-from workbench.steps.loop_figures import takes_compensator
-from workbench.steps.recommend import other_figures, own_figures
+from workbench.steps.loop_figures import COMPENSATED, takes_compensator
+from workbench.steps.recommend import FIGURES_SAID, called, other_figures, own_figures
 
 DESIGN_HEAD = (
     "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",
@@ -71,6 +71,7 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     return [
         *other_lines(found),
         MARGINS_SAID,
+        FIGURES_SAID,
         f"plant: {found.plant.source}, {found.plant.why}",
         *loop_lines(found, rotary),
         *schedule_lines(found, rotary),
@@ -221,13 +222,25 @@ def set_point_lines(found: Design) -> list[str]:
 
 def design_sentence(found: Design) -> str:
     """Which controller, and what speaks for it, in one or two sentences."""
+    lacks = of_the_model(found.lacks)
     if found.recommended == "none":
-        return "No controller meets every goal; below is what each misses."
+        return f"{lacks}No controller meets every goal; below is what each misses."
     why = ""
     if found.recommendation:
         why = f". With friction in simulation: {own_figures(found.recommendation.why)}"
     every = f"position loop every {1e3 * found.plant.h:.4g} ms"
-    return f"{found.recommended.upper()} recommended, {every}{why}."
+    beside = found.recommendation is not None and found.recommendation.compensator
+    name = called(found.recommended + (COMPENSATED if beside else ""))
+    return f"{lacks}{name} recommended, {every}{why}."
+
+
+def of_the_model(lacks: str) -> str:
+    """The sentence that comes first where a design's model lacks something; "" else."""
+    if not lacks:
+        return ""
+    return (
+        f"{lacks[0].upper()}{lacks[1:]}: margins and figures are the model's, not the machine's. "
+    )
 
 
 def drive_lines(found: Design, only: str | None = None) -> list[str]:
@@ -272,6 +285,7 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         MARGINS_SAID,
         drive_table(found),
         listed(other_lines(found)),
+        more(FIGURES_SAID),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),
         listed(schedule_lines(found, rotary)),

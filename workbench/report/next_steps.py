@@ -105,6 +105,8 @@ def after_validate(
     card: str | None,
 ) -> Step | None:  # fmt: skip
     """What to change where the tested controller misses a limit; None where it keeps all."""
+    from workbench.steps.loop_figures import COMPENSATED
+
     failed = {place: one for place, one in found.figures[found.judged].items() if not one.passed}
     if not failed:
         return None
@@ -114,7 +116,11 @@ def after_validate(
         logs = [one.file for one in model.log]
         return step("an effect is missing", "trace", *logs, "--card", _card_of(model, card))
     words = ("design", str(model_file), *(("--card", card) if card else ()))
-    one, limits, controller = failed["model"], found.limits, of.controllers[found.judged]
+    alone = found.judged.removesuffix(COMPENSATED)
+    if alone != found.judged and found.figures[alone]["model"].passed:
+        return step("a design without the compensator", *words)
+    one, limits = failed["model"], found.limits
+    controller = next(it for name, it in of.controllers.items() if name == alone)
     m, pushed = one.margins, one.force_peak > limits.force * one.force_seen or one.limited > 0.0
     slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
     if one.stable and not (m is not None and m.modulus >= limits.modulus and slow):

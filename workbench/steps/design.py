@@ -8,7 +8,6 @@ import numpy as np
 
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
-from design.filters import filters_at
 from design.loop_frequencies import loop_frequencies
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
@@ -18,7 +17,6 @@ from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design import (
-    CompensatorValues,
     Controller,
     Design,
     From,
@@ -33,6 +31,7 @@ from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
 from workbench.steps.identify import check_period
+from workbench.steps.lacking import lacking
 from workbench.steps.linear_loop import (
     command_of,
     corners,
@@ -44,10 +43,9 @@ from workbench.steps.linear_loop import (
 )
 from workbench.steps.local_friction import asked_for
 from workbench.steps.recommend import recommended
+from workbench.steps.usual_compensator import usual_compensator
 
 FINEST = 20  # times faster than its logs that a controller may be designed
-N_C = 2.0  # the paper's, in simulation and on the rig
-E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
 LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
 SLOWED = 4  # times that a controller is made slower for the sake of its reference
 ENOUGH = 0.95  # of the w_n that would just do
@@ -222,8 +220,6 @@ def _design_of(
 ) -> Design:  # fmt: skip
     """The controllers as a design, with the compensator beside them; none is recommended yet."""
     plant, force = linear
-    low, high = model.travel
-    filters, h = filters_at(plant.h), plant.h
     return Design(
         card=model.card,
         motion=model.rig.motion,
@@ -234,9 +230,7 @@ def _design_of(
         p_pi=controllers.get("p-pi"),
         refused=refused,
         recommended="none",
-        compensator=CompensatorValues(
-            N_C, E_T_PER_TRAVEL * (high - low), model.friction, filters, h
-        ),
+        compensator=usual_compensator(model, plant.h, controllers.values()),
         remarks=(
             *model.read,
             *stored_remarks(model),
@@ -245,6 +239,7 @@ def _design_of(
         versions=versions(),
         command=command_of(model, force),
         present=model.present,
+        lacks=lacking(model),
     )
 
 
@@ -342,8 +337,6 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
         out.append(f"compensator: assumed, not identified: {', '.join(model.assumed)}")
     if model.rig.motor_inertia and model.friction["m"].value is not None:
         out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.rotary))
-    if not model.fit.adequate:
-        out.append("the model leaves more than noise; check the loop on the machine with care")
     if asks := [over for over in asked_for(model) if over != "direction"]:
         what = " and ".join(asks)
         out.append(
