@@ -18,13 +18,18 @@ DESIGN_HEAD = (
     "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",
 )  # fmt: skip
 IN_DRIVES_HEAD = (
-    "in a drive's words", "crossover", "bandwidth", "gain margin", "phase margin", "delay margin",
+    "in a drive's words", "crossover", "rejects to", "follows to", "gain margin", "phase margin",
+    "delay margin",
 )  # fmt: skip
 METRES_PER_MINUTE = 0.06  # of a Kv of 1/s, in m/min/mm
 MARGINS_SAID = (
     "modulus, gain, phase, delay: the margins, how much more of each the loop bears; worst: the"
     " least modulus margin inside the parameters' intervals; periods: the delay margin in sampling"
     " periods; |S_up|: at most, from measurement noise to force"
+)
+FREQUENCIES_SAID = (
+    "rejects to: bandwidth of the feedback, |S_yp| below -3 dB; follows to: reference to position"
+    " above -3 dB, with the filter and the speed feed-forward of the reference"
 )
 
 
@@ -39,12 +44,15 @@ def drive_table(found: Design) -> Part:
     rows = []
     for name, m in ((name, one.margins) for name, one in found.controllers.items()):
         said = (
-            *("-" if f is None else f"{number(f)} Hz" for f in (m.crossover_hz, m.bandwidth_hz)),
+            *(
+                "-" if f is None else f"{number(f)} Hz"
+                for f in (m.crossover_hz, m.rejection_hz, m.bandwidth_hz)
+            ),
             "any" if m.gain_db is None else f"{number(m.gain_db)} dB",
             "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
             "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
         )
-        if said[:2] != ("-", "-"):
+        if said[:3] != ("-", "-", "-"):
             rows.append((name.upper(), *said))
     return tabled(IN_DRIVES_HEAD, rows)
 
@@ -54,9 +62,12 @@ def _margins(one: Controller) -> Row:
     delay = ("any", "any")
     if m.delay_s is not None and m.delay_samples is not None:
         delay = f"{1e3 * m.delay_s:.3g} ms", f"{m.delay_samples:.2g}"
+    w_n, zeta = (f"{one.dominant[0]:.3g}", f"{one.dominant[1]:.2g}")
+    if one.cascade is not None:  # a cascade is not placed by its poles
+        w_n, zeta = f"Kv {one.cascade.k_v:.3g}", "-"
     return (
-        f"{one.dominant[0]:.3g}",
-        f"{one.dominant[1]:.2g}",
+        w_n,
+        zeta,
         f"{m.modulus:.3f}",
         "unstable" if m.worst_modulus is None else f"{m.worst_modulus:.3f}",
         "any" if m.gain_up is None else f"x {m.gain_up:.3g}",
@@ -71,6 +82,7 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     return [
         *other_lines(found),
         MARGINS_SAID,
+        FREQUENCIES_SAID,
         FIGURES_SAID,
         f"plant: {found.plant.source}, {found.plant.why}",
         *loop_lines(found, rotary),
@@ -284,6 +296,7 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         margins_table(found),
         MARGINS_SAID,
         drive_table(found),
+        FREQUENCIES_SAID,
         listed(other_lines(found)),
         more(FIGURES_SAID),
         more(f"plant: {found.plant.source}, {found.plant.why}"),

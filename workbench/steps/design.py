@@ -12,7 +12,7 @@ from design.loop_frequencies import loop_frequencies
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
-from identification.model.plant import Actuator
+from identification.model.plant import Actuator, Motor
 from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, shown_unit
@@ -30,6 +30,7 @@ from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
+from workbench.steps.clear_win import CLEARLY_LESS
 from workbench.steps.identify import check_period
 from workbench.steps.lacking import lacking
 from workbench.steps.linear_loop import (
@@ -42,7 +43,8 @@ from workbench.steps.linear_loop import (
     unknown_viscous,
 )
 from workbench.steps.local_friction import asked_for
-from workbench.steps.recommend import recommended
+from workbench.steps.loop_figures import COMPENSATED
+from workbench.steps.recommend import compared, own_figures, reasons, recommended
 from workbench.steps.usual_compensator import usual_compensator
 
 FINEST = 20  # times faster than its logs that a controller may be designed
@@ -73,11 +75,37 @@ def design(
     Raises BadSpecification where no controller meets what was asked, NotIdentifiable where the
     model carries no design.
     """
-    structures = structures or usual_structures(model, asked)
+    usual = usual_structures(model, asked)
     first = placed_design(
-        model, asked, goals=goals, source=source, period=period, structures=structures
+        model, asked, goals=goals, source=source, period=period, structures=structures or usual
     )
-    return with_choice(model, first, recommended(model, first))
+    found = with_choice(model, first, recommended(model, first))
+    by_itself = structures is None and (asked is None or asked == Asked())
+    if not by_itself or "p-pi" in usual or not isinstance(model.simulated.actuator, Motor):
+        return found
+    try:
+        cascade = placed_design(
+            model, goals=goals, source=source, period=period, structures=("p-pi",)
+        )
+    except BadSpecification:
+        return found
+    return replace(found, remarks=(*found.remarks, *_tracks_better(model, cascade, found)))
+
+
+def _tracks_better(model: Model, cascade: Design, found: Design) -> Iterator[str]:
+    """What the P-PI of a motor's axis would do, where it would track clearly better than what is
+    recommended, and the command that makes it."""
+    choice, its = found.recommendation, compared(model, cascade)
+    if choice is None or choice.controller == "none" or not its["p-pi"].passed:
+        return
+    taken = choice.controller + (COMPENSATED if choice.compensator else "")
+    ours = compared(model, found)[taken].smooth_relative
+    if its["p-pi"].smooth_relative < CLEARLY_LESS * ours and not _least_missed(cascade):
+        figures = reasons("p-pi", False, {"p-pi": its["p-pi"]}, shown(model.rotary))
+        yield (
+            f"a P-PI, the cascade of most drives, would track better: {own_figures(figures)};"
+            " 'workbench design MODEL --structure p-pi' makes it"
+        )
 
 
 def usual_structures(model: Model, asked: Asked | None) -> tuple[Structure, ...]:

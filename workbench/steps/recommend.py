@@ -80,7 +80,8 @@ def recommended(model: Model, found: Design) -> Recommendation:
     if not stays and (unclear := _no_clear_win(model, found, alone, better)):
         stays = True
         present_said = f"; {unclear}: no clear win over the present controller, keep it"
-    why = f"{said}: {_decisive(alone, found, figures)}{present_said}"
+    decisive = _decisive(alone, found, figures)
+    why = f"{said}{f': {decisive}' if decisive else ''}{present_said}"
     return Recommendation(alone, better, why, stays)
 
 
@@ -131,7 +132,7 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
     return f"{said} ({'; '.join(beside)})" if beside else said
 
 
-OTHERS = re.compile(r" \(([^()]*)\)(?=:|$)")  # what `reasons` says of the other controllers
+OTHERS = re.compile(r" \(([^()]*)\)(?=[:;]|$)")  # what `reasons` says of the other controllers
 
 
 def own_figures(why: str) -> str:
@@ -164,11 +165,13 @@ def _best(candidates: Sequence[Structure], figures: Mapping[str, LoopFigures]) -
 
 
 def _decisive(name: Structure, found: Design, figures: Mapping[str, LoopFigures]) -> str:
-    """What decided against the other controller, or against the best of several."""
+    """What decided against the other controller, or against the best of several; "" where no other
+    was asked for."""
     others = [one for one in DESIGNED_STRUCTURES if one != name]
     there = [one for one in others if one in found.controllers]
     if not there:
-        return f"there is no {' and no '.join(one.upper() for one in others)}"
+        refused = [one.upper() for one in others if one in found.refused]
+        return f"there is no {' and no '.join(refused)}" if refused else ""
     sound = [one for one in there if not found.controllers[one].missed]
     other = min(sound or there, key=lambda n: _cost(n, (name, n), figures))
     called, rival = other.upper(), found.controllers[other]
