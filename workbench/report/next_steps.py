@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from workbench.steps.demo import Demonstration
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted
-    from workbench.steps.experiment.planned import Experiment
     from workbench.steps.robust.robust import Robust
     from workbench.steps.validate import Validation
 
@@ -143,18 +142,6 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
     if found.verdict == "drift":
         return step("the machine as it is now", "identify", *named, "--card", card)
     return step("which run to add", "doctor", named[0], "--card", card)
-
-
-def after_experiment(
-    found: "Experiment", model_file: Path, design_file: Path | None
-) -> Step | None:
-    """A slower run where a simulated machine exceeds a limit."""
-    if not found.safety.exceeding:
-        return None
-    words = ("experiment", model_file, *(("--design", design_file) if design_file else ()))
-    seconds = f"{found.h * (len(found.r) - 1):g}"
-    speed = f"{_floor(SLOWER * found.limits.speed):g}"
-    return step("a slower run", *words, "--time", seconds, "--speed", speed)
 
 
 def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
