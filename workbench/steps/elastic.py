@@ -7,6 +7,8 @@ from pathlib import Path
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
+from workbench.cards.readable import number
+from workbench.documents.design import Design
 from workbench.documents.model import Model, used
 from workbench.documents.reading import read_document
 from workbench.steps.response import RESPONSE_SCHEMA
@@ -52,3 +54,20 @@ def with_response(model: Model, file: Path | None) -> Model:
         f"{file}: no anti-resonance with a resonance above it (peaks: {kinds}), as two masses have"
         " them; log a run that moves the machine there, or design without --response"
     )
+
+
+def beyond_response(found: Design, file: Path | None) -> Design:
+    """The design, which says so where its recommended controller crosses over at a frequency that
+    the response.json does not identify."""
+    one = found.controllers.get(str(found.recommended))
+    if file is None or one is None or one.margins.crossover_hz is None:
+        return found
+    at, spans = one.margins.crossover_hz, read_document(file)["plant"]["seen_hz"]
+    if any(low <= at <= high for low, high in spans):
+        return found
+    where = ", ".join(f"{number(low)} to {number(high)}" for low, high in spans)
+    said = (
+        f"the {found.recommended.upper()} crosses over at {number(at)} Hz, where the response does"
+        f" not identify the plant ({where} Hz)"
+    )
+    return replace(found, lacks="; ".join(filter(None, (found.lacks, said))))

@@ -111,7 +111,7 @@ def validate(
         versions=versions(),
         why=reasons(alone, with_it, first, shown(model.rotary)),
         design=design_digest(found),
-        lacks=lacking(model),
+        lacks=found.lacks or lacking(model),
     ), traces
 
 

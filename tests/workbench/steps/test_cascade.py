@@ -18,12 +18,12 @@ from workbench.documents.model import Model, used
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps
-from workbench.report.design_tables import cascade_lines
+from workbench.report.design_tables import cascade_lines, design_sentence
 from workbench.report.reports import bode_chart
 from workbench.steps.cascade import beside_resonance, unseen_lag
 from workbench.steps.closed_loop import driven_loop, load_of, run_driven
 from workbench.steps.design import design, usual_structures
-from workbench.steps.elastic import with_resonance, with_response
+from workbench.steps.elastic import beyond_response, with_resonance, with_response
 from workbench.steps.linear_loop import plants_of
 from workbench.steps.validate import validate
 
@@ -171,6 +171,18 @@ def test_a_pair_in_a_gap_of_the_response_is_taken_with_a_damping_that_is_no_more
     model = with_response(plain(), file)
     assert model.resonance is not None and model.resonance["frequency"].value == 60.0
     assert used(model.resonance["damping"]) == 0.03
+
+
+def test_a_crossover_beyond_what_a_response_identifies_comes_first(tmp_path: Path) -> None:
+    found, file = made(), tmp_path / "response.json"
+    at = found.controllers[str(found.recommended)].margins.crossover_hz
+    assert at is not None
+    for spans, said in (([[0.1, 0.5 * at]], True), ([[0.1, 0.5 * at], [0.9 * at, 2 * at]], False)):
+        file.write_text(json.dumps({"schema": "response/1", "plant": {"seen_hz": spans}}))
+        sentence = design_sentence(beyond_response(found, file))
+        assert sentence.startswith("The P-PI crosses over at") is said
+        assert ("does not identify the plant" in sentence) is said
+    assert beyond_response(found, None) is found
 
 
 def test_a_cascade_stands_to_a_resonance_by_what_it_rejects_and_not_by_its_Kv() -> None:
