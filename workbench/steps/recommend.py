@@ -35,8 +35,8 @@ LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no
 FIGURES_SAID = (
     f"static error: the largest in the last {100 * JUDGED_SHARE:g} % of the time after a step of"
     f" {100 * STEP_SHARE:g} % of the logs' travel, held for {DWELLS:g} time constants of the"
-    f" slowest loop ({SHORTEST_DWELL:g} s at least), of that step; settling time: until a step stays"
-    f" within {100 * SETTLING_BAND:g} %; tracking error: root mean square along a sine over"
+    f" slowest loop ({SHORTEST_DWELL:g} s at least), of that step; settling time: until a step"
+    f" stays within {100 * SETTLING_BAND:g} %; tracking error: root mean square along a sine over"
     f" {200 * SMOOTH_SHARE:g} % of the travel, at {100 * SMOOTH_OF_LOGS:g} % of the logs' speed, of"
     " its amplitude"
 )  # the same in `design`, `validate` and `design --robust`
