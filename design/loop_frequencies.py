@@ -1,4 +1,4 @@
-"""A loop in a drive engineer's words: crossover, bandwidth, and a gain margin in decibels."""
+"""A loop in a drive engineer's words: crossover, and up to where it rejects and follows."""
 
 from dataclasses import dataclass
 
@@ -18,21 +18,27 @@ HALF_POWER = 1.0 / np.sqrt(2.0)  # -3 dB
 
 @dataclass(frozen=True)
 class LoopFrequencies:
-    """crossover: the highest frequency at which |L| falls through 1; bandwidth: at which the
-    position first falls 3 dB below a slow reference [Hz]; None: nowhere below half the rate."""
+    """crossover: the highest frequency at which |L| falls through 1; rejection: up to which |S_yp|
+    stays below -3 dB; bandwidth: at which the position first falls 3 dB below a slow reference, the
+    reference's filter and feed-forward of speed included [Hz]; None: nowhere below half the rate.
+    """
 
     crossover: float | None
     bandwidth: float | None
+    rejection: float | None
 
 
 def loop_frequencies(A: ArrayLike, B: ArrayLike, controller: RST) -> LoopFrequencies:
-    """Crossover and bandwidth of the plant (A, B), ascending in z^-1, under a controller."""
+    """Crossover, bandwidth and rejection of the plant (A, B), ascending in z^-1, under a law."""
     f = 0.5 / controller.h * np.geomspace(LOWEST_SHARE, 1.0, POINTS_EVALUATED)
-    closed = np.abs(sensitivities(A, B, controller, 2.0 * np.pi * f).S_yr)
+    curves = sensitivities(A, B, controller, 2.0 * np.pi * f)
+    closed = np.abs(curves.S_yr)
     through = _falls(f, np.abs(open_loop_response(A, B, controller, f)), 1.0)
     below = _falls(f, closed, HALF_POWER * float(closed[0]))
+    rejected = _falls(f, 1.0 / np.maximum(np.abs(curves.S_yp), 1e-300), 1.0 / HALF_POWER)
     return LoopFrequencies(
-        float(through[-1]) if len(through) else None, float(below[0]) if len(below) else None
+        float(through[-1]) if len(through) else None,
+        *(float(at[0]) if len(at) else None for at in (below, rejected)),
     )
 
 

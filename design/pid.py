@@ -31,6 +31,7 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 
 Sampling = Literal["zoh", "tustin"]
+TORN = 1e-5  # by which rounding tears a double pole apart, at most
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ def design_pid(
             "no PID found with these dominant poles keeps the loop stable: its best leaves a pole "
             f"at {text}; choose slower or better damped dominant poles, or design an RST"
         )
-    slow = not exact and abs(slowest) > float(np.abs(roots(P_d)).max()) + 1e-6
+    slow = not exact and abs(slowest) > float(np.abs(roots(P_d)).max()) + TORN
     note = f"slower than the dominant poles: {text}; ask for slower ones" if slow else None
     try:
         return PID(rst, pid_gains(rst), None, exact, note)

@@ -5,7 +5,8 @@
 is acceleration by force: a rigid body with viscous friction, elastic modes, and what modes beyond
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
 projection). Modes are added one by one while each explains more than chance; reported are those
-that stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal
+that stand out where the logs reach, and apart from these those in a gap of the points, which what
+lies below and above shows. The zeros of the sum are the anti-resonances. Sources: modal
 form, Ewins, Modal Testing, 2nd ed. (2000), chapter 4; variable projection, Golub, Pereyra, SIAM J.
 Numer. Anal. 10 (1973) 413.
 """
@@ -52,12 +53,14 @@ class Peak:
 @dataclass(frozen=True, eq=False)
 class Modes:
     """A fit of the modes: `peaks` in the order of their frequency; mass [kg] of the rigid body,
-    viscous rate c [1/s], lag tau [s]; misfit: chi-square a point."""
+    viscous rate c [1/s], lag tau [s]; misfit: chi-square a point; felt: peaks in a gap, with points
+    on either side of it."""
 
     peaks: tuple[Peak, ...]
     nonlinear: Array
     linear: Array
     misfit: float
+    felt: tuple[Peak, ...] = ()
 
     @property
     def lag(self) -> float:
@@ -178,12 +181,12 @@ def _apart(one: Array, other: Array) -> bool:
     return bool(abs(one[0] - other[0]) > max(np.exp(one[1]), np.exp(other[1])))
 
 
-def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
-    """Whether a mode is a resonance that the points show."""
+def _stands_out(p: Array, theta: Array, k: int) -> bool:
+    """Whether a mode is a resonance."""
     w = np.exp(p[2 + 2 * k])
     parts = (_columns(p, np.array([w / (2.0 * np.pi)])) * theta)[0]
     own, rest = abs(parts[1 + k]), abs(np.sum(np.delete(parts, 1 + k)))
-    return is_large(own, rest) and _shown(data, w / (2.0 * np.pi))
+    return is_large(own, rest)
 
 
 def is_large(own: float, rest: float) -> bool:
@@ -209,6 +212,11 @@ def _shown(data: _Data, f: float) -> bool:
     return True
 
 
+def _felt(data: _Data, f: float) -> bool:
+    """Whether points lie below and above a frequency."""
+    return all(np.count_nonzero(side) >= EVENTS_NEEDED for side in (data.f < f, data.f > f))
+
+
 def _told(data: _Data, p: Array) -> Modes:
     """The fit with its peaks and their deviations."""
     left, theta = data.solved(p)
@@ -217,7 +225,7 @@ def _told(data: _Data, p: Array) -> Modes:
     modes = (len(p) - 2) // 2
     peaks = []
     for k in range(modes):
-        if not _stands_out(data, p, theta, k):
+        if not _stands_out(p, theta, k):
             continue
         w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
         at = slice(2 + 2 * k, 4 + 2 * k)
@@ -225,8 +233,10 @@ def _told(data: _Data, p: Array) -> Modes:
         where = float(w / (2.0 * np.pi)), float(z)
         peaks.append(_peak(data, "resonance", where, (float(spread[0]), float(spread[1]))))
     peaks += _anti_resonances(data, p, theta, misfit)
-    sure = [one for one in peaks if is_sharp(one)]
-    return Modes(tuple(sorted(sure, key=lambda one: one.frequency.value)), p, theta, misfit)
+    sure = sorted(filter(is_sharp, peaks), key=lambda one: one.frequency.value)
+    shown = tuple(one for one in sure if _shown(data, one.frequency.value))
+    felt = [one for one in sure if one not in shown and _felt(data, one.frequency.value)]
+    return Modes(shown, p, theta, misfit, tuple(felt))
 
 
 def _deviations(data: _Data, p: Array, misfit: float) -> Array:
@@ -273,13 +283,12 @@ def _product(factors: Sequence[Array]) -> Array:
 
 
 def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list[Peak]:
-    """The zeros that the points show, with deviations by those of the parameters."""
+    """The deep zeros, with deviations by those of the parameters."""
     out = []
     for zero in _zeros(p, theta):
         f, damping = abs(zero) / (2.0 * np.pi), -zero.real / abs(zero)
         parts = (_columns(p, np.array([f])) * theta)[0]
-        deep = is_deep(abs(np.sum(parts)), abs(parts[0]))
-        if not (deep and _shown(data, f)):
+        if not is_deep(abs(np.sum(parts)), abs(parts[0])):
             continue
         near = _zero_spread(data, p, zero, misfit)
         out.append(Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1])))

@@ -34,3 +34,10 @@ def test_a_loop_below_1_everywhere_has_no_crossover() -> None:
     weak = RST(1e-4 * LOOP.R, LOOP.S, 1e-4 * LOOP.T, H)
     plant = np.array([1.0, -1.2, 0.4])
     assert loop_frequencies(plant, B, weak).crossover is None
+
+
+def test_disturbances_are_rejected_to_where_the_sensitivity_comes_to_minus_3_dB() -> None:
+    found = loop_frequencies(A, B, LOOP)
+    assert found.rejection is not None and found.rejection != found.bandwidth
+    (there,) = np.abs(sensitivities(A, B, LOOP, np.array([2 * np.pi * found.rejection])).S_yp)
+    assert 20 * np.log10(there) == pytest.approx(-3.01, abs=0.02)

@@ -73,6 +73,14 @@ def test_dominant_poles_that_do_not_dominate_are_told() -> None:
     assert "slower than the dominant" in found.note
 
 
+def test_a_double_dominant_pole_that_rounding_tears_apart_is_not_slower_than_itself() -> None:
+    A = [1.0, -2.40005, 1.94707, -0.626034, 0.0790104]
+    B = [0.0, 4.64186e-06, 6.63177e-06, -7.67243e-06, -1.24133e-06]
+    others = [complex(0.259588, 0.149364), complex(0.259588, -0.149364)]
+    for w in (17.0, 17.3):
+        assert design_pid(A, B, 0.01, dominant=(w, 1.0), auxiliary=others).note is None
+
+
 @given(
     st.floats(0.1, 2000),
     st.floats(0.02, 5),

@@ -1,6 +1,6 @@
 """`workbench design`: a model -> design.json and report.html."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -126,10 +126,12 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
     from workbench.report.next_steps import after_design, without_design
     from workbench.report.view import show
     from workbench.steps.design import effort_limit
+    from workbench.steps.elastic import beyond_response
 
     asked, goals = _asked(given), Goals(given.modulus, given.delay, effort_limit(model))
     with results("design", given.out, without_design(model, given.card)) as folder:
         found = design(model, goals=goals, structures=given.structures or None, **asked)
+        found = replace(found, design=beyond_response(found.design, given.response_file))
         if given.over:
             poles = Asked(asked["poles"], asked["auxiliary"], given.integrator)
             found = found.scheduled(given.over, poles, goals)

@@ -190,12 +190,13 @@ def _view(
     """What was written and what to do with it, for a terminal."""
     from workbench.export.filled import title_of
     from workbench.output import written
+    from workbench.report.design_tables import of_the_model
     from workbench.screen import listed, screen
 
     program = what.program
     given = ", ".join(f"{one.name} [{one.unit}]" for one in program.inputs)
     return screen(
-        title_of(what),
+        of_the_model(what.design.lacks) + title_of(what),
         f"every {program.h:.6g} s: {given} -> {program.output.name} [{program.output.unit}]",
         listed(f"remark: {one}" for one in what.remarks),
         written(folder, *files),

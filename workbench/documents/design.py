@@ -98,7 +98,8 @@ class MarginValues:
     """Margins of a loop as results carry them; worst_modulus over the parameters' intervals.
 
     None: no limit of that kind; worst_modulus None: unstable for some parameters inside them.
-    crossover_hz, bandwidth_hz: as `design.loop_frequencies` has them, None also in older files.
+    crossover_hz, bandwidth_hz, rejection_hz: as `design.loop_frequencies` has them, None also in
+    older files.
     """
 
     modulus: float
@@ -112,6 +113,7 @@ class MarginValues:
     worst_modulus: float | None
     crossover_hz: float | None = None
     bandwidth_hz: float | None = None
+    rejection_hz: float | None = None
 
     @property
     def gain_db(self) -> float | None:
@@ -409,6 +411,7 @@ class Design:
     drive takes, present: the controller that it has now, recommendation: the same with its reason;
     None in older files. read: what to say of its file, a line for each value in another unit than
     ours. schedule: the controllers over place, load or direction, where that was asked for.
+    lacks: what its model lacks, in words, "" where nothing.
     """
 
     card: str
@@ -431,6 +434,7 @@ class Design:
     schedule: Annotated[GainSchedule | None, Through(ScheduleFile, _schedule, _schedule_file)] = (
         None
     )
+    lacks: str = ""
     read: Annotated[tuple[str, ...], *NOT_WRITTEN] = field(default=(), compare=False)
     schema: Literal["design/2"] = "design/2"
 
@@ -462,4 +466,5 @@ def margin_values(
         worst_modulus=worst,
         crossover_hz=at.crossover if at else None,
         bandwidth_hz=at.bandwidth if at else None,
+        rejection_hz=at.rejection if at else None,
     )

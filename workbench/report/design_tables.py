@@ -11,20 +11,25 @@ from workbench.output import Row
 from workbench.report.view import notes
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
-from workbench.steps.loop_figures import takes_compensator
-from workbench.steps.recommend import other_figures, own_figures
+from workbench.steps.loop_figures import COMPENSATED, takes_compensator
+from workbench.steps.recommend import FIGURES_SAID, called, other_figures, own_figures
 
 DESIGN_HEAD = (
     "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",
 )  # fmt: skip
 IN_DRIVES_HEAD = (
-    "in a drive's words", "crossover", "bandwidth", "gain margin", "phase margin", "delay margin",
+    "in a drive's words", "crossover", "rejects to", "follows to", "gain margin", "phase margin",
+    "delay margin",
 )  # fmt: skip
 METRES_PER_MINUTE = 0.06  # of a Kv of 1/s, in m/min/mm
 MARGINS_SAID = (
     "modulus, gain, phase, delay: the margins, how much more of each the loop bears; worst: the"
     " least modulus margin inside the parameters' intervals; periods: the delay margin in sampling"
     " periods; |S_up|: at most, from measurement noise to force"
+)
+FREQUENCIES_SAID = (
+    "rejects to: bandwidth of the feedback, |S_yp| below -3 dB; follows to: reference to position"
+    " above -3 dB, with the filter and the speed feed-forward of the reference"
 )
 
 
@@ -39,12 +44,15 @@ def drive_table(found: Design) -> Part:
     rows = []
     for name, m in ((name, one.margins) for name, one in found.controllers.items()):
         said = (
-            *("-" if f is None else f"{number(f)} Hz" for f in (m.crossover_hz, m.bandwidth_hz)),
+            *(
+                "-" if f is None else f"{number(f)} Hz"
+                for f in (m.crossover_hz, m.rejection_hz, m.bandwidth_hz)
+            ),
             "any" if m.gain_db is None else f"{number(m.gain_db)} dB",
             "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
             "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
         )
-        if said[:2] != ("-", "-"):
+        if said[:3] != ("-", "-", "-"):
             rows.append((name.upper(), *said))
     return tabled(IN_DRIVES_HEAD, rows)
 
@@ -54,9 +62,12 @@ def _margins(one: Controller) -> Row:
     delay = ("any", "any")
     if m.delay_s is not None and m.delay_samples is not None:
         delay = f"{1e3 * m.delay_s:.3g} ms", f"{m.delay_samples:.2g}"
+    w_n, zeta = (f"{one.dominant[0]:.3g}", f"{one.dominant[1]:.2g}")
+    if one.cascade is not None:  # a cascade is not placed by its poles
+        w_n, zeta = f"Kv {one.cascade.k_v:.3g}", "-"
     return (
-        f"{one.dominant[0]:.3g}",
-        f"{one.dominant[1]:.2g}",
+        w_n,
+        zeta,
         f"{m.modulus:.3f}",
         "unstable" if m.worst_modulus is None else f"{m.worst_modulus:.3f}",
         "any" if m.gain_up is None else f"x {m.gain_up:.3g}",
@@ -71,6 +82,8 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     return [
         *other_lines(found),
         MARGINS_SAID,
+        FREQUENCIES_SAID,
+        FIGURES_SAID,
         f"plant: {found.plant.source}, {found.plant.why}",
         *loop_lines(found, rotary),
         *schedule_lines(found, rotary),
@@ -221,13 +234,25 @@ def set_point_lines(found: Design) -> list[str]:
 
 def design_sentence(found: Design) -> str:
     """Which controller, and what speaks for it, in one or two sentences."""
+    lacks = of_the_model(found.lacks)
     if found.recommended == "none":
-        return "No controller meets every goal; below is what each misses."
+        return f"{lacks}No controller meets every goal; below is what each misses."
     why = ""
     if found.recommendation:
         why = f". With friction in simulation: {own_figures(found.recommendation.why)}"
     every = f"position loop every {1e3 * found.plant.h:.4g} ms"
-    return f"{found.recommended.upper()} recommended, {every}{why}."
+    beside = found.recommendation is not None and found.recommendation.compensator
+    name = called(found.recommended + (COMPENSATED if beside else ""))
+    return f"{lacks}{name} recommended, {every}{why}."
+
+
+def of_the_model(lacks: str) -> str:
+    """The sentence that comes first where a design's model lacks something; "" else."""
+    if not lacks:
+        return ""
+    return (
+        f"{lacks[0].upper()}{lacks[1:]}: margins and figures are the model's, not the machine's. "
+    )
 
 
 def drive_lines(found: Design, only: str | None = None) -> list[str]:
@@ -271,7 +296,9 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         margins_table(found),
         MARGINS_SAID,
         drive_table(found),
+        FREQUENCIES_SAID,
         listed(other_lines(found)),
+        more(FIGURES_SAID),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),
         listed(schedule_lines(found, rotary)),

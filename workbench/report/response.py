@@ -8,6 +8,7 @@ from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
 from identification.frequency.estimate import Response
+from identification.frequency.modes import Peak
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from identification.thresholds import COHERENCE_SURE
@@ -42,21 +43,36 @@ def response_sentence(found: Responded) -> str:
     """What the logs show of the machine, in a sentence or two."""
     body = found.found.body
     said = f"The plant is identified {_spans(ranges(body.f, body.seen))}"
-    if not found.peaks:
-        return f"{said}; no resonance stands out there."
-    named = [
-        f"{'a resonance' if one.kind == 'resonance' else 'an anti-resonance'} at"
-        f" {number(one.frequency.value)} Hz (damping {number(one.damping.value, 2)})"
-        for one in found.peaks
-    ]
-    return f"{said}, with {_and(named)}."
+    if found.peaks:
+        said += f", with {_named(found.peaks)}"
+    if found.felt:
+        low, high = found.gap_around(found.felt)
+        return (
+            f"{said}. Between {number(low)} and {number(high)} Hz, where it is not identified at"
+            f" every frequency, there is {_named(found.felt)}, by the curve below and above: log a"
+            " run that moves the machine there."
+        )
+    return f"{said}." if found.peaks else f"{said}; no resonance stands out there."
+
+
+def _named(peaks: Sequence[Peak]) -> str:
+    """Peaks with frequency and damping, in words."""
+    return _and(
+        [
+            f"{'a resonance' if one.kind == 'resonance' else 'an anti-resonance'} at"
+            f" {number(one.frequency.value)} Hz (damping {number(one.damping.value, 2)})"
+            for one in peaks
+        ]
+    )
 
 
 def peak_table(found: Responded) -> Part:
     """Resonances and anti-resonances with their intervals, a row each."""
     rows = [
-        (one.kind, *_cells(one.frequency, "Hz"), *_cells(one.damping, "1")) for one in found.peaks
-    ]
+        (f"{one.kind}{'' if one in found.peaks else ', felt'}", *_cells(one.frequency, "Hz"),
+         *_cells(one.damping, "1"))
+        for one in (*found.peaks, *found.felt)
+    ]  # fmt: skip
     return tabled(PEAK_HEAD, rows, right=(1, 3))
 
 

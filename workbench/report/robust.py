@@ -14,8 +14,10 @@ from workbench.report.reports import controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
+from workbench.steps.recommend import FIGURES_SAID
 from workbench.steps.robust.outcomes import MEASURES, Measure
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
+from workbench.steps.robust.search import WEIGHED
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")
@@ -116,8 +118,11 @@ def choice_lines(found: Robust, rotary: bool) -> list[str]:
     speed, (unit, factor) = found.speed, shown_unit(shown(rotary).velocity)
     drift = ", ".join(f"{n} {100 * s:.2g} %" for n, s in (found.asked.drift or {}).items())
     return [
-        f"the best of {found.tried} loops, chosen on {found.asked.draws} machines; the shares are"
-        f" counted on as many drawn anew (seed {found.asked.seed})",
+        f"the best of {found.tried} loops on {found.asked.draws} machines: of those whose limits"
+        f" hold on {100 * found.asked.probability:g} % of them, the one with the least"
+        f" {', '.join(WEIGHED)} (mean logarithm of the medians); the shares are counted on as many"
+        f" drawn anew (seed {found.asked.seed})",
+        FIGURES_SAID,
         *([f"drawn with the drift found so far: {drift}"] if drift else []),
         f"slow ramp: {number(factor * speed)} {unit}, half the narrowest stick band",
     ]

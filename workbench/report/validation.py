@@ -11,10 +11,14 @@ from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, units_of
 from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
+from workbench.report.design_tables import of_the_model
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
+from workbench.steps.loop_motion import worst_rest
 from workbench.steps.recommend import (
+    FIGURES_SAID,
+    called,
     in_thousandths,
     other_figures,
     own_figures,
@@ -26,10 +30,6 @@ from workbench.steps.validate import Validation, validation_document
 LOOP_COLOURS: dict[str, Colour] = {
     "rst": "reference", "pid": "model", "p-pi": "measured", PRESENT: "before",
 }  # fmt: skip
-ERRORS_SHOWN: tuple[tuple[Literal["step", "smooth"], str], ...] = (
-    ("smooth", "along the smooth reference"),
-    ("step", "at rest, last step"),
-)
 SETTLING_TIMES_SHOWN = 4.0  # settling times shown after a step
 SINCE = "time since the step [s]"
 STEPS_CAPTION = (
@@ -150,9 +150,9 @@ def columns_line(found: Validation, rotary: bool = False) -> str:
     beside = "+comp: with the compensator" + ("; +table: with the gain schedule" if table else "")
     limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
     return (
-        f"steps of {length(one.step, rotary)}; at rest, over (overshoot): error relative to the"
-        " step; smooth: to the amplitude of the smooth reference; margin: modulus margin; delay:"
-        f" delay margin in sampling periods; {beside}{limit}"
+        f"steps of {length(one.step, rotary)}; at rest: the static error, of the worst of the"
+        f" steps; over: overshoot, of the step; smooth: the tracking error; margin: modulus margin;"
+        f" delay: delay margin in sampling periods; {beside}{limit}; {FIGURES_SAID}"
     )
 
 
@@ -163,7 +163,7 @@ def missed(found: Validation) -> str | None:
 
 def _missed(found: Validation, name: str) -> list[str]:
     return [
-        f"{name if name == PRESENT else name.upper()} on the {place}: {limit}"
+        f"{name if name == PRESENT else called(name)} on the {place}: {limit}"
         for place, one in found.figures[name].items()
         for limit in one.missed
     ]
@@ -171,7 +171,8 @@ def _missed(found: Validation, name: str) -> list[str]:
 
 def validation_sentence(found: Validation) -> str:
     """Whether the tested controller passed and with which figures; what it misses."""
-    said = f"{found.judged.upper()} {'passes' if found.passed else 'fails'} in simulation"
+    said = f"{called(found.judged)} {'passes' if found.passed else 'fails'} in simulation"
+    said = f"{of_the_model(found.lacks)}{said}"
     if not found.passed:
         return f"{said}: {missed(found)}."
     return f"{said}: {own_figures(found.why)}." if found.why else f"{said}."
@@ -180,11 +181,10 @@ def validation_sentence(found: Validation) -> str:
 def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
     """The figures of each loop; what controllers miss that are not tested, with --verbose."""
     others = other_figures(found.why)
-    alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
     return [
         validation_table(found, rotary),
         *([more(others)] if others else []),
-        *(more(listed(_missed(found, name))) for name in alone),
+        *(more(listed(_missed(found, name))) for name in found.figures),
         columns_line(found, rotary),
         notes(found.remarks),
     ]
@@ -197,7 +197,7 @@ def _loop(
     on = "the identified plant" if place == "model" else "the other plant"
     return [
         Section(f"Steps on {on}", _step_chart(found, traces, place, rotary)),
-        Section(f"Error on {on}", _error_chart(traces, place, rotary)),
+        Section(f"Error on {on}", _error_chart(found, traces, place, rotary)),
     ]
 
 
@@ -243,22 +243,35 @@ def _near(lines: Sequence[Line], height: float) -> tuple[float, float] | None:
     return None if inside else (low, high)
 
 
-def _error_chart(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Chart:
-    """Error along the smooth reference and in the last dwell, loops overlaid."""
+def _error_chart(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+) -> Chart:
+    """Error along the smooth reference, and at rest where that of the tested loop is the largest,
+    loops overlaid."""
     unit, factor = units_of(rotary).position
+    tested = traces[found.judged, place].step
+    part, before = worst_rest(tested)
+    height = factor * float(tested.r[part.start] - tested.r[before])
+    step = f"after the step of {number(height)} {unit}" if height else "before the first step"
+    said = f"at rest {step}, where {called(found.judged)} is furthest off"
+    shown_of: tuple[tuple[Literal["step", "smooth"], str, str], ...] = (
+        ("smooth", "time [s]", "along the smooth reference"),
+        ("step", "time, in the last half after the step [s]", said),
+    )
     panels = []
-    for kind, title in ERRORS_SHOWN:
+    for kind, start, title in shown_of:
         runs = _runs(traces, place, kind)
         some = next(iter(runs.values()))
-        begin = 0
-        if kind == "step":  # the last half of the last dwell
-            begin = (int(np.flatnonzero(np.diff(some.r))[-1]) + 1 + len(some.r)) // 2
-        span = len(some.t) - begin
+        begin, span = 0, len(some.t)
+        if kind == "step":
+            begin, span = part.start, part.stop - part.start
         lines = [_of(name, run, run.r - run.y, begin, span, factor) for name, run in runs.items()]
-        start = "time [s]" if kind == "smooth" else "time, after half of the dwell [s]"
         panels.append(Panel(start, f"error [{unit}]", lines, title))
     what = "error along the smooth reference and at rest in the simulated loop, all controllers"
-    caption = "What is left of the error where it should be none: the smaller, the better."
+    caption = (
+        "What is left of the error where it should be none: the smaller, the better. At rest of the"
+        " table is the largest of every step, of each loop by itself."
+    )
     return Chart(f"error-{place}", what, panels, columns=2, shared_x=False, caption=caption)
 
 

@@ -176,7 +176,9 @@ def beside_resonance(model: Model, found: Design, chosen: Recommended) -> Iterat
     if taken.series is not None:
         yield f"{said}, suppressed by a {filter_words(taken.series)}"
         return
-    bandwidth = taken.dominant[0] / (2.0 * np.pi)
-    where = f"the loop's poles lie at {bandwidth:.3g} Hz, {resonance / bandwidth:.2g} times below"
-    near = resonance < WELL_BELOW * bandwidth
+    at, what = taken.dominant[0] / (2.0 * np.pi), "the loop's poles lie at"
+    if taken.cascade is not None:  # which is not placed by its poles
+        at, what = taken.margins.rejection_hz or at, "it rejects disturbances up to"
+    where = f"{what} {at:.3g} Hz, {resonance / at:.2g} times below"
+    near = resonance < WELL_BELOW * at
     yield f"{said}; {where}{': near, check it on the machine with care' if near else ''}"

@@ -20,7 +20,7 @@ from workbench.documents.model import Model
 from workbench.steps.cascade import feed_forward, reference_limits, unseen_lag
 from workbench.steps.closed_loop import DrivenLoop, noise_of, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
-from workbench.steps.loop_figures import risen_sine
+from workbench.steps.loop_figures import risen_sine, speed_seen
 
 CLEARLY_LESS = 0.8  # of the other's root mean square error
 SURELY_SHARE = 0.9  # of the machines drawn
@@ -117,7 +117,7 @@ def sine(model: Model, _: ForceLoop | None, h: float) -> Array:
 def _reach(model: Model) -> tuple[float, float, float]:
     """Middle of the travel and half of what is gone of it [m], and the speed of the logs [m/s]."""
     low, high = model.travel
-    speed = model.speed or (high - low)
+    speed = speed_seen(model)
     half = min(0.5 * STROKE_SHARE * (high - low), 0.5 * LONGEST_STROKE * SLOW_STROKE * speed)
     return 0.5 * (low + high), half, speed
 

@@ -8,17 +8,15 @@ import numpy as np
 
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
-from design.filters import filters_at
 from design.loop_frequencies import loop_frequencies
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
-from identification.model.plant import Actuator
+from identification.model.plant import Actuator, Motor
 from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design import (
-    CompensatorValues,
     Controller,
     Design,
     From,
@@ -32,7 +30,9 @@ from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
+from workbench.steps.clear_win import CLEARLY_LESS
 from workbench.steps.identify import check_period
+from workbench.steps.lacking import lacking
 from workbench.steps.linear_loop import (
     command_of,
     corners,
@@ -43,11 +43,11 @@ from workbench.steps.linear_loop import (
     unknown_viscous,
 )
 from workbench.steps.local_friction import asked_for
-from workbench.steps.recommend import recommended
+from workbench.steps.loop_figures import COMPENSATED
+from workbench.steps.recommend import compared, own_figures, reasons, recommended
+from workbench.steps.usual_compensator import usual_compensator
 
 FINEST = 20  # times faster than its logs that a controller may be designed
-N_C = 2.0  # the paper's, in simulation and on the rig
-E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
 LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
 SLOWED = 4  # times that a controller is made slower for the sake of its reference
 ENOUGH = 0.95  # of the w_n that would just do
@@ -75,11 +75,37 @@ def design(
     Raises BadSpecification where no controller meets what was asked, NotIdentifiable where the
     model carries no design.
     """
-    structures = structures or usual_structures(model, asked)
+    usual = usual_structures(model, asked)
     first = placed_design(
-        model, asked, goals=goals, source=source, period=period, structures=structures
+        model, asked, goals=goals, source=source, period=period, structures=structures or usual
     )
-    return with_choice(model, first, recommended(model, first))
+    found = with_choice(model, first, recommended(model, first))
+    by_itself = structures is None and (asked is None or asked == Asked())
+    if not by_itself or "p-pi" in usual or not isinstance(model.simulated.actuator, Motor):
+        return found
+    try:
+        cascade = placed_design(
+            model, goals=goals, source=source, period=period, structures=("p-pi",)
+        )
+    except BadSpecification:
+        return found
+    return replace(found, remarks=(*found.remarks, *_tracks_better(model, cascade, found)))
+
+
+def _tracks_better(model: Model, cascade: Design, found: Design) -> Iterator[str]:
+    """What the P-PI of a motor's axis would do, where it would track clearly better than what is
+    recommended, and the command that makes it."""
+    choice, its = found.recommendation, compared(model, cascade)
+    if choice is None or choice.controller == "none" or not its["p-pi"].passed:
+        return
+    taken = choice.controller + (COMPENSATED if choice.compensator else "")
+    ours = compared(model, found)[taken].smooth_relative
+    if its["p-pi"].smooth_relative < CLEARLY_LESS * ours and not _least_missed(cascade):
+        figures = reasons("p-pi", False, {"p-pi": its["p-pi"]}, shown(model.rotary))
+        yield (
+            f"a P-PI, the cascade of most drives, would track better: {own_figures(figures)};"
+            " 'workbench design MODEL --structure p-pi' makes it"
+        )
 
 
 def usual_structures(model: Model, asked: Asked | None) -> tuple[Structure, ...]:
@@ -222,8 +248,6 @@ def _design_of(
 ) -> Design:  # fmt: skip
     """The controllers as a design, with the compensator beside them; none is recommended yet."""
     plant, force = linear
-    low, high = model.travel
-    filters, h = filters_at(plant.h), plant.h
     return Design(
         card=model.card,
         motion=model.rig.motion,
@@ -234,9 +258,7 @@ def _design_of(
         p_pi=controllers.get("p-pi"),
         refused=refused,
         recommended="none",
-        compensator=CompensatorValues(
-            N_C, E_T_PER_TRAVEL * (high - low), model.friction, filters, h
-        ),
+        compensator=usual_compensator(model, plant.h, controllers.values()),
         remarks=(
             *model.read,
             *stored_remarks(model),
@@ -245,6 +267,7 @@ def _design_of(
         versions=versions(),
         command=command_of(model, force),
         present=model.present,
+        lacks=lacking(model),
     )
 
 
@@ -342,8 +365,6 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
         out.append(f"compensator: assumed, not identified: {', '.join(model.assumed)}")
     if model.rig.motor_inertia and model.friction["m"].value is not None:
         out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.rotary))
-    if not model.fit.adequate:
-        out.append("the model leaves more than noise; check the loop on the machine with care")
     if asks := [over for over in asked_for(model) if over != "direction"]:
         what = " and ".join(asks)
         out.append(

@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
+from workbench.cards.readable import number
+from workbench.documents.design import Design
 from workbench.documents.model import Model, used
 from workbench.documents.reading import read_document
 from workbench.steps.response import RESPONSE_SCHEMA
@@ -21,7 +22,8 @@ def with_resonance(model: Model, resonance: Mapping[str, Estimate] | None) -> Mo
 
 
 def with_response(model: Model, file: Path | None) -> Model:
-    """The model with the lowest pair of anti-resonance and resonance in a response.json.
+    """The model with the lowest pair of anti-resonance and resonance in a response.json, seen or
+    felt.
 
     Raises BadModel where the file is none, or holds no such pair.
     """
@@ -33,13 +35,18 @@ def with_response(model: Model, file: Path | None) -> Model:
             f"{file}: schema {written.get('schema')!r}, {RESPONSE_SCHEMA!r} needed; give the"
             " response.json of 'workbench response'"
         )
-    peaks = sorted(written["peaks"], key=lambda one: float(one["frequency"]["value"]))
+    every = (*written["peaks"], *written.get("felt", ()))
+    peaks = sorted(every, key=lambda one: float(one["frequency"]["value"]))
     for low, high in pairwise(peaks):
         if (low["kind"], high["kind"]) == ("anti-resonance", "resonance"):
-            anti, top = _estimate(low["frequency"]), _estimate(high["frequency"])
+            anti, top = Estimate(**low["frequency"]), Estimate(**high["frequency"])
             m, unit = model.karnopp.m, model.friction["m"].unit
             first = m * (used(anti) / used(top)) ** 2
-            pair = {"frequency": top, "anti_resonance": anti, "damping": _estimate(high["damping"])}
+            pair = {
+                "frequency": top,
+                "anti_resonance": anti,
+                "damping": Estimate(**high["damping"]),
+            }
             masses = {"m_1": Estimate(first, unit), "m_2": Estimate(m - first, unit)}
             return replace(model, resonance=pair | masses)
     kinds = ", ".join(one["kind"] for one in peaks) or "none"
@@ -49,8 +56,18 @@ def with_response(model: Model, file: Path | None) -> Model:
     )
 
 
-def _estimate(written: dict[str, Any]) -> Estimate:
-    return Estimate(
-        float(written["value"]), written["unit"], sd=written.get("sd"), low=written.get("low"),
-        high=written.get("high"),
-    )  # fmt: skip
+def beyond_response(found: Design, file: Path | None) -> Design:
+    """The design, which says so where its recommended controller crosses over at a frequency that
+    the response.json does not identify."""
+    one = found.controllers.get(str(found.recommended))
+    if file is None or one is None or one.margins.crossover_hz is None:
+        return found
+    at, spans = one.margins.crossover_hz, read_document(file)["plant"]["seen_hz"]
+    if any(low <= at <= high for low, high in spans):
+        return found
+    where = ", ".join(f"{number(low)} to {number(high)}" for low, high in spans)
+    said = (
+        f"the {found.recommended.upper()} crosses over at {number(at)} Hz, where the response does"
+        f" not identify the plant ({where} Hz)"
+    )
+    return replace(found, lacks="; ".join(filter(None, (found.lacks, said))))

@@ -1,6 +1,7 @@
 """What a loop comes to in simulation: its runs along steps and a smooth reference, its figures."""
 
 from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,8 +29,8 @@ from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
-SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
-SMOOTH_PERIODS = 2.5
+SMOOTH_OF_LOGS = 0.25  # of the speed that the logs have shown, which the smooth reference reaches
+SMOOTH_PERIODS = 1.5  # in, and once round
 DWELLS = 15.0  # length of a step, in time constants of the slowest loop
 SHORTEST_DWELL = 1.0  # s
 LAST_DWELL = 10.0  # s
@@ -110,9 +111,9 @@ def tried_loop(
     machine: Model, model: Model, found: Design, loop: DrivenLoop, limits: Limits,
     rng: np.random.Generator | None, *, arx: bool = False,
 ) -> tuple[LoopFigures, Traces]:  # fmt: skip
-    """What a loop comes to on a machine along the motion of a design on its model; rng None: no
-    noise; arx: margins on the machine's ARX plant."""
-    motion = references(model, found, loop.h)
+    """What a loop comes to on a machine along the motion of a design on its model; rng: of the
+    noise, which is the same for every loop, None for none; arx: margins on its ARX plant."""
+    motion, rng = references(model, found, loop.h), deepcopy(rng)
     runs = Traces(*(run_driven(machine, loop, r, rng) for r in motion))
     return _figures(machine, loop, runs, limits, arx), runs
 
@@ -130,37 +131,52 @@ def present_figures(
     return tried_loop(machine, model, found, present_loop(model, now), limits, rng)
 
 
-def references(
-    machine: Model, found: Design, h: float, periods: float = SMOOTH_PERIODS
-) -> tuple[Array, Array, Array]:
+def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, Array]:
     """Steps, the smooth reference and rest [m] every h [s], one motion for every loop and plant.
 
-    periods: of the smooth reference, in the first half of one of which it comes to its amplitude.
-    Levels from the travel that the logs have shown; the last one is held for long, since a limit
-    cycle of an integrator against stiction may take seconds.
+    Levels and speed from what the logs have shown; a step is held until the slowest loop has
+    settled, the last one for long, since a limit cycle of an integrator against stiction may take
+    seconds.
     """
-    step, amplitude = _sizes(machine)
-    n = round(
-        (max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / JUDGED_SHARE) / h
-    )
-    counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
-    levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
-    w = SMOOTH_SPEED * min(one.dominant[0] for one in found.controllers.values())
-    if machine.speed is not None:  # no faster than the machine has been seen to move
-        w = min(w, machine.speed / amplitude)
+    n = round(dwell(machine, [found]) / h)
+    levels = np.repeat(_levels(machine), [n, n, n, max(3 * n, round(LAST_DWELL / h))])
     rest = np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
-    return levels, risen_sine(amplitude, w, h, periods), rest
+    return levels, smooth_reference(machine, h), rest
 
 
 def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Array:
     """Steps and then a smooth motion [m] at the period h [s], the same motion for every design."""
-    step, amplitude = _sizes(machine)
-    dwell = max(
-        max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
+    levels = np.repeat(_levels(machine), round(dwell(machine, designs) / h))
+    return np.concatenate([levels, smooth_reference(machine, h)])
+
+
+def dwell(machine: Model, designs: Sequence[Design]) -> float:
+    """How long a step is held [s]: until every loop of these designs has settled."""
+    step, _ = _sizes(machine)
+    return max(
+        max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) / JUDGED_SHARE
+        for one in designs
     )
-    w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
-    levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
-    return np.concatenate([levels, risen_sine(amplitude, w, h, SMOOTH_PERIODS)])
+
+
+def smooth_reference(machine: Model, h: float) -> Array:
+    """A sine over most of the travel [m], every h [s], at a share of the speed of the logs."""
+    _, amplitude = _sizes(machine)
+    return risen_sine(
+        amplitude, SMOOTH_OF_LOGS * speed_seen(machine) / amplitude, h, SMOOTH_PERIODS
+    )
+
+
+def speed_seen(machine: Model) -> float:
+    """The speed of the logs [m/s]; of an older file without it the travel in a second."""
+    low, high = machine.travel
+    return machine.speed or (high - low)
+
+
+def _levels(machine: Model) -> Array:
+    """The positions of the steps [m], (4,)."""
+    step, _ = _sizes(machine)
+    return np.array([0.0, step, -step, 0.0])
 
 
 def _sizes(machine: Model) -> tuple[float, float]:

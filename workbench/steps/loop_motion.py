@@ -85,6 +85,24 @@ class LoopMotion:
     limit_cycle: LimitCycle | None
 
 
+def dwells(steps: LoopRun) -> list[tuple[int, int]]:
+    """First sample of each rest of a reference, the first before its first step, and one past its
+    last."""
+    changes = (np.flatnonzero(np.diff(steps.r)) + 1).tolist()
+    return list(pairwise([0, *changes, len(steps.r)]))
+
+
+def worst_rest(steps: LoopRun) -> tuple[slice, int]:
+    """The tested part of the dwell in which a loop is furthest off, and the sample before the
+    dwell."""
+    off = np.abs(steps.y - steps.r)
+    tested = [
+        (slice(high - round(JUDGED_SHARE * (high - low)), high), max(low - 1, 0))
+        for low, high in dwells(steps)
+    ]
+    return max(tested, key=lambda one: float(np.max(off[one[0]])))
+
+
 def loop_motion(
     steps: LoopRun, smooth: LoopRun, noise: float, command_limit: float | None
 ) -> LoopMotion:
@@ -92,17 +110,18 @@ def loop_motion(
     step, amplitude = float(np.max(steps.r)), float(np.max(np.abs(smooth.r)))
     stable = _stays(steps, step) and _stays(smooth, amplitude)
     off, h, runs = steps.y - steps.r, float(steps.t[1] - steps.t[0]), (steps, smooth)
-    dwells = list(pairwise([0, *(np.flatnonzero(np.diff(steps.r)) + 1).tolist(), len(off)]))
-    judged = [off[high - round(JUDGED_SHARE * (high - low)) : high] for low, high in dwells]
+    worst, _ = worst_rest(steps)
     # The height of every step, the error after it, and the samples at which that is large.
-    after = [(float(steps.r[low] - steps.r[low - 1]), off[low:high]) for low, high in dwells[1:]]
+    after = [
+        (float(steps.r[low] - steps.r[low - 1]), off[low:high]) for low, high in dwells(steps)[1:]
+    ]
     late = [np.flatnonzero(np.abs(error) > SETTLING_BAND * abs(height)) for height, error in after]
     u = np.concatenate([np.abs(run.u) for run in runs])
     return LoopMotion(
         stable=stable,
         step=step,
         amplitude=amplitude,
-        standstill=float(np.max(np.abs(np.concatenate(judged)))) if stable else np.inf,
+        standstill=float(np.max(np.abs(off[worst]))) if stable else np.inf,
         overshoot=max(float(np.max(error / height)) for height, error in after),
         settling=h * max(float(one[-1] + 1) if one.size else 0.0 for one in late),
         step_rms=float(np.sqrt(np.mean(off**2))),

@@ -13,21 +13,37 @@ from workbench.steps.clear_win import contest
 from workbench.steps.closed_loop import driven_loop, present_loop
 from workbench.steps.loop_figures import (
     COMPENSATED,
+    DWELLS,
     PRESENT,
+    SHORTEST_DWELL,
+    SMOOTH_OF_LOGS,
+    SMOOTH_SHARE,
+    STEP_SHARE,
     Limits,
     LoopFigures,
     loops_of,
     present_figures,
     tried_loop,
 )
-from workbench.steps.loop_motion import SETTLING_BAND
+from workbench.steps.loop_motion import JUDGED_SHARE, SETTLING_BAND, LimitCycle
 
+USUAL_SEED = 0  # of the noise, where none is asked for: that of `validate`
 EQUAL = 0.05  # mean relative difference of the measures below which two loops are as good
 LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no better
 
 
+FIGURES_SAID = (
+    f"static error: the largest in the last {100 * JUDGED_SHARE:g} % of the time after a step of"
+    f" {100 * STEP_SHARE:g} % of the logs' travel, held for {DWELLS:g} time constants of the"
+    f" slowest loop ({SHORTEST_DWELL:g} s at least), of that step; settling time: until a step"
+    f" stays within {100 * SETTLING_BAND:g} %; tracking error: root mean square along a sine over"
+    f" {200 * SMOOTH_SHARE:g} % of the travel, at {100 * SMOOTH_OF_LOGS:g} % of the logs' speed, of"
+    " its amplitude"
+)  # the same in `design`, `validate` and `design --robust`
+
+
 def recommended(model: Model, found: Design) -> Recommendation:
-    """The controller of a design to take, by its loop on the model, without noise.
+    """The controller of a design to take, by its loop on the model, as `validate` tests it.
 
     Of those that keep every goal: one whose loop keeps the limits of `validate` and comes to rest,
     where there is one, and of these the one that is better in the mean of standstill error,
@@ -50,7 +66,12 @@ def recommended(model: Model, found: Design) -> Recommendation:
     alone = _best(candidates, figures)
     both = (alone, alone + COMPENSATED)
     beside = figures.get(both[1])
-    usable = beside is not None and beside.passed and beside.limit_cycle is None
+    usable = (
+        beside is not None
+        and beside.passed
+        and beside.limit_cycle is None
+        and beside.standstill <= figures[alone].standstill
+    )
     better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
     said = reasons(alone, better, figures, shown(model.rotary))
     taken = both[1] if better else alone
@@ -59,7 +80,8 @@ def recommended(model: Model, found: Design) -> Recommendation:
     if not stays and (unclear := _no_clear_win(model, found, alone, better)):
         stays = True
         present_said = f"; {unclear}: no clear win over the present controller, keep it"
-    why = f"{said}: {_decisive(alone, found, figures)}{present_said}"
+    decisive = _decisive(alone, found, figures)
+    why = f"{said}{f': {decisive}' if decisive else ''}{present_said}"
     return Recommendation(alone, better, why, stays)
 
 
@@ -79,13 +101,13 @@ def _no_clear_win(model: Model, found: Design, name: Structure, compensated: boo
 
 
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
-    """Figures of every loop of a design on its model, and of the present one, without noise."""
+    """Figures of every loop of a design on its model, and of the present one, with its noise."""
     out: dict[str, LoopFigures] = {}
-    arx = found.plant.source == "arx"
+    rng, arx = np.random.default_rng(USUAL_SEED), found.plant.source == "arx"
     for name, loop in loops_of(model, found).items():
-        out[name], _ = tried_loop(model, model, found, loop, Limits(), None, arx=arx)
+        out[name], _ = tried_loop(model, model, found, loop, Limits(), rng, arx=arx)
     try:
-        now = present_figures(model, model, found, Limits(), None)
+        now = present_figures(model, model, found, Limits(), rng)
     except BadModel:  # `validate` says why
         return out
     return out if now is None else {PRESENT: now[0], **out}
@@ -98,19 +120,19 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
     others = [other for other in every if other in figures and other != taken]
     one = figures[taken]
     said = (
-        f"{_called(taken)}: static error {_rest(one, units)} of the step, settling"
+        f"{called(taken)}: static error {_rest(one, units)} of the step, settling"
         f" time {settling_words(one)}, tracking error {percent(one.smooth_relative)} on the smooth"
         f" reference, peak force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
     )
     beside = [
-        f"{_called(other)}: {_rest(it, units)}, {settling_words(it)},"
+        f"{called(other)}: {_rest(it, units)}, {settling_words(it)},"
         f" {percent(it.smooth_relative)}, {it.force_peak:.3g} {units.force}, {_modulus(it):.2f}"
         for other, it in ((other, figures[other]) for other in others)
     ]
     return f"{said} ({'; '.join(beside)})" if beside else said
 
 
-OTHERS = re.compile(r" \(([^()]*)\)(?=:|$)")  # what `reasons` says of the other controllers
+OTHERS = re.compile(r" \(([^()]*)\)(?=[:;]|$)")  # what `reasons` says of the other controllers
 
 
 def own_figures(why: str) -> str:
@@ -143,11 +165,13 @@ def _best(candidates: Sequence[Structure], figures: Mapping[str, LoopFigures]) -
 
 
 def _decisive(name: Structure, found: Design, figures: Mapping[str, LoopFigures]) -> str:
-    """What decided against the other controller, or against the best of several."""
+    """What decided against the other controller, or against the best of several; "" where no other
+    was asked for."""
     others = [one for one in DESIGNED_STRUCTURES if one != name]
     there = [one for one in others if one in found.controllers]
     if not there:
-        return f"there is no {' and no '.join(one.upper() for one in others)}"
+        refused = [one.upper() for one in others if one in found.refused]
+        return f"there is no {' and no '.join(refused)}" if refused else ""
     sound = [one for one in there if not found.controllers[one].missed]
     other = min(sound or there, key=lambda n: _cost(n, (name, n), figures))
     called, rival = other.upper(), found.controllers[other]
@@ -199,7 +223,7 @@ def _modulus(one: LoopFigures) -> float:
     return one.margins.modulus if one.margins else 0.0
 
 
-def _called(name: str) -> str:
+def called(name: str) -> str:
     """A loop's name in a sentence."""
     alone = name.removesuffix(COMPENSATED)
     if name == PRESENT:
@@ -213,9 +237,13 @@ def _rest(one: LoopFigures, units: Shown) -> str:
         return "runs away"
     if not one.limit_cycle:
         return percent(one.standstill_relative)
-    size, unit = in_thousandths(one.limit_cycle.amplitude, units)
-    cycle = f"limit cycle of {size:.2g} {unit} every {one.limit_cycle.period:.2g} s"
-    return f"{percent(one.standstill_relative)} in a {cycle}"
+    return f"{percent(one.standstill_relative)} in a {cycle_words(one.limit_cycle, units)}"
+
+
+def cycle_words(cycle: LimitCycle, units: Shown) -> str:
+    """A limit cycle with its size, peak to peak, and its period."""
+    size, unit = in_thousandths(cycle.amplitude, units)
+    return f"limit cycle of {size:.2g} {unit} every {cycle.period:.2g} s"
 
 
 def in_thousandths(length: float, units: Shown) -> tuple[float, str]:

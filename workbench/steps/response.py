@@ -80,6 +80,16 @@ class Responded:
         """Resonances and anti-resonances by their frequency."""
         return self.modes.peaks if self.modes else ()
 
+    @property
+    def felt(self) -> tuple[Peak, ...]:
+        """The same where no frequency is identified, by what lies below and above."""
+        return self.modes.felt if self.modes else ()
+
+    def gap_around(self, peaks: Sequence[Peak]) -> tuple[float, float]:
+        """Frequencies [Hz] identified next below and next above all of these."""
+        seen, at = self.found.f[self.found.body.seen], [one.frequency.value for one in peaks]
+        return float(seen[seen < min(at)][-1]), float(seen[seen > max(at)][0])
+
 
 def respond(
     runs: Sequence[Source], rig: Rig, card: str, model: Model | None, lowest: float | None = None,
@@ -275,14 +285,19 @@ def response_document(found: Responded) -> dict[str, Any]:
             "delay_margin": _plain(m.delay_s, "s"),
             "modulus_margin": _plain(m.modulus, "1"),
         },
-        "peaks": [
-            {"kind": one.kind, "frequency": _sized(one.frequency, "Hz"),
-             "damping": _sized(one.damping, "1")}
-            for one in found.peaks
-        ],
+        "peaks": _written(found.peaks),
+        "felt": _written(found.felt),
         "frequencies": len(f),
         "remarks": found.remarks,
     }  # fmt: skip
+
+
+def _written(peaks: Sequence[Peak]) -> list[dict[str, Any]]:
+    return [
+        {"kind": one.kind, "frequency": _sized(one.frequency, "Hz"),
+         "damping": _sized(one.damping, "1")}
+        for one in peaks
+    ]  # fmt: skip
 
 
 def _seen(response: Response, unit: str) -> dict[str, Any]:

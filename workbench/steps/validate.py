@@ -1,7 +1,7 @@
 """Model + Design -> Validation: the loop in simulation, on the identified plant and another."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,12 +9,13 @@ import numpy as np
 from identification.errors import BadModel
 from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
-from workbench.documents.design import Design, Structure
+from workbench.documents.design import Design
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.closed_loop import effects_left_out, scheduled_loop
 from workbench.steps.elastic import with_resonance
+from workbench.steps.lacking import lacking
 from workbench.steps.loop_figures import (
     ALMOST,
     COMPENSATED,
@@ -29,20 +30,21 @@ from workbench.steps.loop_figures import (
     tested_of,
     tried_loop,
 )
-from workbench.steps.recommend import in_thousandths, reasons
+from workbench.steps.recommend import cycle_words, reasons
 
 
 @dataclass(frozen=True)
 class Validation:
     """Every controller on every plant (by names like "rst", then "model", "plant").
 
-    The loop that decides is without the compensator; "rst + compensator" is the same with it, "pid
-    + schedule" with its gain schedule, "present" the controller that the machine has now. why: what
-    speaks for the tested one. design: digest of the design.
+    judged: the loop that decides, which is the one recommended; "rst + compensator" is that of the
+    RST with the compensator, "pid + schedule" with its gain schedule, "present" that of the
+    controller that the machine has now. why: what speaks for the tested one. design: digest of the
+    design. lacks: what the design's model lacks, "" where nothing.
     """
 
     card: str
-    judged: Structure
+    judged: str
     passed: bool
     limits: Limits
     figures: Mapping[str, Mapping[str, LoopFigures]]
@@ -50,6 +52,7 @@ class Validation:
     versions: Mapping[str, str]
     why: str = ""
     design: str = ""
+    lacks: str = ""
 
 
 def validate(
@@ -88,9 +91,11 @@ def validate(
         for place, machine in plants.items():
             tried = tried_loop(machine, model, found, loop, limits, rng, arx=arx)
             figures[name][place], traces[name, place] = tried
-    judged = tested_of(found)
-    first = {name: places["model"] for name, places in figures.items()}
+    figures = calm_or_missed(figures, shown(model.rotary))
+    alone = tested_of(found)
     with_it = found.recommendation is not None and found.recommendation.compensator
+    judged = alone + (COMPENSATED if with_it else "")
+    first = {name: places["model"] for name, places in figures.items()}
     read: dict[str, Model | Design | None] = {"model": model, "design": found, "plant": plant}
     return Validation(
         card=model.card,
@@ -104,9 +109,32 @@ def validate(
             *_remarks(figures, judged, found, (model, plant)),
         ),
         versions=versions(),
-        why=reasons(judged, with_it, first, shown(model.rotary)),
+        why=reasons(alone, with_it, first, shown(model.rotary)),
         design=design_digest(found),
+        lacks=found.lacks or lacking(model),
     ), traces
+
+
+def calm_or_missed(
+    figures: Mapping[str, Mapping[str, LoopFigures]], units: Shown
+) -> dict[str, dict[str, LoopFigures]]:
+    """The figures, in which a loop misses a limit that swings at rest where the same controller
+    alone, or the one that the machine has now, does not."""
+    out = {name: dict(places) for name, places in figures.items()}
+    for name, places in out.items():
+        alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
+        for place, one in places.items():
+            before = [other for other in (alone, PRESENT) if other != name]
+            calm = [
+                other for other in before
+                if (its := figures.get(other, {}).get(place)) and its.stable
+                and its.limit_cycle is None
+            ]  # fmt: skip
+            if one.limit_cycle is not None and calm:
+                said = f"swings at rest, {cycle_words(one.limit_cycle, units)}, where"
+                other = "the present controller" if calm[0] == PRESENT else calm[0].upper()
+                places[place] = replace(one, missed=(*one.missed, f"{said} {other} alone does not"))
+    return out
 
 
 def _remarks(
@@ -115,33 +143,32 @@ def _remarks(
     found: Design,
     machines: Sequence[Model | None],
 ) -> list[str]:
+    alone = judged.removesuffix(COMPENSATED)
     out: list[str] = [
         MinorRemark(
             f"with the compensator, on the {place}: error at standstill"
-            f" {100 * figures[judged][place].standstill_relative:.3g} ->"
+            f" {100 * figures[alone][place].standstill_relative:.3g} ->"
             f" {100 * one.standstill_relative:.3g} %, along the smooth reference"
-            f" {100 * figures[judged][place].smooth_relative:.3g} ->"
+            f" {100 * figures[alone][place].smooth_relative:.3g} ->"
             f" {100 * one.smooth_relative:.3g} %{'' if one.stable else ', unstable'}"
         )
-        for place, one in figures.get(judged + COMPENSATED, {}).items()
+        for place, one in figures.get(alone + COMPENSATED, {}).items()
     ]
     if found.recommended == "none":
         why = f" ({found.recommendation.why})" if found.recommendation else ""
-        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is shown")
+        out.insert(0, f"the design recommends no controller{why}; its {alone.upper()} is shown")
     out += dict.fromkeys(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )
     unit = shown(found.motion == "rotary")
-    with_it = found.recommendation is not None and found.recommendation.compensator
-    taken = judged + (COMPENSATED if with_it else "")
     for name, places in figures.items():
         for place, one in places.items():
-            alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
-            called = name if name == PRESENT else name.replace(alone, alone.upper(), 1)
-            seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
+            other = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
+            called = name if name == PRESENT else name.replace(other, other.upper(), 1)
+            seen = _seen(one, unit, missed=name == judged or not name.endswith(COMPENSATED))
             lines = (f"{called} on the {place}: {line}" for line in seen)
             # What the table of the loops shows of those that nobody takes is an aside.
-            out += lines if name in (judged, taken) else map(MinorRemark, lines)
+            out += lines if name in (judged, alone) else map(MinorRemark, lines)
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")
     return out
@@ -155,11 +182,7 @@ def _seen(one: LoopFigures, units: Shown, *, missed: bool) -> Iterator[str]:
     if one.limit_cycle:
         weak = one.margins is None or one.margins.modulus < WEAK
         cause = "too little margin" if weak else "as an integrator against stiction makes"
-        size, unit = in_thousandths(one.limit_cycle.amplitude, units)
-        yield (
-            f"limit cycle of {size:.3g} {unit} peak to peak every {one.limit_cycle.period:.3g} s,"
-            f" {cause}"
-        )
+        yield f"{cycle_words(one.limit_cycle, units)}, {cause}"
     peak, limit = one.command_peak, one.command_limit
     reported = missed and one.limited > 0.0
     if one.stable and not reported and peak is not None and limit and peak >= ALMOST * limit:

@@ -93,3 +93,22 @@ def test_two_masses_by_their_parameters_are_the_bodys() -> None:
     assert np.max(near) < 0.05
     spring = body_response(F, 3.5, 0.0, stiffness=3.5 * (2 * np.pi * 4.0) ** 2)
     assert F[np.argmax(np.abs(spring))] == pytest.approx(4.0)
+
+
+def test_peaks_in_a_gap_are_felt_by_what_lies_below_and_above() -> None:
+    response = exact(accelerations())
+    gap = (F > 0.85 * HERTZ) & (F < 1.15 * RESONANCE)
+    hidden = replace(response, coherence=np.where(gap, 0.1, response.coherence))
+    found = fit_modes(hidden)
+    assert found is not None and found.peaks == ()
+    anti, resonance = found.felt
+    assert (anti.kind, resonance.kind) == ("anti-resonance", "resonance")
+    assert anti.frequency.value == pytest.approx(HERTZ, rel=0.02)
+    assert resonance.frequency.value == pytest.approx(RESONANCE, rel=0.02)
+    below = replace(response, coherence=np.where(F > 0.85 * HERTZ, 0.1, response.coherence))
+    alone = fit_modes(below)
+    assert alone is not None and alone.felt == ()  # nothing above it is seen
+    one = np.asarray(-((2 * np.pi * F) ** 2) * body_response(F, 3.5, VISCOUS))
+    stiff = exact(one)
+    plain = fit_modes(replace(stiff, coherence=np.where(gap, 0.1, stiff.coherence)))
+    assert plain is not None and plain.felt == ()

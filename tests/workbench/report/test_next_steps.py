@@ -24,7 +24,6 @@ from workbench.report.next_steps import (
     after_design,
     after_doctor,
     after_drift,
-    after_experiment,
     after_identify,
     after_validate,
     check_of_refused,
@@ -198,16 +197,6 @@ def test_a_demo_that_finds_another_effect(model: Model, found: Design) -> None:
         named_rightly=True, validation=result, design=found, traced=SimpleNamespace(model=model)
     )
     assert taken(after_demo(failed, Path("demo"), 0)).startswith("workbench design demo/model.json")
-
-
-def test_a_run_that_exceeds_a_limit_is_made_slower() -> None:
-    def planned(exceeding: int) -> Any:
-        safety, limits = SimpleNamespace(exceeding=exceeding), SimpleNamespace(speed=0.5)
-        return SimpleNamespace(safety=safety, limits=limits, h=0.01, r=range(1501))
-
-    assert after_experiment(planned(0), Path("m.json"), None) is None
-    asked = "workbench experiment m.json --design d.json --time 15 --speed 0.35"
-    assert taken(after_experiment(planned(2), Path("m.json"), Path("d.json"))) == asked
 
 
 def test_alarms_of_many_machines() -> None:

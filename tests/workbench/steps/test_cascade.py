@@ -14,16 +14,16 @@ from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
 from workbench.documents.design import Design
 from workbench.documents.design_file import design_document, read_design
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps
-from workbench.report.design_tables import cascade_lines
+from workbench.report.design_tables import cascade_lines, design_sentence
 from workbench.report.reports import bode_chart
-from workbench.steps.cascade import unseen_lag
+from workbench.steps.cascade import beside_resonance, unseen_lag
 from workbench.steps.closed_loop import driven_loop, load_of, run_driven
 from workbench.steps.design import design, usual_structures
-from workbench.steps.elastic import with_resonance, with_response
+from workbench.steps.elastic import beyond_response, with_resonance, with_response
 from workbench.steps.linear_loop import plants_of
 from workbench.steps.validate import validate
 
@@ -158,6 +158,40 @@ def test_the_resonance_of_a_response_is_taken(tmp_path: Path) -> None:
     assert model.resonance["m_1"].value == pytest.approx(EMPS.m * (40.0 / 60.0) ** 2)
     assert with_response(plain(), None) == plain()
     assert with_resonance(plain(), model.resonance) == model
+
+
+def test_a_pair_in_a_gap_of_the_response_is_taken_with_a_damping_that_is_no_more_than_assumed(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "response.json"
+    felt = peak("resonance", 60.0)
+    felt["damping"] = {"value": None, "unit": "1", "reason": "wide", "assumed": 0.03}
+    found = {"schema": "response/1", "peaks": [], "felt": [peak("anti-resonance", 40.0), felt]}
+    file.write_text(json.dumps(found))
+    model = with_response(plain(), file)
+    assert model.resonance is not None and model.resonance["frequency"].value == 60.0
+    assert used(model.resonance["damping"]) == 0.03
+
+
+def test_a_crossover_beyond_what_a_response_identifies_comes_first(tmp_path: Path) -> None:
+    found, file = made(), tmp_path / "response.json"
+    at = found.controllers[str(found.recommended)].margins.crossover_hz
+    assert at is not None
+    for spans, said in (([[0.1, 0.5 * at]], True), ([[0.1, 0.5 * at], [0.9 * at, 2 * at]], False)):
+        file.write_text(json.dumps({"schema": "response/1", "plant": {"seen_hz": spans}}))
+        sentence = design_sentence(beyond_response(found, file))
+        assert sentence.startswith("The P-PI crosses over at") is said
+        assert ("does not identify the plant" in sentence) is said
+    assert beyond_response(found, None) is found
+
+
+def test_a_cascade_stands_to_a_resonance_by_what_it_rejects_and_not_by_its_Kv() -> None:
+    found = made()
+    one = found.p_pi
+    assert one is not None and one.margins.rejection_hz is not None
+    bare = replace(found, p_pi=replace(one, series=None))
+    (said,) = beside_resonance(swinging(), bare, "p-pi")
+    assert f"it rejects disturbances up to {one.margins.rejection_hz:.3g} Hz" in said
 
 
 def test_a_response_without_such_a_pair_is_refused_in_a_line(tmp_path: Path) -> None:

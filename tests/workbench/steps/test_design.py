@@ -49,7 +49,7 @@ def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) ->
         # Not by choosing a slow controller: a ramp is followed a few samples behind.
         if kind == found.recommended:
             assert 0.0 < controller.lag < (0.06 if name != "emps" else 0.11)
-    assert result.figures["rst"]["model"].smooth_relative < 0.03
+    assert result.figures["rst"]["model"].smooth_relative < 0.05
     assert ("rst", "model") in traces
 
 
@@ -177,4 +177,5 @@ def test_a_design_has_crossover_and_bandwidth_of_each_loop() -> None:
         assert m.gain_up is not None and m.gain_db == pytest.approx(20 * np.log10(m.gain_up))
     (head, *rows) = (line.split() for line in design_view(found).screen().text().splitlines()
                      if "drive's" in line or ("Hz" in line and "deg" in line))  # fmt: skip
+    assert "rejects to" in " ".join(head) and "follows to" in " ".join(head)
     assert head[:3] == ["in", "a", "drive's"] and len(rows) == len(found.controllers)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.experiment.limits import MotionLimits
 from design.loop import LoopNoise
 from design.pid import pid_to_rst
 from identification.arrays import Array
@@ -24,7 +25,7 @@ from workbench.documents.model import Model
 from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import bench_of
-from workbench.steps.experiment.plan import _remarks, experiment
+from workbench.steps.experiment.plan import _remarks, experiment, made_safe
 from workbench.steps.experiment.planned import (
     Experiment,
     Wanted,
@@ -142,6 +143,22 @@ def test_a_controller_that_hardly_moves_the_machine_is_told() -> None:
         )  # fmt: skip
 
 
+def test_a_run_that_exceeds_a_limit_is_made_smaller_or_refused() -> None:
+    model = controlled()
+    bench, plants = bench_of(model, None), (in_loop(model),)
+    r = 0.04 * np.sin(0.01 * np.arange(600.0))
+    free = MotionLimits((-0.1, 0.1), 10.0, 20.0)
+    _, seen = made_safe(bench, plants, r, free, np.random.default_rng(0))
+    assert seen.scale == 1.0 and seen.exceeding == 0
+    tight = replace(free, force=0.9 * seen.peaks.force)
+    smaller, safe = made_safe(bench, plants, r, tight, np.random.default_rng(0))
+    assert safe.scale < 1.0 and safe.exceeding == 0 and safe.peaks.force <= tight.force
+    assert np.max(np.abs(smaller)) == pytest.approx(safe.scale * np.max(np.abs(r)))
+    hopeless = replace(free, force=0.1 * seen.peaks.force)
+    with pytest.raises(NotIdentifiable, match=r"1 of 1 machines .* \(force .* N\), .*--speed 7 "):
+        made_safe(bench, plants, r, hopeless, np.random.default_rng(0))
+
+
 def test_limits_that_are_not_given_are_those_of_the_logs() -> None:
     limits = limits_of(controlled(), Wanted())
     assert limits.stroke == (-0.1, 0.1)
@@ -203,8 +220,8 @@ def test_a_motor_whose_force_is_noisy_logs_another_command_than_it_got() -> None
 def test_what_is_promised_of_an_assumed_band_is_told() -> None:
     fast = replace(controlled().log[0], speed=1e3)  # of which any band is next to none
     bare = replace(controlled(), log=(fast,))
-    assert any("the logs show no band" in one for one in _remarks(bare, 0, 1.0))
-    assert not any("the logs show no band" in one for one in _remarks(controlled(), 0, 1.0))
+    assert any("the logs show no band" in one for one in _remarks(bare, 1.0))
+    assert not any("the logs show no band" in one for one in _remarks(controlled(), 1.0))
 
 
 def test_a_band_next_to_none_is_taken_for_one_that_no_log_told() -> None:

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from design.tune import Asked
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
@@ -14,6 +15,7 @@ from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Recommendation
 from workbench.documents.drive import present_file
 from workbench.documents.model import Model
+from workbench.report.design_tables import margins_table
 from workbench.report.validation import validation_table
 from workbench.steps import recommend
 from workbench.steps.design import with_choice
@@ -203,3 +205,35 @@ def test_a_loop_is_no_faster_than_its_reference_may_be_moved() -> None:
     assert result.passed
     smooth = traces["rst", "model"].smooth
     assert np.max(np.abs(np.diff(smooth.r))) / 1e-3 < 1.05 * 0.15
+
+
+def test_a_motor_s_design_says_where_a_cascade_would_track_better_and_how() -> None:
+    plain = model_of(EMPS, k_a=35.15)
+    found = designed(plain)
+    (said,) = [line for line in found.remarks if line.startswith("a P-PI")]
+    assert "would track better: static error" in said and "--structure p-pi" in said
+    alone = designed(plain, structures=("p-pi",))
+    assert alone.recommendation is not None
+    for figure in ("static error", "tracking error", "settling time"):
+        part = said.split(figure)[1].split(",")[0]
+        assert f"{figure}{part}" in alone.recommendation.why
+    assert not any(line.startswith("a P-PI") for line in alone.remarks)
+    by_hand = designed(plain, Asked((8.0, 0.9)), period=5e-3)
+    assert not any(line.startswith("a P-PI") for line in by_hand.remarks)
+
+
+def test_structures_that_were_not_asked_for_are_no_reason() -> None:
+    alone = designed(model_of(EMPS, k_a=35.15), structures=("p-pi",))
+    assert alone.recommendation is not None and "there is no" not in alone.recommendation.why
+    row = margins_table(alone).whole[0]
+    assert alone.p_pi is not None and alone.p_pi.cascade is not None
+    assert row[1:3] == (f"Kv {alone.p_pi.cascade.k_v:.3g}", "-")
+
+
+def test_a_compensator_with_which_a_loop_rests_further_off_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one = plain()
+    faster = replace(one, settling=0.2 * one.settling, standstill=1.1 * one.standstill)
+    both = {"rst + compensator": faster, "pid + compensator": faster}
+    assert choose(monkeypatch, **both)[1] is False

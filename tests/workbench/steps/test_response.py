@@ -29,6 +29,7 @@ from workbench.logs.sources import Source
 from workbench.report.response import (
     loop_line,
     over_frequency,
+    peak_table,
     plant_chart,
     response_sentence,
     response_view,
@@ -107,6 +108,28 @@ def test_the_load_that_swings_behind_a_motor_at_rest_is_seen() -> None:
     assert anti.frequency.value == pytest.approx(TWO.anti_resonance, rel=0.02)
     assert resonance.frequency.value == pytest.approx(TWO.resonance, rel=0.02)
     assert responded(ONE).peaks == ()
+
+
+def test_peaks_in_a_gap_are_told_apart_from_those_that_are_seen() -> None:
+    found = responded(TWO)
+    assert found.modes is not None and TWO.anti_resonance and TWO.resonance
+    body = found.found.body
+    gap = (body.f > 0.8 * TWO.anti_resonance) & (body.f < 1.2 * TWO.resonance)
+    hidden = replace(body, coherence=np.where(gap, 0.0, body.coherence))
+    modes = replace(found.modes, peaks=(), felt=found.peaks)
+    felt = replace(found, modes=modes, found=replace(found.found, body=hidden))
+    low, high = felt.gap_around(felt.felt)
+    assert low < 0.81 * TWO.anti_resonance < 1.19 * TWO.resonance < high
+    said = response_sentence(felt)
+    assert "no resonance" not in said and "where it is not identified at every frequency" in said
+    assert "there is an anti-resonance at" in said and "and a resonance at" in said
+    document = response_document(felt)
+    assert document["peaks"] == [] and [one["kind"] for one in document["felt"]] == [
+        "anti-resonance", "resonance"
+    ]  # fmt: skip
+    assert [row[0] for row in peak_table(felt).whole] == [
+        "anti-resonance, felt", "resonance, felt"
+    ]  # fmt: skip
 
 
 @pytest.mark.slow

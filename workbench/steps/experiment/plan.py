@@ -24,6 +24,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.progress import KeepGoing, Progress
 from workbench.cards.effect_values import known_effect
+from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
@@ -106,7 +107,7 @@ def experiment(
         chaotic=seen[1][0].loose if seen else 1.0,
         tried=plan.tried,
         seed=wanted.seed,
-        remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
+        remarks=tuple(_remarks(model, safety.scale)),
         versions=versions(),
         r=moved_reference(bench.loop.servo, r, bench.loop.h)[
             :: max(1, round(bench.loop.law.h / bench.loop.h))  # where the controller samples
@@ -143,7 +144,7 @@ def _apart(information: Information, keys: Sequence[str]) -> tuple[Separation, .
     return tuple(sorted(found, key=lambda one: one.deviations))
 
 
-def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
+def _remarks(model: Model, scale: float) -> list[str]:
     out = list(model.read)
     if left_out := effects_left_out(model):
         out.append(left_out)
@@ -162,14 +163,12 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
         )
     if scale < 1.0:
         out.append(f"made smaller, to {scale:.0%}, so that no drawn machine exceeds a limit")
-    if exceeding:
-        out.append(f"{exceeding} drawn machines still exceed a limit: do not run it; widen the"
-                   " limits or identify a better model")  # fmt: skip
     return out
 
 
 SAFETY_PASSES = 8  # in which a reference is made smaller until no limit is exceeded
 SMALLER_SCALE = 0.93  # in each
+SLOWER_RUN = 0.7  # of its speed, that a run is given after one that is not safe
 
 
 def promised(
@@ -214,7 +213,8 @@ def made_safe(
 ) -> tuple[Array, Safety]:
     """The reference, made smaller about home until none of these plants exceeds a limit.
 
-    Raises BadModel where none of them can be followed.
+    Raises BadModel where none of them can be followed, NotIdentifiable where one exceeds a limit
+    however small the reference: a feed-forward asks for the more force, the smoother a path it is.
     """
     seeds, scale, smaller = rng.spawn(len(plants)), 1.0, r
     for again in range(1 + SAFETY_PASSES):
@@ -230,4 +230,25 @@ def made_safe(
             break
     if not found:
         raise BadModel("none of the drawn machines can be simulated in this loop; check the model")
-    return smaller, Safety(len(plants), reduce(Peaks.or_more, found), exceeding, scale)
+    worst = reduce(Peaks.or_more, found)
+    if exceeding:
+        raise NotIdentifiable(
+            f"{bench.model.card}: no run that {bench.controller} keeps within the limits:"
+            f" {exceeding} of {len(plants)} machines drawn from what the model leaves open exceed"
+            f" one{_beyond(worst, limits, shown(bench.model.rotary))}, also with the reference at"
+            f" {scale:.0%}; give --speed {SLOWER_RUN * limits.speed:.2g} or less, or wider limits"
+        )
+    return smaller, Safety(len(plants), worst, exceeding, scale)
+
+
+def _beyond(worst: Peaks, limits: MotionLimits, units: Shown) -> str:
+    """Force and speed beyond their limits, in brackets; "" where it is another limit."""
+    said = [
+        f"{name} {reached:.3g} of {limit:.3g} {unit}"
+        for name, reached, limit, unit in (
+            ("force", worst.force, limits.force, units.force),
+            ("speed", worst.speed, limits.speed, units.velocity),
+        )
+        if reached > limit
+    ]
+    return f" ({', '.join(said)})" if said else ""

@@ -15,6 +15,7 @@ from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
+from workbench.steps.lacking import lacking
 from workbench.steps.loop_figures import PRESENT, Limits, references
 from workbench.steps.robust.outcomes import (
     MEASURES,
@@ -35,7 +36,6 @@ ROBUST_STAGES = {
     "loops on all machines": (0.55, 0.75),
     "what it promises": (0.75, 1.0),
 }
-SMOOTH_LAPS = 1.25  # of the smooth reference: in, and once round
 MOST_BESIDE = 100  # machines on which the nominal and the present loop are shown
 ROBUST = "robust"
 NOMINAL = "nominal"  # the design that knows of no spread
@@ -160,7 +160,7 @@ def robust_design(
 def one_motion(model: Model, nominal: Design, h: float | None = None) -> tuple[Motion, float]:
     """One motion for all loops: that of the nominal design's validation, and a slow ramp."""
     period = h or (nominal.force.h if nominal.force else nominal.plant.h)
-    steps, smooth, _ = references(model, nominal, period, SMOOTH_LAPS)
+    steps, smooth, _ = references(model, nominal, period)
     slow, speed = slow_ramp(model, period)
     return Motion(steps, smooth, slow), speed
 
@@ -225,8 +225,8 @@ def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
             f"widened by the drift between the machine's models: {len(wanted.drift)} parameters, at"
             f" most {100 * wanted.drift[widest]:.2g} % a step ({widest})"
         )
-    if not model.fit.adequate:
-        out.append("the model leaves more than noise: the machine is not among those drawn")
+    if lacks := lacking(model):
+        out.append(f"{lacks}: the machine is not among those drawn")
     return out
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.filters import quick_filters, scaled_filters
+from design.filters import scaled_filters
 from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
@@ -20,13 +20,12 @@ from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
 from workbench.steps.design import POLES_PLACED, placed_design
 from workbench.steps.robust.outcomes import DrawnMachines, Motion, Outcomes, outcomes
+from workbench.steps.usual_compensator import excess_compensator, whole_compensator
 
 SPEEDS_TRIED = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
 # The whole compensator's e_T and its filters' time constants, in units of the usual ones.
 WHOLE_TRIED = ((1.0, 1.0), (0.3, 0.3), (0.1, 0.3))
-# e_T of one that gives the excess alone, in the position's noise, and its N_c.
-EXCESS_TRIED = (5.0, 20.0)
-EXCESS_N_C = 1.05
+EXCESS_TRIED = (5.0, 20.0)  # e_T of one that gives the excess alone, in the position's noise
 FEW = 6  # machines that sort the candidates
 FINALISTS = 2  # candidates that all machines test
 # Errors below which less is no better: of step and amplitude; a staircase, in the sensor's noise.
@@ -132,26 +131,22 @@ def _of_design(model: Model, found: Design) -> Iterator[Candidate]:
     for name in admissible or [n for n in names if n in found.controllers]:
         yield Candidate(found, name, compensator=False)
         controller = found.controllers[name]
-        for own in compensators(model, found.compensator, controller):
+        for own in compensators(model, controller):
             yield Candidate(replace(found, compensator=own), name, compensator=True)
 
 
-def compensators(
-    model: Model, usual: CompensatorValues, controller: Controller
-) -> Iterator[CompensatorValues]:
+def compensators(model: Model, controller: Controller) -> Iterator[CompensatorValues]:
     """The compensators that are tried around a controller; beside an integrator, which holds the
     sliding friction, also of the excess alone, where the machine has one."""
-    h = usual.h or controller.h
+    h = controller.h
+    whole = whole_compensator(model, h)
     for e_T, times in WHOLE_TRIED:
-        yield replace(usual, e_T=e_T * usual.e_T, filters=scaled_filters(h, times), h=h)
-    friction, noise = usual.value.friction, model.fit.noise_y
+        yield replace(whole, e_T=e_T * whole.e_T, filters=scaled_filters(h, times))
+    friction = whole.value.friction
     excess = max(friction.F_sp - friction.F_cp, -friction.F_sn - friction.F_cn)
-    if excess > 0.0 and noise > 0.0 and integrates(np.ones(1), controller.rst):
-        filters = quick_filters(h, noise, min(friction.dv_p, -friction.dv_n))
+    if excess > 0.0 and model.fit.noise_y > 0.0 and integrates(np.ones(1), controller.rst):
         for many in EXCESS_TRIED:
-            yield replace(
-                usual, N_c=EXCESS_N_C, e_T=many * noise, filters=filters, h=h, excess=True
-            )
+            yield excess_compensator(model, h, many)
 
 
 def _short(found: Outcomes, limits: dict[str, float], probability: float) -> float:
