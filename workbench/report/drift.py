@@ -145,6 +145,8 @@ def drift_sentence(found: Drifted) -> str:
             )
         case "drift":
             last = [test for test in tests if test.verdict == "drift"][-1]
+            if found.slip:
+                return f"In {_files(found, 'drift')}: {found.slip}."
             parts = [", ".join(_changed(shift) for shift in last.moved)] if last.moved else []
             if last.unsure:
                 first = "something more" if parts else "something changed"
@@ -255,6 +257,8 @@ def _shift_row(shift: Shift) -> Row:
 def then_of_drift(found: Drifted) -> list[str]:
     """What to do next after a drift test."""
     match found.verdict:
+        case "drift" if found.slip:
+            return ["correct the unit in the card, or the logger, and test the log again"]
         case "drift":
             logs = _files(found, "drift").replace(", ", " ")
             return [f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and"

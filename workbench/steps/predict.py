@@ -18,6 +18,7 @@ from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import of_body, with_motor_force
 from workbench.documents.model import Model
+from workbench.documents.plausible import refuse_other_units
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import (
     force_by_model,
@@ -140,13 +141,15 @@ def predict_sources(
 ) -> Predicted:
     """What the model says of the runs that the sources are; see `predict`.
 
-    Raises BadModel where model and card are of unlike machines, and as `predict` does.
+    Raises BadModel where model and card are of unlike machines, BadLog where a run is in other
+    units than the model's logs, and as `predict` does.
     """
     if sources.rig.motion != model.rig.motion:
         raise BadModel(
             f"the model is of a {model.rig.motion} machine, but {sources.card.path} says"
             f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
         )
+    refuse_other_units([one.log for one in sources.runs], model.log, sources.rig)
     found = tuple(predict(model, s.log, drive=drive, window=window) for s in sources.runs)
     of_runs = dict.fromkeys(line for one in found for line in one.remarks)
     refused = dict.fromkeys(one.refused for one in found if one.refused is not None)

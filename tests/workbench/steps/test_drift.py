@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from identification.drift.drift_result import DriftTest, Statistic
@@ -257,3 +258,17 @@ def test_a_correlation_that_is_none_is_refused() -> None:
         ParameterCorrelation(("m", "F_cp"), ((1.0,), (1.0,)))
     with pytest.raises(BadModel, match="-1 to 1"):
         ParameterCorrelation(("m", "F_cp"), ((1.0, 2.0), (2.0, 1.0)))
+
+
+@pytest.mark.slow
+def test_a_slip_of_unit_is_called_so_and_not_drift(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slipped = pd.read_csv(shop / "b.csv")
+    slipped["y"] *= 10.0
+    slipped.to_csv(shop / "z.csv", index=False)
+    assert run(shop, tmp_path / "d", "z") == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "In z.csv: no wear but a slip of unit or scale" in said
+    assert "every length by the factor 10 (the unit of the position 1/10" in said
+    assert "workbench doctor" in said
