@@ -13,6 +13,7 @@ from identification.estimation.regression.held_command import with_period
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
+from identification.model.plant import Motor
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
@@ -45,7 +46,8 @@ PREDICTION_COLUMNS = (
 
 @dataclass(frozen=True)
 class Prediction:
-    """Columns of prediction.csv, each (n,); force_simulated is NaN without a command.
+    """Columns of prediction.csv, each (n,); force_simulated is NaN without a command, and of a
+    motor, whose applied force is that of its command.
 
     sliding: True outside the stick band, where the inverse model predicts the force; inside it
     repeats the applied one. drive: what drove the position; the errors are root mean squares [N],
@@ -106,7 +108,9 @@ def predict(
     applied = log.signals.get("F", blank)
     run, refused = _run(model, log, body, chosen, restarts)
     simulated, other = (run if chosen == "command" else None), None
-    if chosen == "force" and model.actuator is not None and "u" in body:
+    if isinstance(plant.actuator, Motor):  # of which the applied force is the command's
+        simulated = None
+    elif chosen == "force" and model.actuator is not None and "u" in body:
         simulated, other = _run(model, body, body, "command", restarts)
     # The velocity as the inverse model takes it, and where it is significant.
     motion = differentiate(body["y"], body.h, how.cutoff, how.method)
