@@ -149,6 +149,17 @@ def test_a_position_ahead_of_its_reference_is_told(
     assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
 
 
+def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
+    found = look(load_card(card.path), table)
+    text = doctor_view(found, None).text().splitlines()
+    assert text[1].split(maxsplit=1) == [
+        "next", "check the units in the card (see note), then ask again"
+    ]  # fmt: skip
+    assert "signals.y, read in 'parsec': the position covers" in found.remarks[0]
+
+
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
     card, table = motor
     text = doctor_view(look(card, table), None, "my card.toml").text()

@@ -18,7 +18,13 @@ from identification.signals.noise import local_noise
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
 from workbench.cards.headers import Header, read_header
-from workbench.logs.faulty_rows import several_axes, sound_rows, stretches, told_of_starts
+from workbench.logs.faulty_rows import (
+    late_stamps,
+    several_axes,
+    sound_rows,
+    stretches,
+    told_of_starts,
+)
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
@@ -183,6 +189,12 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             runs = stretches(one.values[rows])
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = np.flatnonzero(rows)[longest]
+            even, late = late_stamps(one.values[at])
+            if late:
+                clock = replace(one, values=even, x=even)
+                told = (*said, late)
+                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
+                        for c in columns], told  # fmt: skip
             if len(at) < len(one.values) and _ticks(replace(one, values=one.values[at])):
                 if len(runs) > 1:
                     told = told_of_starts(one.values[rows], runs)
