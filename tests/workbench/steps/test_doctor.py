@@ -69,6 +69,16 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
 
 
 @pytest.mark.slow
+def test_identify_says_that_a_voltage_brakes(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    voltage = table["u"] + 40.0 * np.gradient(table["y"], table["t"])  # the motor's own, 40 V s/m
+    look(card, {**table, "u": voltage})
+    path = card.path.parent / "run.csv"
+    remarks = identify_sources(read_sources([str(path)], str(card.path))).remarks
+    assert any("if it is the motor's voltage, F_vp and F_vn hold" in one for one in remarks)
+
+
+@pytest.mark.slow
 def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> None:
     card, table = motor
     up = table["u"] > 0

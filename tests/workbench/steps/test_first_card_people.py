@@ -10,6 +10,7 @@ from benchmarks.init_people import KINDS, make_file
 from benchmarks.init_real_tables import fewest_wrong, machine
 from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
+from identification.errors import BadLog
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
 from workbench.page.card_form import OTHER_FIELD, form_of, stored_form
@@ -168,3 +169,29 @@ def test_a_proposal_keeps_its_other_through_answers(
     found = propose(tmp_path, "t,a1,a2", T, joint["y"], joint["F"])
     assert replace(found, name="b").other is found.other
     assert with_rig(found, "kind", "").kind == found.kind
+
+
+def test_three_currents_whose_sum_is_0_drive_nothing_by_themselves(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    rng, at = np.random.default_rng(4), 12.0 * joint["y"]
+    phases = [
+        joint["F"] * np.sin(at - k * 2.0 * np.pi / 3.0) + 1e-3 * rng.standard_normal(len(T))
+        for k in range(3)
+    ]
+    headers = "t_s,angle_rad,i_u_A,i_v_A,i_w_A"
+    with pytest.raises(BadLog, match="'i_u_A', 'i_v_A', 'i_w_A' are the three phase currents"):
+        propose(tmp_path, headers, T, joint["y"], *phases)
+    found = propose(tmp_path, f"{headers},i_q_A", T, joint["y"], *phases, joint["F"])
+    u = found.signal("u")
+    assert u is not None and u.column == "i_q_A"
+    assert set(found.unused.values()) == {"one of three phase currents, whose sum is 0"}
+
+
+def test_rows_that_were_stamped_late_have_a_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    stamped = T.copy()
+    stamped[70::90] = stamped[71::90]
+    found = propose(tmp_path, "time_s,angle_rad,torque_Nm", stamped, joint["y"], joint["F"])
+    t = found.signal("t")
+    assert t is not None and t.column == "time_s"
+    assert any("stamped late, taken as even rows" in one for one in found.remarks)
