@@ -1,6 +1,7 @@
 """Margins of an open loop that is known at frequencies alone, as logs show it."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,8 @@ def measured_margins(f: Array, L: NDArray[np.complex128], seen: BoolArray) -> Me
 
 
 def is_minus_one(f: Array, L: NDArray[np.complex128], seen: BoolArray) -> BoolArray:
-    """The points (k,) of an octave over which an open loop stays close to -1.
+    """The points (k,) of an octave over which an open loop stays close to -1, and what lies between
+    two of them less than an octave apart, which follows the reference there by chance.
 
     There the response from force to position is the controller's inverse: what goes round the loop
     is noise, or a force at its limit, and no answer to the reference. Source: direct and indirect
@@ -69,7 +71,12 @@ def is_minus_one(f: Array, L: NDArray[np.complex128], seen: BoolArray) -> BoolAr
     low, high = (np.searchsorted(f, f * 2.0**half) for half in (-0.5, 0.5))
     counts = [np.concatenate([[0], np.cumsum(one)]) for one in (near, seen)]
     close, every = (one[high] - one[low] for one in counts)
-    return np.asarray(near & (close >= MOST_OF_AN_OCTAVE * np.maximum(every, 1)))
+    at = np.flatnonzero(near & (close >= MOST_OF_AN_OCTAVE * np.maximum(every, 1)))
+    found = np.zeros(len(f), dtype=np.bool_)
+    found[at] = True
+    for a, b in pairwise(at):
+        found[a:b] |= f[b] < 2.0 * f[a]
+    return found
 
 
 def _crossings(f: Array, y: Array) -> list[float]:

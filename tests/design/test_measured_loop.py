@@ -59,6 +59,16 @@ def test_an_octave_at_minus_one_is_no_loop() -> None:
     assert not np.any(found[(F < 2.8) | (F > 28.0)])
 
 
+def test_what_lies_between_two_stretches_at_minus_one_is_no_loop_either() -> None:
+    L, shut = points(), (F > 2.0) & (F < 20.0)
+    island = (F > 6.0) & (F < 6.6)
+    shown = np.where(shut & ~island, -1.0, L)
+    found = is_minus_one(F, shown, np.ones(len(F), dtype=bool))
+    assert np.all(found[island])
+    wide = (F > 4.0) & (F < 9.0)
+    assert not np.any(is_minus_one(F, np.where(shut & ~wide, -1.0, L), shut | ~shut)[wide])
+
+
 def test_a_loop_that_only_passes_minus_one_is_one() -> None:
     L = points()
     at = measured_margins(F, L, np.ones(len(F), dtype=bool)).crossover

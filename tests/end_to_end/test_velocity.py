@@ -87,6 +87,24 @@ def test_trace(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert list(columns) == ["t", "position_measured", "position_simulated"]
 
 
+def test_a_prediction_begins_as_the_fit_does(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log whose first command has not acted yet: the body stands where it is read as moving."""
+    log = made(83, h=0.02)
+    late, u = 10, np.full(len(log["t"]), 4.0)
+    u[late:] = log["u"][:-late]
+    y = np.concatenate([np.full(late, log["y"][0]), log["y"][:-late]])
+    write(folder / "late.csv", {"t": log["t"], "y": y, "u": u})
+    words = ("m/model.json", "late.csv", "--card", "card.toml", "--out", "p")
+    assert run(folder, "predict", *words) == 0
+    assert "from 1 s on, since commands from before the log act" in capsys.readouterr().out
+    found = pd.read_csv(folder / "p" / "prediction.csv")
+    assert found["position_simulated"].isna().sum() == 50
+    off = 1e3 * (found["position_measured"] - found["position_simulated"]).dropna()
+    assert abs(off.iloc[0]) < 1e-6 and np.abs(off[:50]).max() < 2.0  # mm
+
+
 def test_the_design_passes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     design = read(folder / "d" / "design.json")
     assert design["law"] == "PI" and design["margins"]["phase_deg"] > 30.0

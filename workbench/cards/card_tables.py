@@ -5,6 +5,7 @@ what a gain means in workbench/cards/units.py. A limit of `[limits]` is a pair o
 of texts with a unit, as `["10 N", "16 N"]`.
 """
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any, Literal
@@ -37,7 +38,7 @@ Format = Literal[
 class About(CardTable):
     """`[card]`: name of the set and where it comes from."""
 
-    name: str = Field(pattern=r"^[\w.-]+$")
+    name: str
     """of the machine: letters, digits, `_`, `.`, `-`; also the folder of its files under
     `WORKBENCH_DATA`"""
     title: str = ""
@@ -52,6 +53,15 @@ class About(CardTable):
     """where they are described"""
     notes: tuple[str, ...] = ()
     """traps, one a text"""
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, name: str) -> str:
+        if not re.fullmatch(r"[\w.-]+", name):
+            raise ValueError(
+                "letters, digits, '_', '.' and '-' make a name, one of them at least, as 'bench-a'"
+            )
+        return name
 
 
 class FileSpec(CardTable):
@@ -164,13 +174,20 @@ class RigSection(CardTable):
         command = self.command_unit or self._command_unit(signals)
         limit = self.control_limit_v if self.control_limit is None else self.control_limit
         per = over(force_unit(self.motion), command)
+        given = self._per_command(per, command)
+        if given == 0.0:
+            raise BadCard(
+                f"rig.force_per_command = 0 {per}: a command without a force drives nothing; give"
+                " the drive's constant (1 where it is not known: a force is then in units of the"
+                " command)"
+            )
         mass = "kg m^2" if self.motion == "rotary" else "kg"
         return Rig(
             kind=self.kind,
             area_p=self.area_p_m2,
             area_n=self.area_n_m2,
             supply_pressure=self.supply_pressure_pa,
-            force_per_command=self._per_command(per, command),
+            force_per_command=given,
             control_limit=_positive_in(command, limit, "rig.control_limit"),
             stroke=self.stroke_m,
             motion=self.motion,

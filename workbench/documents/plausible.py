@@ -15,7 +15,7 @@ from math import sqrt
 
 import numpy as np
 
-from identification.errors import BadModel
+from identification.errors import BadLog, BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from workbench.cards.against_header import contradicted_units
@@ -62,6 +62,9 @@ ROTARY: Mapping[str, Size] = {
     "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
 }
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
+_OTHER_UNIT = (
+    200.0  # times another log's clock or travel: a slip of 1000, and motions alike in part
+)
 _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
 
@@ -139,6 +142,32 @@ def bandwidth_remarks(w_n: Iterable[float], rig: Rig) -> tuple[str, ...]:
     return tuple(dict.fromkeys(line for line in found if line))
 
 
+def refuse_other_units(
+    logs: Sequence[Log], known: Sequence[Log] | Sequence[LogEntry], rig: Rig
+) -> None:
+    """Raises BadLog where the clock or the travel of a log is hundreds of times that of the known
+    ones, training logs or those of a model, or as much less: it is in other units."""
+    periods, travels = [one.h for one in known], [_travel(one) for one in known]
+    for log in logs:
+        _refuse_apart("period", log.h, periods, rig, f"{log.name}: signals.t: sampled every")
+        said = f"{log.name}: signals.y: the position covers"
+        _refuse_apart("travel", _travel(log), travels, rig, said)
+
+
+def _refuse_apart(quantity: str, value: float, known: Sequence[float], rig: Rig, said: str) -> None:
+    low, high = _extremes(known)
+    if value <= 0.0 or low <= 0.0 or low / _OTHER_UNIT < value < high * _OTHER_UNIT:
+        return
+    size = (ROTARY if rig.motion == "rotary" else LINEAR)[quantity]
+    near = high if value > high else low
+    like = min(_slips(size), key=lambda slip: abs(np.log(value * slip[0] / near)))
+    raise BadLog(
+        f"{said} {value:.4g} {size.unit}, {max(value / near, near / value):.4g} times"
+        f" {'more' if value > near else 'less'} than in the logs of the model ({near:.4g}"
+        f" {size.unit}), as if it were {like[1]}; correct its unit, or give it its own card"
+    )
+
+
 def _of_rig(rig: Rig) -> Iterator[str | None]:
     """Areas, supply pressure and stroke as the card gives them."""
     for key, area in (("area_p_m2", rig.area_p), ("area_n_m2", rig.area_n)):
@@ -185,8 +214,8 @@ def _extremes(values: Sequence[float]) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def _travel(entry: LogEntry) -> float:
-    return entry.travel[1] - entry.travel[0]
+def _travel(of: Log | LogEntry) -> float:
+    return float(np.ptp(of["y"] if isinstance(of, Log) else of.travel))
 
 
 # Parameters that no machine has this far apart: directions, and breakaway over sliding friction.

@@ -3,7 +3,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,19 @@ import numpy as np
 from design.controller_program import ProgramUnits, controller_program
 from design.feed_forward import FeedForward
 from design.filters import filters_at
-from design.program import Program
+from design.program import (
+    Assign,
+    Choice,
+    Constant,
+    Element,
+    Expression,
+    Program,
+    Repeat,
+    Statement,
+    Variable,
+    flat,
+    parts,
+)
 from design.program_run import SelfTest, self_test
 from design.servo import Compensation
 from identification.errors import BadModel
@@ -85,10 +97,53 @@ def exported(
     assert found.command is not None
     units = shown(found.motion == "rotary")
     own = ProgramUnits(units.position, units.force, found.command.unit)
-    program = controller_program(
-        identifier(name or found.card), loop.servo, loop.h, own, loop.k_a or 0.0
+    program = _without_unread(
+        controller_program(identifier(name or found.card), loop.servo, loop.h, own, loop.k_a or 0.0)
     )
     return Exported(program, loop, found, chosen, _remarks(found, chosen, loop), precision)
+
+
+def _without_unread(program: Program) -> Program:
+    """The program without locals that are set and nowhere read, and constants that only these
+    had."""
+    kept = program.statements
+    while True:
+        read = {program.output.name, *_read_in(kept)}
+        unread = {one.name for one in program.locals} - read
+        less = tuple(
+            one for one in kept
+            if not (isinstance(one, Assign) and getattr(one.target, "name", "") in unread)
+        )  # fmt: skip
+        if less == kept:
+            break
+        kept = less
+    named = {
+        part.name for one in flat(kept) for part in _parts_of(one) if isinstance(part, Constant)
+    }
+    return replace(
+        program, statements=kept,
+        locals=tuple(one for one in program.locals if one.name not in unread),
+        constants=tuple(one for one in program.constants if one.name in named),
+    )  # fmt: skip
+
+
+def _read_in(statements: tuple[Statement, ...]) -> Iterator[str]:
+    """Names of the variables that the statements read, and of those that count."""
+    for one in flat(statements):
+        yield from (part.name for part in _parts_of(one) if isinstance(part, Variable))
+        if isinstance(one, Repeat):
+            yield one.index.name
+
+
+def _parts_of(one: Statement) -> Iterator[Expression]:
+    """What a statement reads."""
+    match one:
+        case Assign(target, value):
+            yield from parts(value)
+            if isinstance(target, Element):
+                yield from parts(target.index)
+        case Choice(condition):
+            yield from parts(condition)
 
 
 def _with_schedule(

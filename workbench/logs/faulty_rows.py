@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from identification.arrays import Array, BoolArray
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP, told_of_hours
+from identification.thresholds import HALF, OF_ACCOUNT
 from workbench.logs.table import number_of, text_of
 
 MOST_FAULTY = 0.01  # of the rows: more is a file that is laid out otherwise
 MOST_STARTS = 50  # of a clock in one file
+_ROWS_OF_A_MEAN = 50  # over which the jitter of stamps is gone, and a lost row is not
 _MOST_AXES, _SHOWN_AXES, _LOOKED_AT = 50, 4, 1000  # axes of one file, named; rows looked at first
 
 
@@ -78,6 +80,27 @@ def sound_rows(t: Array, others: Sequence[Array]) -> tuple[BoolArray, tuple[str,
     if repeated := int(np.sum(twice)):
         remarks.append(f"{rows_of(repeated)} that repeat the row before left out")
     return timed & ~twice, tuple(remarks)
+
+
+def late_stamps(t: Array) -> tuple[Array, str]:
+    """The times (n,) of even rows of which some were stamped late, together with the next, and what
+    is said of that; other times as they are.
+
+    The rows are even where their stamps follow the count of the rows without a step: a row that
+    was lost would shift all behind it by a period.
+    """
+    step = np.diff(t)
+    same = step == 0.0
+    if not np.any(same) or np.any(step < 0.0) or np.mean(same) >= OF_ACCOUNT:
+        return t, ""
+    row = np.arange(len(t))
+    period, start = np.polyfit(row, t, 1)
+    blocks = max(1, len(t) // _ROWS_OF_A_MEAN)
+    late = [float(np.mean(one)) for one in np.array_split(t - start - period * row, blocks)]
+    if np.ptp(late) > HALF * period:
+        return t, ""
+    said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"
+    return start + period * row, f"{said}: stamped late, taken as even rows"
 
 
 def several_axes(t: Array, columns: Iterable[tuple[str, NDArray[Any]]]) -> str:

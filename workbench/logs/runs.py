@@ -24,6 +24,7 @@ from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
 from workbench.logs.faulty_rows import (
     at_rows,
+    late_stamps,
     numbers_in,
     several_axes,
     sound_rows,
@@ -148,6 +149,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
             raise BadLog(f"{path}: {in_turn}")
         rows, said = sound_rows(whole["t"], [x for key, x in whole.items() if key != "t"])
         whole = whole if np.all(rows) else at_rows(whole, rows)
+        whole["t"], late = late_stamps(whole["t"])
+        said = (*said, late) if late else said
         told = tuple(f"{called}: {one}" for one in (*remarks, *said))
         return Log(called, whole), table.first_row, told
 

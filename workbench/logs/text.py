@@ -319,7 +319,14 @@ def _parse(
             numbers = None
     whole = numbers
     if whole is None:
-        whole = parsed.load(pa.string(), names[:1])
+        try:
+            whole = parsed.load(pa.string(), names[:1])
+        except pa.ArrowInvalid:
+            many = "1 field" if width == 1 else f"{width} fields"
+            raise BadLog(
+                f"{path}, from row {first_row}: cannot be cut into rows of {many}: a row is longer"
+                " than 1 MB, or a quote in it is not closed; write one row a line"
+            ) from None
     said = parsed.refused(path, first_row, len(whole) + len(parsed.wrong))
     numeric = set() if numbers is None else set(numbers.column_names)
 

@@ -108,6 +108,8 @@ def _then(found: Examined, card: str) -> str:
         return "mend the log or its card (see refused), then ask again"
     if found.exchanged:
         return "exchange the columns of r and y in the card (see note), then ask again"
+    if found.other_units:
+        return "check the units in the card (see note), then ask again"
     if found.verdict == "nothing":
         return "log again, with the motion that 'add' names"
     if found.rig.kind == "motor" and found.rig.force_per_command is None:

@@ -146,7 +146,10 @@ def drift_sentence(found: Drifted) -> str:
             )
         case "drift":
             last = [test for test in tests if test.verdict == "drift"][-1]
-            parts = [", ".join(_changed(shift) for shift in last.moved)] if last.moved else []
+            if found.slip:
+                return f"In {_files(found, 'drift')}: {found.slip}."
+            by = ", by the mean over the logs" if last.found_by == "mean" else ""
+            parts = [", ".join(map(_changed, _as_in_table(last))) + by] if last.moved else []
             if last.unsure:
                 first = "something more" if parts else "something changed"
                 names = ", ".join(last.unsure)
@@ -187,7 +190,7 @@ def _all_that_moved(test: DriftTest) -> str:
     if not test.found_by:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = [_from_to(one) for one in test.moved]
+    moved = [_from_to(one) for one in _as_in_table(test)]
     if test.unsure:
         moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
@@ -212,6 +215,13 @@ def _files(found: Drifted, verdict: str) -> str:
 def _changed(shift: Shift) -> str:
     change, low, high = (signed_percent(x) for x in (shift.change, shift.low, shift.high))
     return f"{shift.name} {change} ({low} to {high})"
+
+
+def _as_in_table(test: DriftTest) -> list[Shift]:
+    """What has moved, with the numbers of the log's table; by the mean over the logs with its
+    own."""
+    own = {} if test.found_by == "mean" else test.shifts
+    return [own.get(one.name, one) for one in test.moved]
 
 
 def signed_percent(value: float) -> str:
@@ -263,6 +273,8 @@ def _shift_row(shift: Shift) -> Row:
 def then_of_drift(found: Drifted) -> list[str]:
     """What to do next after a drift test."""
     match found.verdict:
+        case "drift" if found.slip:
+            return ["correct the unit in the card, or the logger, and test the log again"]
         case "drift":
             logs = _files(found, "drift").replace(", ", " ")
             return [f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and"

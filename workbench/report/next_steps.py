@@ -139,6 +139,8 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
     named = [log for log in logs if Path(log).name in files] or list(logs)
     if found.verdict == "structure":
         return step("an effect is missing", "trace", *named, "--card", card)
+    if found.slip:
+        return step("which unit is wrong", "doctor", named[0], "--card", card)
     if found.verdict == "drift":
         return step("the machine as it is now", "identify", *named, "--card", card)
     return step("which run to add", "doctor", named[0], "--card", card)

@@ -188,7 +188,7 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
     """The verdict "none" in words; what is left may be more than noise, without a structure."""
     left, noise = found.after["test"].force_rms, force(found.noise_force, rotary)
     if left is None:
-        return "Nothing is missing."
+        return "Open: no row was held out on which it would show whether something is missing."
     if left <= NOISE * found.noise_force:
         where = "" if found.noise_actuator is not None else " in the equation of motion"
         off = found.after["test"].position_rms

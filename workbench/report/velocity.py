@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import isnan
 from pathlib import Path
 from typing import Any
 
+from identification.velocity.record import RUN_IN
 from identification.velocity.rivals import STRUCTURES, is_noise
 from workbench.cards.readable import length, number
 from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity_document
@@ -165,12 +167,12 @@ def _rivals(found: VelocityTraced) -> Part:
 
 
 def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
-    """prediction.csv: time [s], measured and simulated position [m (rad)]."""
+    """prediction.csv: time [s], measured and simulated position [m (rad)]; empty: no value."""
     lines = ["t,position_measured,position_simulated"]
     for one in runs:
         columns = (one.t, one.measured, one.simulated)
         rows = zip(*(x.tolist() for x in columns), strict=True)
-        lines += [",".join(f"{x:.9g}" for x in row) for row in rows]
+        lines += [",".join("" if isnan(x) else f"{x:.9g}" for x in row) for row in rows]
     return "\n".join(lines) + "\n"
 
 
@@ -180,7 +182,8 @@ def velocity_prediction_view(
     """How far the simulated position is from the measured one; window [s]: after which it begins
     anew."""
     summary = prediction_summary(runs, window)
-    anew = f", anew every {window:g} s" if window else " from the first sample on"
+    begun = f" from {RUN_IN:g} s on, since commands from before the log act until then"
+    anew = f"{begun}{f', anew every {window:g} s' if window else ''}"
     off, worst = (
         length(float(summary[k] or 0.0), rotary) for k in ("position_rms", "position_worst")
     )

@@ -108,13 +108,15 @@ class Examined(CheckedLog):
     would identify the rest; effects: by how many deviations of the noise each would show at a size
     that matters, None where that was not asked; refused: why `identify` would not take the log,
     empty where it would.
-    exchanged: whether position and reference look like each other's columns.
+    exchanged: whether position and reference look like each other's columns; other_units: whether
+    a unit of the card is that of no machine, or not its header's.
     log and motion: the first run, for the picture; None where the log is refused before.
     """
 
     sensors: tuple[SensorState, ...]
     delays: tuple[Delay, ...]
     exchanged: bool
+    other_units: bool
     ways: Ways | None
     identifiability: tuple[Identifiable, ...]
     add: tuple[str, ...]
@@ -187,16 +189,16 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         if runs and not found.refused
         else RunsIdentifiability(reason=found.refused)
     )
-    remarks = [*found.remarks, *contradicted_units(card.signals, found.rig).values()]
+    units = list(contradicted_units(card.signals, found.rig).values())
+    remarks = list(found.remarks)
     late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else None
     if log is not None and not found.refused:
-        remarks += log_remarks(runs, found.rig, card.signals)
+        units += log_remarks(runs, found.rig, card.signals)
         remarks += hardly_identifiable(runs, found.rig)
     sensors = tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t")
     delays = _delays(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else _exchanged(delays, sensors, log.h)
-    if exchanged:
-        remarks.insert(0, exchanged)
+    remarks = [*([exchanged] if exchanged else []), *units, *remarks]
     of_log = {
         **vars(found),
         "refused": found.refused or seen.reason,
@@ -207,6 +209,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         sensors=sensors,
         delays=delays,
         exchanged=bool(exchanged),
+        other_units=bool(units),
         ways=seen.ways,
         identifiability=seen.identifiability,
         add=tuple(dict.fromkeys(one.add for one in seen.identifiability if one.add)),

@@ -21,9 +21,11 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
+from workbench.documents.plausible import refuse_other_units
 from workbench.documents.reading import as_number, plain, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
+from workbench.steps.moved_scale import Moved, slip_of_scale
 
 DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 
@@ -82,6 +84,14 @@ class Drifted:
                 return verdict
         tested = [one.test.verdict for one in self.tests if one.test.tested]
         return tested[-1] if tested else "not_judged"
+
+    @property
+    def slip(self) -> str:
+        """That the newest log with drift has moved by a slip of unit or scale; "" where not."""
+        found = [one.test.shifts for one in self.tests if one.test.verdict == "drift"]
+        nine = {n: one for n, one in (found[-1] if found else {}).items() if n in NAMES}
+        moved = {name: Moved(one.before, one.after, one.sd) for name, one in nine.items()}
+        return slip_of_scale(moved, self.model.rotary)
 
     @property
     def tested(self) -> bool:
@@ -150,10 +160,12 @@ def drift_of(
     """The runs tested one after the other against the model.
 
     stream: of the same model, what was stored after earlier logs; one of another model is not
-    used, with a remark. Raises BadModel where model and card are not of one kind of machine.
+    used, with a remark. Raises BadModel where model and card are not of one kind of machine, BadLog
+    where a run is in other units than the model's logs.
     """
     settings = settings or DriftSettings()
     _same_machine(model, sources)
+    refuse_other_units([one.log for one in sources.runs], model.log, sources.rig)
     active = replace(active_model(model, key), rig=sources.rig)
     remarks = [*model.read, *sources.remarks]
     if sources.card.name != model.card:

@@ -27,6 +27,10 @@ ALL_FOLLOWED = 0.8  # of a command, that is the velocity
 SPEED_LEFT = 0.7  # of its speed at first, that a body which slows down keeps at most
 GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a drive that is idle
 AT_AN_END = 0.02  # of the travel, within which a body is at its end
+BRAKED = (
+    "F_vp and F_vn hold, beside friction, the braking by the voltage that the motor makes itself,"
+    " k_t k_e / R = k_e force_per_command; log its current to identify friction alone"
+)
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -86,7 +90,7 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
         )
         return
     if rig.kind == "motor" and (share := derivative(motion, logged).share) > ALL_FOLLOWED:
-        yield _said_of_followed(name, share, of_current=rig.command_unit == "A")
+        yield _said_of_followed(name, share, rig.command_unit)
 
 
 def _against_stops(
@@ -107,16 +111,31 @@ def _against_stops(
             )
 
 
-def _said_of_followed(name: str, share: float, *, of_current: bool) -> str:
+def braked_by_its_voltage(logs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
+    """A line where a motor's command is a voltage that mostly is the velocity, as that which the
+    motor makes itself is."""
+    if rig.kind != "motor" or rig.command_unit != "V":
+        return ()
+    log = max(logs, key=len)
+    try:
+        share = derivative(differentiate(log["y"], log.h), log["u"]).share
+    except BadLog:
+        return ()
+    if not share > ALL_FOLLOWED:
+        return ()
+    return (f"{share:.0%} of the command is the velocity; if it is the motor's voltage, {BRAKED}",)
+
+
+def _said_of_followed(name: str, share: float, unit: str) -> str:
     said = f"the velocity follows the {name} ({share:.0%} of it is the velocity alone)"
-    if of_current:  # which is a force: no valve's
+    if unit == "A":  # which is a force: no valve's
         return (
             f"{said}: inertia is hardly identifiable, and a motor that the body turns makes such a"
             " current by itself; log quick strokes that a command drives"
         )
-    return (
-        f'{said}, as of a valve and cylinder: inertia is hardly identifiable; use kind = "velocity"'
-    )
+    valve = f"{said}, as of a valve and cylinder: inertia is hardly identifiable; use kind ="
+    by_voltage = f"; of a motor by its voltage, {BRAKED}" if unit == "V" else ""
+    return f'{valve} "velocity"{by_voltage}'
 
 
 def _said_of_one_way(up: float) -> str:

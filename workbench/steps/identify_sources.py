@@ -14,6 +14,7 @@ from workbench.documents.model import Model
 from workbench.documents.plausible import model_remarks
 from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
+from workbench.steps.hardly_identifiable import braked_by_its_voltage
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify
 from workbench.steps.other_kind import looks_like_velocity
@@ -75,7 +76,7 @@ def identify_sources(
     if posterior_samples is not None:
         model = replace(model, posterior=_posterior(posterior_samples, fit))
     remarks = (
-        *looks_like_velocity(logs, sources.rig, model),
+        *looks_like_velocity(logs, sources.rig, model), *braked_by_its_voltage(logs, sources.rig),
         *surrounding_lines(fit.surroundings, sources.rig),
         *unequal_friction(model.friction, model.effects),
         *sources.remarks, *model_remarks(model), *broken_promises(model),

@@ -14,11 +14,13 @@ from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import of_body, with_motor_force
 from workbench.documents.model import Model
+from workbench.documents.plausible import refuse_other_units
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import (
     force_by_model,
@@ -45,7 +47,8 @@ PREDICTION_COLUMNS = (
 
 @dataclass(frozen=True)
 class Prediction:
-    """Columns of prediction.csv, each (n,); force_simulated is NaN without a command.
+    """Columns of prediction.csv, each (n,); force_simulated is NaN without a command, and of a
+    motor, whose applied force is that of its command.
 
     sliding: True outside the stick band, where the inverse model predicts the force; inside it
     repeats the applied one. drive: what drove the position; the errors are root mean squares [N],
@@ -106,7 +109,9 @@ def predict(
     applied = log.signals.get("F", blank)
     run, refused = _run(model, log, body, chosen, restarts)
     simulated, other = (run if chosen == "command" else None), None
-    if chosen == "force" and model.actuator is not None and "u" in body:
+    if isinstance(plant.actuator, Motor):  # of which the applied force is the command's
+        simulated = None
+    elif chosen == "force" and model.actuator is not None and "u" in body:
         simulated, other = _run(model, body, body, "command", restarts)
     # The velocity as the inverse model takes it, and where it is significant.
     motion = differentiate(body["y"], body.h, how.cutoff, how.method)
@@ -141,13 +146,15 @@ def predict_sources(
 ) -> Predicted:
     """What the model says of the runs that the sources are; see `predict`.
 
-    Raises BadModel where model and card are of unlike machines, and as `predict` does.
+    Raises BadModel where model and card are of unlike machines, BadLog where a run is in other
+    units than the model's logs, and as `predict` does.
     """
     if sources.rig.motion != model.rig.motion:
         raise BadModel(
             f"the model is of a {model.rig.motion} machine, but {sources.card.path} says"
             f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
         )
+    refuse_other_units([one.log for one in sources.runs], model.log, sources.rig)
     found = tuple(predict(model, s.log, drive=drive, window=window) for s in sources.runs)
     of_runs = dict.fromkeys(line for one in found for line in one.remarks)
     refused = dict.fromkeys(one.refused for one in found if one.refused is not None)

@@ -20,7 +20,7 @@ from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
 from workbench.documents.model import FitSummary, Model
-from workbench.documents.plausible import model_remarks
+from workbench.documents.plausible import model_remarks, refuse_other_units
 from workbench.documents.reading import plain, versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
 from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects
@@ -67,7 +67,8 @@ def trace_sources(
 ) -> Traced:  # fmt: skip
     """The trace of the machine that the sources are of; keep_going: whether it is to go on.
 
-    Raises BadLog where a test log is a training log, NotIdentifiable where too little slides.
+    Raises BadLog where a test log is a training log, has other units, or no row that could be
+    judged, NotIdentifiable where too little slides.
     """
     seen = test.runs if test else ()
     if train.rig.kind == "motor" and not train.rig.force_per_command:
@@ -81,15 +82,23 @@ def trace_sources(
             f"{test.runs[0].file}: the card gives it another rig than {train.runs[0].file}; trace"
             " machines one by one"
         )
+    train_logs, test_logs = ([source.log for source in of] for of in (train.runs, seen))
+    refuse_other_units(test_logs, train_logs, train.rig)
     found = trace(
-        [source.log for source in train.runs],
-        [source.log for source in seen],
+        train_logs,
+        test_logs,
         train.rig,
         library,
         np.random.default_rng(seed),
         on_progress=on_progress,
         keep_going=keep_going,
     )
+    if seen and found.after["test"].force_rms is None:
+        raise BadLog(
+            f"{', '.join(dict.fromkeys(source.file for source in seen))}: no row of it could be"
+            " judged, since it nowhere slides long enough; test on a log of motion like that of the"
+            " training logs"
+        )
     remarks = (
         *surrounding_lines(found.surroundings, train.rig),
         *train.remarks, *(test.remarks if test else ()), *_held_out(train),

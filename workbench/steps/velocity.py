@@ -149,7 +149,10 @@ def _errors(test_errors: HeldOut) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class VelocityPrediction:
-    """Measured and simulated position [m] of a run at its times t [s], each (n,)."""
+    """Measured and simulated position [m] of a run at its times t [s], each (n,).
+
+    simulated: NaN while commands act that were given before the log.
+    """
 
     t: Array
     measured: Array
@@ -160,7 +163,11 @@ def predict_velocity(
     model: VelocityModel, sources: Sources, window: float | None = None
 ) -> tuple[VelocityPrediction, ...]:
     """The position of each run by its command, from where it is measured to be, anew after each
-    `window` [s]; raises BadModel where model and card are of unlike machines."""
+    `window` [s].
+
+    As in the fit it begins where commands act no more that were given before the log. Raises
+    BadModel where model and card are of unlike machines.
+    """
     same = ("motion", "command_unit")
     for key in same:
         if getattr(sources.rig, key) != getattr(model.rig, key):
@@ -172,12 +179,15 @@ def predict_velocity(
     record = replace(recorded(logs_of_runs(sources)), u_max=model.command_peak)
     if valve.place:
         record = record.placed(replace(valve, place=0.0), model.travel)
-    for log, e in zip(logs_of_runs(sources), record.errors(valve), strict=True):
+    for run, log, e in zip(record.runs, logs_of_runs(sources), record.errors(valve), strict=True):
         if window is not None and window < 2.0 * log.h:
             raise BadModel(f"window {window:g} s, at least 2 samples ({2 * log.h:g} s) needed")
         size = len(e) if window is None else round(window / log.h)
-        anchors = e[size * (np.arange(len(e)) // size)]
-        out.append(VelocityPrediction(log["t"], log["y"], log["y"] - e + anchors))
+        after = np.arange(len(e)) - run.begin
+        starts = run.begin + size * (np.maximum(after, 0) // size)
+        anchors = e[np.minimum(starts, len(e) - 1)]
+        simulated = np.where(after < 0, np.nan, log["y"] - e + anchors)
+        out.append(VelocityPrediction(log["t"], log["y"], simulated))
     return tuple(out)
 
 
@@ -186,6 +196,7 @@ def prediction_summary(
 ) -> dict[str, float | int | None]:
     """Error of the position [m] over all runs, as `--json` prints it."""
     off = np.concatenate([one.measured - one.simulated for one in runs])
+    off = off[np.isfinite(off)]
     return {
         "samples": len(off),
         "window": window,

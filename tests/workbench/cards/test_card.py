@@ -101,7 +101,17 @@ def test_unknown_key_names_the_nearest(
         ('column = "time_s", ', "", "[signals.t] has no 'column'"),
         ('unit = "V"', 'unit = "V", gain = 0', "gain must not be 0"),
         ('unit = "V"', 'unit = "V", signed = true', "needs bits"),
-        ('name = "bench-a"', 'name = "a/../b"', "[card.name]"),
+        (
+            'name = "bench-a"',
+            'name = "a/../b"',
+            "[card.name] 'a/../b': letters, digits, '_',",
+        ),
+        ('name = "bench-a"', 'name = ""', "[card.name] '': letters, digits, '_', '.' and"),
+        (
+            "[-0.15, 0.15]",
+            '[-0.15, 0.15]\nforce_per_command = "0 N/V"',
+            "rig.force_per_command = 0 N/V: a command without a force drives nothing",
+        ),
         ('unit = "V"', 'unit = "V", gain = true', "[signals.u] gain needs a value, not true"),
         ('unit = "V"', 'unit = "V", gain = [2]', "[signals.u.gain] [2]: a number, or a text with"),
         ('unit = "V"', 'unit = "V", gain = "0 V/V"', "gain must not be 0"),

@@ -132,6 +132,30 @@ def test_its_own_test_finds_a_changed_constant(precision: Precision, tmp_path: P
     assert ctypes.CDLL(str(target)).tested() > 0
 
 
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+def test_a_lost_sample_is_taken_as_it_last_was(lost: float, tmp_path: Path) -> None:
+    what = exported(case("limited").design, compensated=True)
+    inputs = what.test.inputs[:400].copy()
+    inputs[100] = inputs[99]
+    code = library(what, tmp_path, "gcc -O2")
+    held = driven(code, inputs)
+    for at in range(inputs.shape[1]):
+        holed = inputs.copy()
+        holed[100, at] = lost
+        assert np.array_equal(driven(code, holed), held)
+    holed[0] = lost  # before any good one: at rest where it was begun
+    assert np.all(np.isfinite(driven(code, holed)))
+    header = " ".join(c_files(what)[f"{what.program.name}.h"].replace(" * ", "").split())
+    assert "An input that is infinite or no number (NaN: a lost sample) is taken as it" in header
+
+
+def test_what_is_nowhere_read_is_not_in_the_code(tmp_path: Path) -> None:
+    design = case("emps").design  # a motor, whose force only the friction of sliding asks for
+    own = replace(design.compensator, excess=True)
+    what = exported(replace(design, compensator=own), compensated=True)
+    assert library(what, tmp_path, "gcc -O2").tested() == 0  # it compiles with -Werror
+
+
 def test_it_needs_no_header_and_allocates_nothing(tmp_path: Path) -> None:
     files = c_files(exported(case("limited").design, compensated=True))
     for text in files.values():

@@ -166,6 +166,18 @@ def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
 
 
 @pytest.mark.slow
+def test_a_slip_of_unit_replaces_nothing_by_itself(shop: Path, first: Judgement) -> None:
+    slipped = pd.read_csv(shop / "same.csv")
+    slipped["y"] *= 10.0
+    slipped.to_csv(shop / "slipped.csv", index=False)
+    found = Chain(says("drift"), Terms(loop=-10.0))(task(shop, "slipped", first))
+    assert found.verdict == "refused"
+    assert found.reason.startswith("no wear but a slip of unit or scale")
+    assert "every length by the factor 10 " in found.reason
+    assert found.candidate is not None  # which a person may promote
+
+
+@pytest.mark.slow
 def test_a_false_alarm_is_refused_with_its_reason(shop: Path, first: Judgement) -> None:
     found = Chain(says("drift"))(task(shop, "same", first))
     assert found.verdict == "refused"

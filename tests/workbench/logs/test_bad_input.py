@@ -114,6 +114,13 @@ def test_rows_of_another_length(tmp_path: Path, fields: int) -> None:
     assert f"row 57 has {many}, 3 needed (5 such rows)" in message
 
 
+def test_a_row_without_an_end_is_refused_in_our_words(tmp_path: Path) -> None:
+    path = edited(tmp_path, 3, lambda fields: fields * 400_000)
+    message = refusal(path)
+    assert "cannot be cut into rows of" in message and "write one row a line" in message
+    assert "straddling" not in message
+
+
 @pytest.mark.parametrize("fields", [1, 2, 4])
 def test_one_row_of_another_length_is_left_out(tmp_path: Path, fields: int) -> None:
     path = edited(tmp_path, 57, lambda f: [*f, "9"][:fields])
@@ -180,10 +187,23 @@ def test_absurd_values(tmp_path: Path) -> None:
 
 def test_time_going_back_or_repeated(tmp_path: Path) -> None:
     t = signals()["t"]
-    t[50] = t[49]
-    assert "time repeats in row 52 " in refusal(with_columns(tmp_path, t=t))
-    t[50] = t[30]
+    t[50:] += 5.0 * (t[1] - t[0])  # rows are lost, so that the rest are not even
+    t[20] = t[19]
+    assert "time repeats in row 22 " in refusal(with_columns(tmp_path, t=t))
+    t[20], t[50] = 0.5 * (t[19] + t[21]), t[30]
     assert "time goes back in row 52 " in refusal(with_columns(tmp_path, t=t))
+
+
+def test_rows_that_are_stamped_late_together_are_even(tmp_path: Path) -> None:
+    t = signals()["t"]
+    h, late = float(t[1] - t[0]), np.arange(40, len(t), 90)
+    stamped = t.copy()
+    stamped[late] += 1.0 * h  # with the next, which has another position
+    found = read_runs(with_columns(tmp_path, t=stamped), card(tmp_path, CARD))
+    (run,) = found.runs
+    np.testing.assert_allclose(np.diff(run["t"]), h, rtol=1e-3)
+    said = f"{len(late)} rows with the time of the row before and other values: stamped late"
+    assert any(said in one for one in found.remarks)
 
 
 def test_constant_position(tmp_path: Path) -> None:

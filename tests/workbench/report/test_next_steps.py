@@ -146,12 +146,17 @@ def test_a_machine_on_which_a_design_fails_gets_its_own(model: Model, found: Des
     assert taken(then) == "workbench design other.json"
 
 
-def drifted(verdict: str, files: dict[str, str], tested: bool = True) -> Any:
+def drifted(verdict: str, files: dict[str, str], tested: bool = True, slip: str = "") -> Any:
     tests = tuple(
         SimpleNamespace(source=SimpleNamespace(file=name), test=SimpleNamespace(verdict=one))
         for name, one in files.items()
     )
-    return SimpleNamespace(verdict=verdict, tests=tests, tested=tested)
+    return SimpleNamespace(verdict=verdict, tests=tests, tested=tested, slip=slip)
+
+
+def test_a_slip_of_unit_asks_for_the_units_and_no_new_model() -> None:
+    found = drifted("drift", {"b.csv": "drift"}, slip="no wear")
+    assert taken(after_drift(found, ["b.csv"], "emps")) == "workbench doctor b.csv --card emps"
 
 
 @pytest.mark.parametrize(

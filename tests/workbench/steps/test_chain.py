@@ -241,6 +241,14 @@ def test_a_prediction_by_force_drifts_less_in_windows() -> None:
         predict(model, log, window=1e-3)
 
 
+def test_the_force_of_a_motor_is_its_commands_and_no_result() -> None:
+    log = identified().sources[0].log
+    motor = model_of(EMPS, k_a=35.15)
+    found = predict(motor, Log("motor", {key: log[key] for key in ("t", "y", "u")}))
+    assert found.drive == "command" and found.position_rms is not None
+    assert found.force_simulated_rms is None and np.all(np.isnan(found.force_simulated))
+
+
 def test_a_prediction_without_a_command_leaves_its_column_empty() -> None:
     log = identified().sources[0].log
     bare = Log("bare", {key: log[key] for key in ("t", "y", "F")})

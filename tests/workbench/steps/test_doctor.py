@@ -69,6 +69,16 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
 
 
 @pytest.mark.slow
+def test_identify_says_that_a_voltage_brakes(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    voltage = table["u"] + 40.0 * np.gradient(table["y"], table["t"])  # the motor's own, 40 V s/m
+    look(card, {**table, "u": voltage})
+    path = card.path.parent / "run.csv"
+    remarks = identify_sources(read_sources([str(path)], str(card.path))).remarks
+    assert any("if it is the motor's voltage, F_vp and F_vn hold" in one for one in remarks)
+
+
+@pytest.mark.slow
 def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> None:
     card, table = motor
     up = table["u"] > 0
@@ -148,6 +158,17 @@ def test_a_position_ahead_of_its_reference_is_told(
     assert any(said in one for one in found.remarks) == exchanged
     assert ("behind its reference by" in text and "(100% alike)" in text) == (not exchanged)
     assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
+
+
+def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
+    found = look(load_card(card.path), table)
+    text = doctor_view(found, None).text().splitlines()
+    assert text[1].split(maxsplit=1) == [
+        "next", "check the units in the card (see note), then ask again"
+    ]  # fmt: skip
+    assert "signals.y, read in 'parsec': the position covers" in found.remarks[0]
 
 
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:

@@ -6,9 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from identification.drift.drift_result import DriftTest, Statistic
+from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.drift.drift_test import DriftSettings
 from identification.drift.mewma import fresh_state
 from identification.drift.reference_model import OwnLogs
@@ -20,6 +21,7 @@ from workbench.cli import main
 from workbench.documents.model import ParameterCorrelation
 from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
+from workbench.report.drift import drift_sentence, reason_sentence
 from workbench.steps.drift import (
     Drifted,
     Stream,
@@ -101,6 +103,24 @@ def test_an_older_log_is_no_comfort_for_a_newer_one_that_could_see_nothing() -> 
         runs = tuple(OneRun(source, one, False) for one in tests)
         found = Drifted(model, "k", DriftSettings(), runs, Stream(state, ()), ())
         assert found.verdict == verdict
+
+
+def test_a_change_has_the_number_that_the_table_has() -> None:
+    def shift(change: float) -> Shift:
+        return Shift("F_cp", "N", 16.0, 0.1, 16.0 * (1.0 + change), 0.1, change, 0.01, 0.0, 0.3)
+
+    one = Statistic(20.0, 12.0, 1e-6, 1)
+    state, source = fresh_state("k", ()), identified().sources[0]
+    by_log = DriftTest("a", "drift", (shift(0.103),), {"F_cp": shift(0.105)}, {}, one, one, "log",
+                       1.0, 2.0, "", state)  # fmt: skip
+    for test, said in (
+        (by_log, "F_cp +10.5 % ("),
+        (replace(by_log, found_by="mean"), "F_cp +10.3 % (+0.00 % to +30.0 %), by the mean over"),
+    ):
+        runs = (OneRun(source, test, False),)
+        found = Drifted(identified().model, "k", DriftSettings(), runs, Stream(state, ()), ())
+        assert said in drift_sentence(found)
+    assert reason_sentence(by_log, 0.1) == "moved: F_cp 16 -> 17.68 N"
 
 
 def test_the_model_file_carries_its_own_logs_and_older_ones_keep_their_key(tmp_path: Path) -> None:
@@ -257,3 +277,17 @@ def test_a_correlation_that_is_none_is_refused() -> None:
         ParameterCorrelation(("m", "F_cp"), ((1.0,), (1.0,)))
     with pytest.raises(BadModel, match="-1 to 1"):
         ParameterCorrelation(("m", "F_cp"), ((1.0, 2.0), (2.0, 1.0)))
+
+
+@pytest.mark.slow
+def test_a_slip_of_unit_is_called_so_and_not_drift(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slipped = pd.read_csv(shop / "b.csv")
+    slipped["y"] *= 10.0
+    slipped.to_csv(shop / "z.csv", index=False)
+    assert run(shop, tmp_path / "d", "z") == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "In z.csv: no wear but a slip of unit or scale" in said
+    assert "every length by the factor 10 (the unit of the position 1/10" in said
+    assert "workbench doctor" in said

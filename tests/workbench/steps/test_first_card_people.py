@@ -268,3 +268,29 @@ def test_a_column_that_stands_twice_is_in_no_other_unit(
     found = propose(tmp_path, "t,a,b,c,torque_Nm", T, y, y, 57.3 * y, joint["F"])
     said = sorted(found.unused[f"'{one}'"] for one in "abc" if f"'{one}'" in found.unused)
     assert [one.partition("'")[0] for one in said] == ["equals ", "is "]
+
+
+def test_three_currents_whose_sum_is_0_drive_nothing_by_themselves(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    rng, at = np.random.default_rng(4), 12.0 * joint["y"]
+    phases = [
+        joint["F"] * np.sin(at - k * 2.0 * np.pi / 3.0) + 1e-3 * rng.standard_normal(len(T))
+        for k in range(3)
+    ]
+    headers = "t_s,angle_rad,i_u_A,i_v_A,i_w_A"
+    with pytest.raises(BadLog, match="'i_u_A', 'i_v_A', 'i_w_A' are the three phase currents"):
+        propose(tmp_path, headers, T, joint["y"], *phases)
+    found = propose(tmp_path, f"{headers},i_q_A", T, joint["y"], *phases, joint["F"])
+    u = found.signal("u")
+    assert u is not None and u.column == "i_q_A"
+    assert set(found.unused.values()) == {"one of three phase currents, whose sum is 0"}
+
+
+def test_rows_that_were_stamped_late_have_a_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    stamped = T.copy()
+    stamped[70::90] = stamped[71::90]
+    found = propose(tmp_path, "time_s,angle_rad,torque_Nm", stamped, joint["y"], joint["F"])
+    t = found.signal("t")
+    assert t is not None and t.column == "time_s"
+    assert any("stamped late, taken as even rows" in one for one in found.remarks)

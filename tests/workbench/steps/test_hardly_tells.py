@@ -9,7 +9,7 @@ from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS
 from identification.arrays import Array
 from identification.log import Log, Rig
-from workbench.steps.hardly_identifiable import hardly_identifiable
+from workbench.steps.hardly_identifiable import braked_by_its_voltage, hardly_identifiable
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 FORCE = Rig("force", motion="rotary")
@@ -66,3 +66,20 @@ def test_nearly_one_way_is_told_by_its_share() -> None:
 
 def test_where_nothing_is_said_no_run_is_needed() -> None:
     assert hardly_identifiable([], FORCE) == ()
+
+
+def test_a_motor_driven_by_its_voltage_is_braked_by_its_own() -> None:
+    """Of 2 ohm, k_t 30 N/A and k_e 20 V s/m: friction of 16 N and 25 N s/m lies beside 300."""
+    v = np.gradient(SWING, T)
+    force = 2.0 * np.gradient(v, T) + 16.0 * np.sign(v) + 25.0 * v
+    voltage = 2.0 * force / 30.0 + 20.0 * v
+    log = Log("run", {"t": T, "y": SWING + noise(1e-6), "u": voltage + noise(0.02)})
+    (line,) = braked_by_its_voltage([log], MOTOR)
+    assert "% of the command is the velocity; if it is the motor's voltage, F_vp and F_vn" in line
+    assert "k_t k_e / R" in line
+    assert "k_t k_e / R" in " ".join(hardly_identifiable([log], MOTOR))
+    for rig in (replace(MOTOR, command_unit="A"), FORCE):
+        assert braked_by_its_voltage([log], rig) == ()
+        assert "k_t k_e" not in " ".join(hardly_identifiable([log.with_signals(F=voltage)], rig))
+    by_force = Log("run", {"t": T, "y": SWING + noise(1e-6), "u": np.gradient(v, T)})
+    assert braked_by_its_voltage([by_force], MOTOR) == ()

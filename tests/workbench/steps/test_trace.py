@@ -129,6 +129,30 @@ def test_a_test_log_that_is_a_training_log_is_refused() -> None:
         trace_sources(sources(), sources("b.csv", "a"), built_in())
 
 
+@pytest.mark.parametrize(("signal", "factor", "said"), [
+    ("t", 1e3, r"b\.csv: signals\.t: sampled every 2 s, 1000 times more .* ms in place of s;"),
+    ("y", 1e-3, r"b\.csv: signals\.y: the position covers .* less .* m in place of mm;"),
+])  # fmt: skip
+def test_a_test_log_in_other_units_is_refused_by_its_name(
+    signal: str, factor: float, said: str
+) -> None:
+    other = sources("b.csv", "b")
+    log = other.runs[0].log
+    signals = {**log.signals, signal: factor * log[signal]}
+    run = replace(other.runs[0], log=replace(log, name="b.csv", signals=signals))
+    with pytest.raises(BadLog, match=said):
+        trace_sources(sources(), replace(other, runs=(run,)), built_in())
+
+
+def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    without = Errors(None, None, 0.3, None)
+    found = replace(trace_of("none", ()), after={"train": without, "test": without})
+    assert trace_sentence(traced(found, tested=False)).startswith("Open: no row was held out")
+    monkeypatch.setattr(tracing, "trace", lambda *_, **__: found)
+    with pytest.raises(BadLog, match=r"b\.csv: no row of it could be judged"):
+        trace_sources(sources(), sources("b.csv", "b"), built_in())
+
+
 def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
     other = sources("b.csv", "b")
     turned = replace(other, rig=replace(other.rig, motion="rotary"))

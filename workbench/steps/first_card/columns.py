@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +17,15 @@ from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.noise import local_noise
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
+from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header
-from workbench.logs.faulty_rows import several_axes, sound_rows, stretches, told_of_starts
+from workbench.logs.faulty_rows import (
+    late_stamps,
+    several_axes,
+    sound_rows,
+    stretches,
+    told_of_starts,
+)
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
@@ -30,6 +37,8 @@ WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
+AMPERES = ("A", "mA")
+PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
@@ -178,9 +187,22 @@ def columns_of(log: UnknownLog) -> Columns:
         replace(one, x=_on_grid(clock.values, x, step, grid))
         for one, (x, _) in zip(others, whole, strict=True)
     ]
-    distinct, twice = _without_doubles(signals)
+    phases = _phases(signals)
+    left_out |= {one.raw.number: PHASE_CURRENT for one in phases}
+    distinct, twice = _without_doubles([one for one in signals if one not in phases])
     own = tuple(_with_axes(distinct))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Three currents of about one size, whose sum is 0: those of a motor's phases."""
+    currents = [one for one in columns if one.header.unit and one.header.unit.card in AMPERES]
+    for three in combinations(currents, 3):
+        sizes = [float(np.std(one.x)) for one in three]
+        left = float(np.std(np.sum([one.x for one in three], axis=0)))
+        if max(sizes) < TWICE * min(sizes) and left < OF_ACCOUNT * min(sizes):
+            return three
+    return ()
 
 
 def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, ...]]:
@@ -195,6 +217,11 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             runs = stretches(one.values[rows])
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = np.flatnonzero(rows)[longest]
+            even, late = late_stamps(one.values[at])
+            if late:
+                clock = replace(one, values=even, x=even)
+                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
+                        for c in columns], (*said, late)  # fmt: skip
             if len(at) < len(one.values) and _ticks(replace(one, values=one.values[at])):
                 if len(runs) > 1:
                     told = told_of_starts(one.values[rows], runs)

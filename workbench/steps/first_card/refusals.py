@@ -6,7 +6,7 @@ from itertools import permutations
 from identification.errors import BadLog
 from identification.signals.relations import lead
 from workbench.cards.headers import words_of
-from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.columns import PHASE_CURRENT, Column, Columns
 from workbench.steps.first_card.motion_guess import is_current
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.weights import SURE, said
@@ -18,6 +18,14 @@ SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force 
 
 def no_body(columns: Columns) -> BadLog:
     """The one line for a log of which no column moves as a body that is driven."""
+    phases = [o.shown for o in columns.read if columns.left_out.get(o.raw.number) == PHASE_CURRENT]
+    if phases:
+        return BadLog(
+            f"{columns.log.path}: columns {', '.join(phases)} are the three phase currents of a"
+            " motor (their sum is 0), of which none is its force, and no other drive is logged; log"
+            " the current that makes the torque too (the drive's q current), or add a column of it"
+            " by Park's transform with the electrical angle"
+        )
     speeds = [one for one in columns.signals if one.header.speed]
     if speeds and all(said(one, "y") < 0.0 for one in columns.signals):
         one = min(speeds, key=lambda one: one.header.purpose == "reference")
