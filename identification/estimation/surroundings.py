@@ -51,7 +51,8 @@ from identification.thresholds import (
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
-LEAD, LAG = -6.0, 12.0  # samples, between which they are; a current may be as late as a position
+LAG = 12.0  # samples, up to which they are
+LEADS = {False: -6.0, True: -LAG}  # from which; a motor's current may be as late as a position
 FEWEST_WINDOWS = 40  # windows of sliding
 SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
@@ -351,7 +352,7 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
     """
     if not any(len(one.speed) for one in moved):
         return None
-    lead = -LAG if moved[0].held else LEAD
+    lead = LEADS[moved[0].held]
     lags = np.arange(lead, LAG + LAG_STEP / 2, LAG_STEP)
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
