@@ -52,7 +52,10 @@ from identification.thresholds import (
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
-LEADS = {False: -6.0, True: -LAG}  # from which; a motor's current may be as late as a position
+EARLIEST_LAG = {
+    False: -6.0,
+    True: -LAG,
+}  # from which; a motor's current may be as late as a position
 FEWEST_WINDOWS = 40  # windows of sliding
 SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
@@ -352,7 +355,7 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
     """
     if not any(len(one.speed) for one in moved):
         return None
-    lead = LEADS[moved[0].held]
+    lead = EARLIEST_LAG[moved[0].held]
     lags = np.arange(lead, LAG + LAG_STEP / 2, LAG_STEP)
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))

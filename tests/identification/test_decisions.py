@@ -31,7 +31,7 @@ ENOUGH = {
 }  # fmt: skip
 # Where a search begins, what it tries and when it ends.
 STEER = {
-    "FAR_BEYOND", "LAG", "LASTING_SHARE", "LASTING_STEP", "LEAD", "LONG_TIME",
+    "FAR_BEYOND", "LAG", "LASTING_SHARE", "LASTING_STEP", "LONG_TIME",
     "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN",
 }  # fmt: skip
 # What still decides outside of `thresholds`.
