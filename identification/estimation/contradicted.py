@@ -161,9 +161,8 @@ def _of_log(
         return one.log, []
     gains = BEYOND_CHANCE**2 * max(1.0, misfit) ** 2
     log, found = one.log, list[BadSamples]()
-    if not (
-        isinstance(plant.actuator, Motor) and one.walks(drive)
-    ):  # whose noise is of such a size
+    noisy = isinstance(plant.actuator, Motor) and one.walks(drive)  # as much as a wrong sample
+    if not noisy:
         log, found = _without_drive_spikes(_Driven(plant, one, drive, weighted), gains)
     run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
     if run is None or misfit > HOPELESS:

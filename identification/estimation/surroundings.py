@@ -52,10 +52,8 @@ from identification.thresholds import (
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
-EARLIEST_LAG = {
-    False: -6.0,
-    True: -LAG,
-}  # from which; a motor's current may be as late as a position
+# From which, of a measured force and of a motor, whose current may be as late as a position.
+EARLIEST_LAG = {False: -6.0, True: -LAG}
 FEWEST_WINDOWS = 40  # windows of sliding
 SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
