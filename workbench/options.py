@@ -114,7 +114,7 @@ STANDSTILL_OPTION = option(
 )
 TRACKING_OPTION = option(
     "Largest rms error along the smooth reference, relative to its amplitude.",
-    type=POSITIVE, default=0.15,
+    type=POSITIVE, default=0.2,
 )  # fmt: skip
 OVERSHOOT_OPTION = option("Largest overshoot, relative to the step.", type=POSITIVE, default=0.1)
 FORCE_OPTION = option(

@@ -53,7 +53,7 @@ class Limits:
     modulus: float = 0.5
     delay: float = 2.0
     standstill: float = 0.05
-    tracking: float = 0.15
+    tracking: float = 0.2
     overshoot: float = 0.1
     force: float = 1.2
 

@@ -21,7 +21,7 @@ from identification.estimation.regression.weighted_rows import (
     stacked,
 )
 from identification.model.estimates import NORMAL_95
-from identification.thresholds import WORSE
+from identification.thresholds import HALF, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS = (1, 2)
@@ -62,7 +62,8 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
-    the levels are as uncertain as beside viscous friction that is left out."""
+    the levels are as uncertain as beside viscous friction that is left out, where these logs
+    separate the two."""
     every = [fitted(data, used) for used in COLUMN_SETS]
     fits = [one for one in every if _may_be(one) and (1 in one.used or _rubs(every[-1]))]
     rows = stacked(data)
@@ -72,9 +73,10 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     beside = np.zeros(len(best.used))
     for fuller in (one for one in every if set(one.used) > set(best.used)):
         at = [fuller.used.index(column) for column in best.used]
-        more = np.diag(fuller.covariance)[at] - np.diag(best.covariance)
-        off = fuller.theta[at] - best.theta
-        beside = np.maximum(beside, off**2 + np.maximum(more, 0.0))
+        theta, square = fuller.theta[at], np.diag(fuller.covariance)[at]
+        separate = NORMAL_95 * np.sqrt(square) <= HALF * np.abs(theta)
+        wider = (theta - best.theta) ** 2 + np.maximum(square - np.diag(best.covariance), 0.0)
+        beside = np.where(separate, np.maximum(beside, wider), beside)
     covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
     return replace(best, covariance=covariance, share=every[-1].share)
 

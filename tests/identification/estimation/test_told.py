@@ -32,7 +32,6 @@ DIFFERENCES = {
     "workbench/steps/drift.py",
     "workbench/steps/axis_test.py",
     "workbench/jobs/axis_history.py",
-    "workbench/steps/elastic.py",  # two masses of a frequency response, without intervals
 }
 PARAMS = [(key, p) for key, effect in sorted(built_in().items()) for p in effect.params]
 

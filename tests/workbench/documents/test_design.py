@@ -51,7 +51,7 @@ def test_every_parameter_has_its_unit() -> None:
     assert units == {"k_R": "N/m", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"}
     assert pid["dominant"]["w_n"]["unit"] == "rad/s"
     assert pid["reference_rate"]["unit"] == "m/s"
-    assert document["compensator"]["e_T"] == {"value": pytest.approx(0.006), "unit": "m", **BARE}
+    assert document["compensator"]["e_T"] == {"value": pytest.approx(2e-4), "unit": "m", **BARE}
     assert document["compensator"]["friction"]["F_sn"] == {
         "value": None, "unit": "N", **BARE, "reason": "too few breakaways", "assumed": -20.0
     }  # fmt: skip

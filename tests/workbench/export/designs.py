@@ -57,7 +57,7 @@ def case(name: str) -> Case:
     else:
         model = model_of(TABLES["paper_table1" if name == "limited" else name], ACTUATOR)
         if name == "limited":
-            model = replace(model, rig=replace(model.rig, control_limit=0.4))
+            model = replace(model, rig=replace(model.rig, control_limit=0.2))
     return Case(model, designed(model))
 
 

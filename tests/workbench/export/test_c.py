@@ -102,7 +102,7 @@ def test_a_compensator_of_the_excess_alone_is_the_same_program(tmp_path: Path) -
 def test_a_limited_command_reaches_its_limit() -> None:
     one = case("limited")
     run, _ = simulated(one, exported(one.design, "rst", compensated=True), 20_000)
-    assert np.max(np.abs(run.u)) == 0.4
+    assert np.max(np.abs(run.u)) == 0.2
 
 
 @pytest.mark.slow

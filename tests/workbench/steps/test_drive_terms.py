@@ -59,9 +59,14 @@ def compensated(document: dict[str, Any], y_0: float) -> Callable[[float, float,
     C = filtered(of["C"]["b"], of["C"]["a"], 0.0)
     slope = filtered(of["slope"], [1.0], y_0)
 
+    if c["excess"]:
+        p |= {"F_sp": max(p["F_sp"] - p["F_cp"], 0.0), "F_sn": min(p["F_sn"] + p["F_cn"], 0.0)}
+
     def force(r: float, y: float, F: float) -> float:
         v, e_y = slope(A(y)), r - B(y)
-        if v >= p["dv_p"]:
+        if c["excess"] and not p["dv_n"] / N_c <= v <= p["dv_p"] / N_c:
+            raw = 0.0
+        elif v >= p["dv_p"]:
             raw = p["F_cp"]
         elif v <= p["dv_n"]:
             raw = -p["F_cn"]
