@@ -243,6 +243,8 @@ def _of_both(
             continue
         least = 0.0 if coulomb is None or coulomb.low is None else coulomb.low
         other, spread = way * risen[name].value, NORMAL_95 * risen[name].sd
+        if run is coulomb and other + spread <= run.high:
+            continue  # no more is shown than that it is no less than sliding friction
         sizes = (abs(run.low), abs(run.high), other - spread, other + spread)
         low, high = max(min(sizes), least), max(*sizes, least)
         middle, sd = 0.5 * (low + high), 0.5 * (high - low) / NORMAL_95

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from identification.estimation.latent_force import LatentForces
+from identification.thresholds import OF_ACCOUNT
 from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
 from identification.tracing.verdict import listed
@@ -189,6 +190,12 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
     left, noise = found.after["test"].force_rms, force(found.noise_force, rotary)
     if left is None:
         return "Open: no row was held out on which it would show whether something is missing."
+    bound = found.missing[1] if found.missing is not None else 0.0
+    if bound > OF_ACCOUNT:
+        return (
+            f"Open: a force of {100 * bound:.2g} % of friction would not show in these logs, of"
+            f" which the model leaves {force(left, rotary)} and the sensors' noise {noise}."
+        )
     if left <= NOISE * found.noise_force:
         where = "" if found.noise_actuator is not None else " in the equation of motion"
         off = found.after["test"].position_rms

@@ -45,6 +45,13 @@ def test_where_the_run_has_none_it_lies_above_the_coulomb_level(
     assert (found["F_sp"].low, found["F_sp"].high) == pytest.approx((7.8, 12.98), abs=0.01)
 
 
+def test_a_breakaway_that_is_not_above_sliding_friction_shows_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    none = {"F_sp": Estimate(None, "N", reason="2 breakaways", assumed=9.0)}
+    assert limits(monkeypatch, none, {"F_sp": Size(7.5, 0.1)}) == {}
+
+
 def test_without_a_rest_that_ends_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     run = {"F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2)}
     found = limits(monkeypatch, run, {})

@@ -4,6 +4,8 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,6 +253,13 @@ def test_signals_that_no_log_has_are_said_in_words() -> None:
 def test_what_is_left_without_structure_is_not_called_noise() -> None:
     text = trace_sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
     assert text.startswith("No effect is missing that these logs show: what is left (0.07 N")
+
+
+def test_nothing_is_not_said_of_a_force_that_could_not_have_been_seen() -> None:
+    bound: Any = SimpleNamespace(share=lambda level: 0.35, is_a_bound=True)
+    hidden: Any = SimpleNamespace(before=bound, after=bound, lessened=False)
+    text = trace_sentence(traced(replace(trace_of("none", ()), missing_force=hidden)))
+    assert text.startswith("Open: a force of 35 % of friction would not show in these logs")
 
 
 def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
