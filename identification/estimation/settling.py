@@ -96,7 +96,7 @@ def settled(
     sd = dict(zip(near.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     own = {n: x for n, x in zip(near.names, values.tolist(), strict=True) if "." not in n}
     found = estimates(own, sd, events, recorded.rig, recorded.name)
-    found |= _of_both(found, plant, recorded)
+    found |= _of_both(found, plant, recorded, followed=adequate)
     return KarnoppFit(
         friction=plant.friction,
         actuator=plant.actuator,
@@ -222,11 +222,12 @@ def structure_estimates(
 
 
 def _of_both(
-    found: Mapping[str, Estimate], plant: Plant, recorded: RecordedLogs
+    found: Mapping[str, Estimate], plant: Plant, recorded: RecordedLogs, *, followed: bool = False
 ) -> dict[str, Estimate]:
-    """The stick limits of a motor, each midway between the run's, or the Coulomb level where the
-    run has none, and the force at its breakaways: where the force changes between samples the one
-    errs to below and the other to above, and the interval holds both. Ours."""
+    """The stick limits of a motor, each midway between the run's and the force at its breakaways:
+    where the force changes between samples the one errs to below and the other to above, and the
+    interval holds both. followed: the logs are to the noise, so that where the run shows no limit
+    the Coulomb level stands in for it. Ours."""
     if not recorded.by_noisy_command:
         return {}
     risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
@@ -238,7 +239,7 @@ def _of_both(
             if one.value is not None:
                 out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
             continue
-        run = one if one.low is not None else coulomb
+        run = one if one.low is not None or not followed else coulomb
         if run is None or run.low is None or run.high is None:
             continue
         least = 0.0 if coulomb is None or coulomb.low is None else coulomb.low

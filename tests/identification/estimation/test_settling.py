@@ -17,10 +17,11 @@ COULOMB = {"F_cp": Estimate(8.0, "N", 0.1, 7.8, 8.2), "F_cn": Estimate(8.0, "N",
 
 
 def limits(
-    monkeypatch: pytest.MonkeyPatch, found: dict[str, Estimate], risen: dict[str, Size]
-) -> dict[str, Estimate]:
+    monkeypatch: pytest.MonkeyPatch, found: dict[str, Estimate], risen: dict[str, Size],
+    followed: bool = True,
+) -> dict[str, Estimate]:  # fmt: skip
     monkeypatch.setattr(settling, "risen_to", lambda logs, plant: risen)
-    return settling._of_both({**COULOMB, **found}, PLANT, NOISY)
+    return settling._of_both({**COULOMB, **found}, PLANT, NOISY, followed=followed)
 
 
 def test_a_limit_lies_midway_between_the_run_s_and_the_force_at_breakaway(
@@ -43,6 +44,7 @@ def test_where_the_run_has_none_it_lies_above_the_coulomb_level(
     none = {"F_sp": Estimate(None, "N", reason="2 breakaways", assumed=9.0)}
     found = limits(monkeypatch, none, {"F_sp": Size(12.0, 0.5)})
     assert (found["F_sp"].low, found["F_sp"].high) == pytest.approx((7.8, 12.98), abs=0.01)
+    assert limits(monkeypatch, none, {"F_sp": Size(12.0, 0.5)}, followed=False) == {}
 
 
 def test_a_breakaway_that_is_not_above_sliding_friction_shows_none(
