@@ -104,8 +104,8 @@ class HeldOut:
     def share(self) -> float:
         """Share of what was missing on the test logs, that is left."""
         plain = self.plain.model
-        lacks_by_run = plain is not self.model and not plain.imposed and plain.misfit > ADEQUATE
-        by_run = lacks_by_run and not self.model.imposed
+        runs = plain is not self.model and not plain.imposed and not self.model.imposed
+        by_run = runs and plain.misfit > ADEQUATE
         return share_left(self.was, self.now, self.noise, self.coulomb, by_run)
 
     @cached_property
