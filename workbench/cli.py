@@ -3,19 +3,17 @@
 import errno
 import importlib
 import os
-import signal
 import sys
-import threading
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from types import FrameType
+from collections.abc import Sequence
+from contextlib import suppress
 
 import click
 from click.shell_completion import CompletionItem
 
 from identification.errors import NotIdentifiable, UserError
 from workbench.ending import BAD_INPUT, DONE, FAULT, REFUSAL, Refused, Step, step, write_status
+from workbench.termination import Terminated, raised_on_a_signal
 from workbench.threads import one_thread_by_default
 
 COMMANDS = {
@@ -42,7 +40,6 @@ COMMANDS = {
     "work": "Do what was asked for on the page.",
     "token": "Make and revoke the tokens of the page.",
 }
-ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
 TAB_VARIABLE = "_WORKBENCH_COMPLETE"  # set by the shell's completion script
 COMPLETION = {
     "bash": f'eval "$({TAB_VARIABLE}=bash_source workbench)" in ~/.bashrc',
@@ -61,14 +58,6 @@ ADVICE = {
     errno.EPERM: "; check its rights, or choose another folder with --out",
     errno.EROFS: "; choose another folder with --out",
 }
-
-
-class Terminated(KeyboardInterrupt):
-    """The process was asked to end, which it does as on Ctrl-C: what is half written is cleared."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.number = number
 
 
 def module_of(name: str) -> str:
@@ -162,7 +151,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = tuple(sys.argv[1:] if argv is None else argv)
     one_thread_by_default(os.environ)
     try:
-        with _cleared_on_a_signal(), warnings.catch_warnings():
+        with raised_on_a_signal(), warnings.catch_warnings():
             if not _debug(arguments):  # "error" filters, as in the tests, still act
                 warnings.showwarning = _drop_warning
             return _run(arguments)
@@ -181,26 +170,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         with suppress(OSError):  # of a terminal that is gone
             click.echo(one_line(line), err=True, nl=bool(line))
     return status
-
-
-@contextmanager
-def _cleared_on_a_signal() -> Iterator[None]:
-    """Within the block, SIGTERM and SIGHUP raise Terminated, where nobody else handles them."""
-    mine = threading.current_thread() is threading.main_thread()
-    taken = [one for one in ENDING if mine and signal.getsignal(one) is signal.SIG_DFL]
-
-    def end(number: int, _frame: FrameType | None) -> None:
-        for one in taken:
-            signal.signal(one, signal.SIG_IGN)  # a second one must not stop the clearing up
-        raise Terminated(number)
-
-    for one in taken:
-        signal.signal(one, end)
-    try:
-        yield
-    finally:
-        for one in taken:
-            signal.signal(one, signal.SIG_DFL)
 
 
 def _run(arguments: Sequence[str]) -> int:

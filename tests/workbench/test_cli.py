@@ -17,6 +17,7 @@ import pytest
 from identification.errors import BadLog, NotIdentifiable, UserError
 from workbench import cli, commands
 from workbench.ending import Refused, StatusCommand, step
+from workbench.termination import ENDING, Terminated
 
 HEAVY = ("numpy", "scipy", "numba", "pandas", "matplotlib", "pyarrow", "h5py", "rich", "pydantic")
 Fail = Callable[[BaseException | int | None], None]
@@ -181,7 +182,7 @@ def test_returned_status_is_the_exit_status(outcome: Fail, status: int | None) -
         (UserError("a: no column 'y'"), 2, "error: a: no column 'y'"),
         (BadLog("run 3:\n  t goes\r\nback\x1b[1m"), 2, "error: run 3: t goes back\ufffd[1m"),
         (KeyboardInterrupt(), 130, "interrupted"),
-        (cli.Terminated(15), 143, "terminated"),
+        (Terminated(15), 143, "terminated"),
         (click.Abort(), 130, "interrupted"),
         (click.FileError("a.csv", "gone"), 2, "error: Could not open file 'a.csv': gone"),
         (IsADirectoryError(errno.EISDIR, "Is a directory", "x"), 2, "error: x: Is a directory"),
@@ -347,10 +348,10 @@ def test_reader_that_goes_away_is_no_error() -> None:
 
 
 def test_signals_are_as_before_after_a_command(outcome: Fail) -> None:
-    before = [signal.getsignal(one) for one in cli.ENDING]
+    before = [signal.getsignal(one) for one in ENDING]
     outcome(None)
     cli.main(["probe"])
-    assert [signal.getsignal(one) for one in cli.ENDING] == before
+    assert [signal.getsignal(one) for one in ENDING] == before
 
 
 def test_a_signal_that_is_ignored_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
