@@ -25,7 +25,7 @@ from identification.estimation.windowed_run.refinement import (
     Effort,
     HaltedRefit,
     Refit,
-    onward,
+    descended,
     refit,
 )
 from identification.estimation.windowed_run.run_errors import misfit
@@ -95,13 +95,23 @@ def fitted_structure(
                 return model.refined(done)
         done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
-        if smooth and done.misfit > COMPLETE and not hopeless:
-            again = replace(onward(done.plant, logs, drive), prior=prior)
-            done = again if again.misfit < done.misfit else done
-        return model.refined(done)
+        if smooth and not (hopeless and effects):
+            done = _from_far_off(done, [] if effects else [plant], recorded)
+        return model.refined(replace(done, prior=prior))
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
         return replace(model, plant=best, misfit=least)
+
+
+def _from_far_off(done: Refit, others: Sequence[Plant], recorded: RecordedLogs) -> Refit:
+    """A refinement, where it leaves more than noise the best that windows that grow lead to from
+    it, then from the others."""
+    for plant in (done.plant, *others):
+        if done.misfit <= COMPLETE:
+            break
+        again = descended(plant, recorded.logs, recorded.drive)
+        done = again if again.misfit < done.misfit else done
+    return done
 
 
 def _best_so_far(
@@ -174,7 +184,8 @@ def _from_first_estimate(
         return model
     try:
         band = max(plant.friction.dv_p, -plant.friction.dv_n)
-        return model.refined(refit(plant, recorded.logs, recorded.drive, prior={}, band=band))
+        done = refit(plant, recorded.logs, recorded.drive, prior={}, band=band)
+        return model.refined(_from_far_off(done, [], recorded))
     except Halted as halted:
         best, least = _best_so_far(plant, None, halted, recorded)
         return replace(model, plant=best, misfit=least)

@@ -51,16 +51,12 @@ from identification.progress import Halted
 from identification.simulation.effect_table import LONGEST_BRISTLE
 from identification.thresholds import ADEQUATE, COMPLETE, HOPELESS
 
-# Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
-# where a stop comes late, no more than its own window is lost, so the minimum is wide.
-APPROACH_WINDOWS = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
-APPROACH_SAMPLES = 20  # that such a window has at least
-# Of a parameter, or of so much of its unit, that it changes in them
-APPROACH_REACH, LEAST_OF_UNIT = 0.4, 0.5
+# Of `descended`: windows [s] in which hardly a stop is lost first, samples that each has at least,
+# how often each is gone through, since what a plant loses by chance is judged by the plant; errors
+# count in full within so many deviations
+GROWING_WINDOWS, FEWEST_IN_WINDOW = (0.1, 0.3, 1.0, RUN_WINDOW), 20
+PASSES, IN_FULL_WITHIN = 2, 10.0
 PASSING = 0.03  # share of the cost, below which a step of an approach is the last
-REACHED = 60.0  # misfit up to which short windows may reach the minimum
-# Of `onward` at most, each to leave this share of the misfit before
-ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
 # At most, of a refinement, of one on a bristle and of a quick one
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
@@ -107,7 +103,7 @@ class HaltedRefit(Halted):
         self.plant = plant
 
 
-Effort = Literal["quick", "near", "far", "rough", "whole", "long"]
+Effort = Literal["quick", "near", "rough", "whole", "long"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +160,8 @@ class _Unknowns:
         return misfit(self.plant_at(x), self.logs, self.drive, bristle)
 
     def refined(
-        self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
-        reach: Array | float = np.inf, little: float | None = None,
-    ) -> Minimum:  # fmt: skip
+        self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE
+    ) -> Minimum:
         """The nearest minimum over windows of so many seconds; tie: the regression is the prior."""
         now = self.plant_at(x)
         errors_of = judge(now, self.logs, self.drive, seconds, bristle)
@@ -179,10 +174,19 @@ class _Unknowns:
             pull = (self.full(at)[tied] - self.x0[tied]) / (TRUST * self.trust[tied])
             return np.concatenate([r, pull]) if tie else np.asarray(r)
 
-        last = self.little if little is None else little
-        found = gauss_newton(bent, x, self.steps, reach=reach, little=last)
+        found = gauss_newton(bent, x, self.steps, little=self.little)
         self.reached[:] = [found.x]
         return found
+
+    def descended(self, x: Array, seconds: float) -> Array:
+        """Where no damping leads further down over windows of so many seconds."""
+        errors_of = judge(self.plant_at(x), self.logs, self.drive, seconds)
+        found = gauss_newton(
+            lambda at: soft(errors_of(self.plant_at(at)), IN_FULL_WITHIN), x,
+            step_by=ROUGH_STEP, rough=True,
+        )  # fmt: skip
+        self.reached[:] = [found.x]
+        return found.x
 
 
 def refit(
@@ -194,8 +198,8 @@ def refit(
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
     steps from the plant as it is, "near" goes on from there, "long" to the end over whole runs, if
-    these are followed, "far" comes there through short windows, "rough" searches the band first and
-    goes on while much is gained, "whole" as long as anything is. Sources: multiple shooting, Bock
+    these are followed, "rough" searches the band first and goes on while much is gained, "whole" as
+    long as anything is. Sources: multiple shooting, Bock
     (1983); Levenberg (1944), Marquardt (1963); Cauchy's weights, Holland, Welsch (1977);
     covariance, Liang, Zeger (1986): `README.md`, (5), (8) to (10).
     """
@@ -288,10 +292,6 @@ def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
     x = unknowns.start
     if effort in ("rough", "whole"):
         x = unknowns.refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
-    for seconds, part in APPROACH_WINDOWS if effort == "far" else ():
-        short = max(seconds, *(APPROACH_SAMPLES * one.log.h for one in unknowns.logs))
-        reach = APPROACH_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
-        x = unknowns.refined(x, short, False, part, reach=reach, little=PASSING).x
     return unknowns.refined(x, RUN_WINDOW, True, HALF_SHARE)
 
 
@@ -305,30 +305,19 @@ def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, floa
     return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
 
 
-def briefly(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
-    """The plant refined through short windows, with directions that may be unequal."""
+def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
+    """The plant refined from far off, through windows that grow, with directions that may be
+    unequal. Ours: `README.md`, (7)."""
     held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
-    return refit(plant, logs, drive, prior=held, effort="far")
-
-
-def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
-    """The plant refined through short windows while that helps. Ours."""
-    best: Refit | None = None
-    left_by = misfit(plant, logs, drive)
-    for _ in range(ONWARD_ROUNDS):
-        try:
-            found = briefly(plant, logs, drive)
-        except Halted:
-            if best is None:
-                raise
-            break
-        gained = found.misfit < ONWARD_GAIN * left_by
-        best = found if best is None or found.misfit < best.misfit else best
-        if not gained or not COMPLETE < best.misfit < REACHED:
-            break
-        plant, left_by = best.plant, best.misfit
-    assert best is not None
-    return best
+    unknowns = _Unknowns.of(plant, logs, drive, held, REFIT_STEPS, 0.0)
+    x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
+    try:
+        for seconds in GROWING_WINDOWS:
+            for _ in range(PASSES):
+                x = unknowns.descended(x, max(seconds, shortest))
+        return refit(unknowns.plant_at(x), logs, drive, prior=held, effort="near")
+    except Halted:
+        raise HaltedRefit(unknowns.plant_at(x)) from None
 
 
 def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | None:

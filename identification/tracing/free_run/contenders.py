@@ -9,7 +9,7 @@ from identification.effects._base import MAX_SIGNALS, Acting, Effect
 from identification.errors import UserError
 from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD, by_load
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
-from identification.estimation.windowed_run.refinement import Refit, briefly, refit
+from identification.estimation.windowed_run.refinement import Refit, descended, refit
 from identification.estimation.windowed_run.run_errors import judge, loss
 from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import RUN_WINDOW
@@ -89,7 +89,7 @@ def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
-        return plant if on_bristle(plant) else briefly(plant, setting.short, setting.drive).plant
+        return plant if on_bristle(plant) else descended(plant, setting.short, setting.drive).plant
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))

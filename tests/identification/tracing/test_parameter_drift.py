@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.regression.weighted_rows import Rows
-from identification.tracing.parameter_drift import changes
-from tests.identification.motor_logs import made, seen
+from identification.estimation.structure_fit import FittedStructure
+from identification.tracing.parameter_drift import changes, is_refined
+from identification.tracing.result import Change
+from tests.identification.motor_logs import NINE, made, plant, seen
 
 
 def trained() -> tuple[RowFit, Rows]:
@@ -54,3 +57,17 @@ def test_a_change_within_the_error_of_the_training_is_none() -> None:
     ((name, *_),) = found(mine, rows, 0.5)
     assert name == "F_cp"
     assert found(vague, rows, 0.5) == []
+
+
+@pytest.mark.parametrize(
+    ("misfit", "refined", "same"),
+    [(1.0, 4.0, True), (1.0, 3.7, False), (9.0, 4.0, False)],  # the last run does not follow
+)
+def test_what_the_run_has_already_has_not_changed(
+    misfit: float, refined: float, same: bool
+) -> None:
+    """The position's noise biases the equations, which differ from the test logs, not the run."""
+    friction = replace(NINE, m=refined)
+    stage, outcomes = first_stage([seen(made(3))], by_command=False)
+    model = FittedStructure(stage, outcomes, replace(plant(), friction=friction), {}, False, misfit)
+    assert is_refined(Change("m", "kg", 3.7, 4.01, 0.04), model) is same

@@ -15,10 +15,11 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.refinement import onward, refit
-from identification.estimation.windowed_run.run_errors import mean_loss
+from identification.estimation.windowed_run.refinement import HaltedRefit, descended, refit
+from identification.estimation.windowed_run.run_errors import mean_loss, misfit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.progress import Halt
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
@@ -64,16 +65,44 @@ def test_effects_are_refined_with_the_nine() -> None:
     assert 0 < found.sd["spring.k"] < 1.0
 
 
+@pytest.mark.parametrize(
+    ("seed", "off"),
+    [
+        (2, (1.2, 1.1, 0.9, 0.9, 1.1, 0.3, 3.0, 1.4, 0.7)),
+        (3, (1.0, 1.01, 0.99, 0.99, 1.01, 1.6, 0.5, 1.15, 0.9)),
+        (4, (1.05, 1.05, 0.95, 0.9, 1.1, 2.0, 0.4, 1.3, 0.8)),
+    ],
+)
+def test_a_motor_far_off_comes_to_its_parameters_through_windows_that_grow(
+    seed: int, off: tuple[float, ...]
+) -> None:
+    one = seen(made(seed))
+    begun = replace(plant(), friction=Karnopp.from_array(NINE.array * off))
+    assert refit(begun, [one], "command", prior={}, effort="near").misfit > 10.0
+    found = descended(begun, [one], "command")
+    assert found.misfit < 1.05
+    assert np.allclose(found.plant.friction.array, NINE.array, rtol=0.02)
+
+
+def test_a_descent_that_is_halted_gives_what_it_has_come_to() -> None:
+    one, asked = seen(made(2)), iter([True] * 200)
+    halted = replace(one, halt=Halt(lambda: next(asked, False)))
+    begun = replace(plant(), friction=ROUGH)
+    with pytest.raises(HaltedRefit) as ended:
+        descended(begun, [halted], "command")
+    assert misfit(ended.value.plant, [one], "command") < misfit(begun, [one], "command")
+
+
 @pytest.mark.method
 @pytest.mark.parametrize("seed", [2, 3])
-def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
+def test_windows_that_grow_lead_where_long_ones_lead_astray(seed: int) -> None:
     warm = {"a": 0.3, "b": 0.2, "tau": 6.0, "asymmetry": 0.1}
     one = seen(made(seed, {"warmup": warm}))
     rough = plant({"warmup": {"a": 0.25, "b": 0.1, "tau": 7.0}})
     off = NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.15, 0.85, 1.05, 0.96)
     begun = replace(rough, friction=Karnopp.from_array(off))
     astray = refit(begun, [one], "command", prior=even(begun), effort="near")
-    found = onward(begun, [one], "command")
+    found = descended(begun, [one], "command")
     assert found.misfit < 1.1 < 5.0 < astray.misfit
     values = found.plant.effects[0].values
     assert values["asymmetry"] == pytest.approx(0.1, abs=2e-3)  # begun as none
@@ -84,7 +113,7 @@ def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
 @pytest.mark.slow
 def test_a_shape_other_than_the_asymmetry_stays_at_its_default() -> None:
     one = seen(made(3, {"stribeck": {"F_s": 3.0, "v_s": 0.02}}))
-    found = onward(plant({"stribeck": {"F_s": 2.5, "v_s": 0.025}}), [one], "command")
+    found = descended(plant({"stribeck": {"F_s": 2.5, "v_s": 0.025}}), [one], "command")
     assert found.misfit < 1.1
     assert found.plant.effects[0].values["delta"] == 2.0
 
