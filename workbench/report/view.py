@@ -136,9 +136,14 @@ class View:
         first, rest = self.parts[: self.then_below], self.parts[self.then_below :]
         return screen(self.sentence, *first, *map(next_step, then), *rest, *where)
 
+    @cached_property
+    def drawn(self) -> Sequence[Section]:
+        """The sections of the page."""
+        return self.sections()
+
     def page(self) -> str:
         """The result as a page of HTML that needs no network."""
-        return page(self.title, self.lead or self.sentence, self.sections(), self._then(None))
+        return page(self.title, self.lead or self.sentence, self.drawn, self._then(None))
 
     def html(self) -> str:
         """The result for a notebook: all that a terminal shows, uncut."""
