@@ -43,9 +43,7 @@ def read_result(path: Path | Stored, kind: type[Value], schema: str, around: Any
 
 def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
     """The JSON object in the file, or stored; raises BadModel where it is not of that schema."""
-    raw = _read_json(path)
-    if not isinstance(raw, Mapping):
-        raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a {schema} file")
+    raw = read_document(path)
     found = raw.get("schema")
     if found == schema:
         return raw
@@ -81,12 +79,11 @@ def validated(
         raise BadModel(f"{path}: {error}") from None
 
 
-def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
-    """The JSON object in the file, unchecked but for its schema; raises BadModel in one line."""
+def read_document(path: Path | Stored) -> dict[str, Any]:
+    """The JSON object in the file, or stored, unchecked; raises BadModel in one line."""
     raw = _read_json(path)
-    if not isinstance(raw, dict) or (schema is not None and raw.get("schema") != schema):
-        needed = "a JSON object" if schema is None else f"a {schema} file"
-        raise BadModel(f"{path}: holds {_shown(raw)}; {needed} needed")
+    if not isinstance(raw, dict):
+        raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a result's file")
     return raw
 
 
