@@ -33,12 +33,9 @@ class Stored:
         return self.name
 
 
-def read_result(path: Path | Stored, kind: type[Value], schema: str, around: Any = None) -> Value:
-    """The result of dataclass `kind` in the JSON file `path`, or of one that is stored.
-
-    Raises as `read_raw` and `validated`.
-    """
-    return validated(read_raw(path, schema), path, kind, around)
+def read_result(path: Path, kind: type[Value], schema: str) -> Value:
+    """The result of dataclass `kind` in the JSON file; raises as `read_raw` and `validated`."""
+    return validated(read_raw(path, schema), path, kind)
 
 
 def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
@@ -190,11 +187,12 @@ PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
 
 def versions() -> dict[str, str]:
     """Versions of our package and of those that its numbers hang on."""
-    return {name: _version(name) for name in PACKAGES}
+    return {name: installed(name) or "unknown" for name in PACKAGES}
 
 
-def _version(name: str) -> str:
+def installed(name: str) -> str | None:
+    """The version of a package; None where it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
-        return "unknown"
+        return None
