@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 WIDEST = 96  # characters of a line of numbers
-HELD = "\0"  # a blank within a value, at which no line ends
+KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
 
 
 def filled(template: str, *, markup: bool = False, **values: Any) -> str:
@@ -37,9 +37,9 @@ def _environment(markup: bool) -> "Environment":
 
 def rows(values: Iterable[str]) -> list[str]:
     """Values with commas between them, in lines."""
-    whole = ", ".join(value.replace(" ", HELD) for value in values)
+    whole = ", ".join(value.replace(" ", KEPT_BLANK) for value in values)
     lines = textwrap.wrap(whole, WIDEST, break_long_words=False, break_on_hyphens=False)
-    return [line.replace(HELD, " ") for line in lines]
+    return [line.replace(KEPT_BLANK, " ") for line in lines]
 
 
 def title_of(what: Exported) -> str:
