@@ -8,8 +8,9 @@ from pathlib import Path
 from identification.errors import UserError
 
 CARD_FILE = "card.toml"
-REPORT_FILE = "report.html"
 """Name of a card in a machine's folder."""
+
+REPORT_FILE = "report.html"
 
 LOGS = "logs"
 """Name of the folder of a machine's logs, beside its card."""

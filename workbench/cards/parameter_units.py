@@ -99,11 +99,3 @@ def converted(written: Estimate, found: Estimate, where: str) -> str | None:
         f" {value:.4g} {found.unit}, {times} of the number that stands there; if only the unit was"
         f" changed, write {found.unit!r} again"
     )
-
-
-def all_converted(
-    written: Mapping[str, Estimate], found: Mapping[str, Estimate], table: str
-) -> list[str]:
-    """`converted` of each estimate in a table."""
-    said = (converted(written[name], found[name], f"[{table}.{name}]") for name in found)
-    return [line for line in said if line]

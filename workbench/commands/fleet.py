@@ -1,6 +1,5 @@
 """`workbench fleet`: the logs of many machines on a Dask cluster."""
 
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
@@ -163,11 +162,8 @@ def _recorder(where: str | None) -> "Iterator[Recorder]":
 
 
 def _cluster(given: FleetOptions) -> Any:
-    from workbench.fleet.cluster import cluster_at, local_cluster
+    from workbench.fleet.cluster import cluster_at, cores, local_cluster
 
     if given.address is not None:
         return cluster_at(given.address, given.timeout)
-    cores = os.cpu_count() or 1
-    if hasattr(os, "sched_getaffinity"):  # those that this process may use
-        cores = len(os.sched_getaffinity(0))
-    return local_cluster(given.workers or cores, given.attempts)
+    return local_cluster(given.workers or len(cores()), given.attempts)

@@ -130,7 +130,7 @@ def add(
     from workbench.cards.own_effects import library
     from workbench.documents.design_file import read_design
     from workbench.documents.model_file import read_model
-    from workbench.documents.reading import read_document
+    from workbench.documents.reading import read_document, read_raw
     from workbench.registry.values import Candidate
 
     remarks = list(read_model(model_file, library(effects)).read)
@@ -139,7 +139,7 @@ def add(
     candidate = Candidate(
         read_document(model_file),
         None if design_file is None else read_document(design_file),
-        None if validation is None else read_document(validation, "validation/1"),
+        None if validation is None else read_raw(validation, "validation/1"),
     )
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where, create=True) as found:

@@ -38,8 +38,7 @@ def command(given: JobOptions) -> int:
     from workbench.jobs.worker import worker
 
     with worker(given) as found:
-        done = found.once()
-    judged, alarms = done.judged, done.alarms
+        judged, alarms = found.once()
     then = after_pass(judged, given.where)
     emit({**vars(judged), "alarms": alarms}, lambda: pass_view(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]

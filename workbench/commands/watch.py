@@ -67,14 +67,13 @@ def _once(found: "Worker") -> bool:
     from identification.errors import UserError
 
     try:
-        done = found.once()
+        judged, alarms = found.once()
     except (UserError, OSError, MemoryError) as error:
         found.report("pass_failed", reason=" ".join(str(error).split()))
         return False
     except Exception:  # a fault of ours in one pass must not end those to come
         found.report("fault_of_ours", traceback=traceback.format_exc())
         return False
-    judged, alarms = done.judged, done.alarms
     found.report("pass_done", judged=len(judged.outcomes), growing=judged.growing,
                  busy=judged.busy, failed=dict(judged.failed),
                  alarms_waiting=alarms.waiting if alarms else 0)  # fmt: skip

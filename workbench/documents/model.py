@@ -17,7 +17,7 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import Shown, in_unit, shown
+from workbench.cards.parameter_units import in_unit, shown
 from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through, in_units, no_key
 from workbench.documents.drive import Present, PresentFile, present_of
 from workbench.documents.reading import PLACEHOLDER, as_number
@@ -336,12 +336,7 @@ class Model:
         """The controller that the machine has now; None where its card named none."""
         if self.controller is None:
             return None
-        return present_of(self.controller, self.drive_units, "controller")
-
-    @property
-    def drive_units(self) -> Shown:
-        """Units of what its drive runs."""
-        return shown(self.rotary, self.rig.command_unit)
+        return present_of(self.controller, shown(self.rotary, self.rig.command_unit), "controller")
 
     @property
     def rotary(self) -> bool:

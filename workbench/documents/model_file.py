@@ -38,9 +38,13 @@ def read_model(path: Path | Stored, library: Library | None = None) -> Model:
     """
     raw = read_raw(path, MODEL_SCHEMA)
     rig = raw.get("rig")
-    if library is None:
-        library = _installed() if raw.get("effects") else built_in()
-    around = around_in(rig, "motion", rig, "command_unit")._replace(library=library)
+    if library is None and raw.get("effects"):
+        from workbench.cards import own_effects  # with it comes numba
+
+        library = own_effects.library()
+    around = around_in(rig, "motion", rig, "command_unit")._replace(
+        library=built_in() if library is None else library
+    )
     found = validated(raw, path, Model, around)
     both = tuple(pairs(raw, model_document(found)))
     try:
@@ -48,9 +52,3 @@ def read_model(path: Path | Stored, library: Library | None = None) -> Model:
     except BadModel as error:
         raise BadModel(f"{path}: {error}") from None
     return replace(found, read=said_of(both))
-
-
-def _installed() -> Library:
-    from workbench.cards.own_effects import library
-
-    return library()

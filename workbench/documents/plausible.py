@@ -154,6 +154,18 @@ def refuse_other_units(
         _refuse_apart("travel", _travel(log), travels, rig, said)
 
 
+def refuse_other_machine(of_model: Rig, of_logs: Rig, card: str, *keys: str) -> None:
+    """Raises BadModel where the logs' rig, by their card, is another by one of these keys."""
+    for key in keys:
+        own, other = getattr(of_model, key), getattr(of_logs, key)
+        if own != other:
+            what = f"a {own} machine" if key == "motion" else f"a rig with {key} {own!r}"
+            raise BadModel(
+                f"the model is of {what}, but {card} says {key} = {other!r}; give the model and the"
+                " card of one machine"
+            )
+
+
 def _refuse_apart(quantity: str, value: float, known: Sequence[float], rig: Rig, said: str) -> None:
     low, high = _extremes(known)
     if value <= 0.0 or low <= 0.0 or low / _OTHER_UNIT < value < high * _OTHER_UNIT:

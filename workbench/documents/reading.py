@@ -33,19 +33,14 @@ class Stored:
         return self.name
 
 
-def read_result(path: Path | Stored, kind: type[Value], schema: str, around: Any = None) -> Value:
-    """The result of dataclass `kind` in the JSON file `path`, or of one that is stored.
-
-    Raises as `read_raw` and `validated`.
-    """
-    return validated(read_raw(path, schema), path, kind, around)
+def read_result(path: Path, kind: type[Value], schema: str) -> Value:
+    """The result of dataclass `kind` in the JSON file; raises as `read_raw` and `validated`."""
+    return validated(read_raw(path, schema), path, kind)
 
 
 def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
     """The JSON object in the file, or stored; raises BadModel where it is not of that schema."""
-    raw = _read_json(path)
-    if not isinstance(raw, Mapping):
-        raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a {schema} file")
+    raw = read_document(path)
     found = raw.get("schema")
     if found == schema:
         return raw
@@ -81,12 +76,11 @@ def validated(
         raise BadModel(f"{path}: {error}") from None
 
 
-def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
-    """The JSON object in the file, unchecked but for its schema; raises BadModel in one line."""
+def read_document(path: Path | Stored) -> dict[str, Any]:
+    """The JSON object in the file, or stored, unchecked; raises BadModel in one line."""
     raw = _read_json(path)
-    if not isinstance(raw, dict) or (schema is not None and raw.get("schema") != schema):
-        needed = "a JSON object" if schema is None else f"a {schema} file"
-        raise BadModel(f"{path}: holds {_shown(raw)}; {needed} needed")
+    if not isinstance(raw, dict):
+        raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a result's file")
     return raw
 
 
@@ -193,11 +187,12 @@ PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
 
 def versions() -> dict[str, str]:
     """Versions of our package and of those that its numbers hang on."""
-    return {name: _version(name) for name in PACKAGES}
+    return {name: installed(name) or "unknown" for name in PACKAGES}
 
 
-def _version(name: str) -> str:
+def installed(name: str) -> str | None:
+    """The version of a package; None where it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
-        return "unknown"
+        return None

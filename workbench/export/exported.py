@@ -1,9 +1,9 @@
 """What is exported: a design's controller as a program, with the vector that tests it, and what
 `workbench validate` has said of the design."""
 
-import json
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +33,7 @@ from identification.errors import BadModel
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
-from workbench.files import RESULT_BYTES
+from workbench.documents.reading import read_document
 from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop
 
@@ -233,7 +233,9 @@ def validation_line(found: Design, design_file: Path) -> str:
     near = {*folder.glob("validation.json"), *folder.parent.glob("*/validation.json")}
     own = design_digest(found)
     for path in sorted(near, key=lambda one: one.stat().st_mtime, reverse=True):
-        validation = _read(path)
+        validation = dict[str, Any]()
+        with suppress(BadModel):  # a file that may be anything
+            validation = read_document(path)
         if validation.get("design") != own:
             continue
         if validation.get("passed"):
@@ -241,14 +243,3 @@ def validation_line(found: Design, design_file: Path) -> str:
         where = f"{path.parent.name}/{path.name}"
         return f"its validation did NOT pass ({where}): do not run it on the machine before it does"
     return "no validation of this design lies near it: workbench validate MODEL DESIGN checks it"
-
-
-def _read(path: Path) -> dict[str, object]:
-    """A file that may be anything."""
-    try:
-        if path.stat().st_size > RESULT_BYTES:
-            return {}
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}

@@ -1,5 +1,6 @@
 """Templates of code filled in, and numbers in lines."""
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.metadata import version
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 WIDEST = 96  # characters of a line of numbers
+KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
 
 
 def filled(template: str, *, markup: bool = False, **values: Any) -> str:
@@ -35,16 +37,9 @@ def _environment(markup: bool) -> "Environment":
 
 def rows(values: Iterable[str]) -> list[str]:
     """Values with commas between them, in lines."""
-    lines, line = [], ""
-    whole = list(values)
-    for at, value in enumerate(whole):
-        entry = value + ("," if at + 1 < len(whole) else "")
-        if line and len(line) + 1 + len(entry) > WIDEST:
-            lines.append(line)
-            line = entry
-        else:
-            line = f"{line} {entry}".strip()
-    return [*lines, line] if line else lines
+    whole = ", ".join(value.replace(" ", KEPT_BLANK) for value in values)
+    lines = textwrap.wrap(whole, WIDEST, break_long_words=False, break_on_hyphens=False)
+    return [line.replace(KEPT_BLANK, " ") for line in lines]
 
 
 def title_of(what: Exported) -> str:

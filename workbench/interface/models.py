@@ -5,7 +5,6 @@ import math
 import os
 import time
 import warnings
-from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,11 +40,12 @@ class _OfModel(Result):
     """A result that holds the model of a machine; `card` by which its logs were read."""
 
     card: Card
+    found: Identified | Traced
 
     @property
-    @abstractmethod
     def model(self) -> Model:
         """The model of the machine, in SI."""
+        return self.found.model
 
     @property
     def parameters(self) -> "pd.DataFrame":
@@ -79,10 +79,6 @@ class IdentifyResult(_OfModel):
     found: Identified
 
     @property
-    def model(self) -> Model:
-        return self.found.model
-
-    @property
     def remarks(self) -> tuple[str, ...]:
         """What to know of the logs and the fit, a line each."""
         return (*self.found.remarks, *self.model.fit.remarks)
@@ -111,10 +107,6 @@ class TraceResult(_OfModel):
 
     _command = "trace"
     found: Traced
-
-    @property
-    def model(self) -> Model:
-        return self.found.model
 
     @property
     def verdict(self) -> str:

@@ -20,7 +20,7 @@ from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.loop_figures import common_reference, tested_of
-from workbench.steps.predict import default_drive, predict
+from workbench.steps.predict import default_drive, pooled, predict
 from workbench.steps.validate import validate
 
 WINDOW = 2.0  # s between fresh starts of a free run, as everywhere on held-out logs
@@ -119,23 +119,14 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
     for log in logs:
         window = WINDOW if log.duration >= 2 * WINDOW else None
         one = predict(model, log, drive=drive, window=window)
-        positions.append((len(log), None if model.by_equation else one.position_rms))
-        forces.append((len(log), one.force_predicted_rms))
-    return HeldOut(_pooled(positions), _pooled(forces))
+        positions.append((None if model.by_equation else one.position_rms, len(log)))
+        forces.append((one.force_predicted_rms, len(log)))
+    return HeldOut(pooled(positions), pooled(forces))
 
 
 def contest_document(found: Contest) -> dict[str, Any]:
     """The contest as the registry keeps it."""
     return asdict(found)
-
-
-def _pooled(found: Sequence[tuple[int, float | None]]) -> float | None:
-    known = [(n, value) for n, value in found if value is not None]
-    if not known:
-        return None
-    total = sum(n for n, _ in known)
-    with np.errstate(over="ignore"):
-        return float(np.sqrt(sum(n * value**2 for n, value in known) / total))
 
 
 def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms, rotary: bool) -> str:

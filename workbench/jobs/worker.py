@@ -22,14 +22,6 @@ from workbench.registry.store import Registry
 
 
 @dataclass(frozen=True)
-class Done:
-    """What a pass did, and what became of the alarms; None without a webhook."""
-
-    judged: PassReport
-    alarms: Delivery | None
-
-
-@dataclass(frozen=True)
 class Worker:
     """One worker: `once` is a pass with its alarms and metrics."""
 
@@ -41,8 +33,9 @@ class Worker:
     figures: MachineFigures
     stop: Callable[[], bool]
 
-    def once(self) -> Done:
-        """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
+    def once(self) -> tuple[PassReport, Delivery | None]:
+        """One pass, and what became of the alarms, None without a webhook; raises BadRoot,
+        RegistryAway, and OSError where metrics cannot be written."""
         given, database = self.options, self.registry.database
         settings = PassSettings(
             owner=self.owner,
@@ -65,7 +58,7 @@ class Worker:
         self.figures.passed(clock(), len(done.failed))
         if given.metrics is not None:
             write_metrics(given.metrics, self.figures)
-        return Done(done, alarms)
+        return done, alarms
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from workbench.jobs.metrics import PREFIX, MachineFigures
+from workbench.jobs.metrics import PREFIX, MachineFigures, collected
 from workbench.page.asked import Asked, Server
 from workbench.page.visitors import reading
 from workbench.registry.errors import RegistryAway
@@ -64,8 +64,7 @@ async def health(request: Request) -> Response:
 
 def metrics(asked: Asked) -> Response:
     """All figures in Prometheus' text format."""
-    own = CollectorRegistry(auto_describe=False)
-    own.register(MachineFigures(asked.registry))
+    own = collected(MachineFigures(asked.registry))
     with suppress(RegistryAway):  # which its own figures show
         counts = asked.bench.counts()
         tasks = Gauge(f"{PREFIX}_page_tasks", "Tasks by state.", ["state"], registry=own)

@@ -8,7 +8,7 @@ from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import units_of
 from workbench.documents.drive import equation_lines, force_lines
 from workbench.output import Row
-from workbench.report.view import notes
+from workbench.report.view import notes, texts_of
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import COMPENSATED, takes_compensator
@@ -79,20 +79,7 @@ def _margins(one: Controller) -> Row:
 
 def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    return [
-        *other_lines(found),
-        MARGINS_SAID,
-        FREQUENCIES_SAID,
-        FIGURES_SAID,
-        f"plant: {found.plant.source}, {found.plant.why}",
-        *loop_lines(found, rotary),
-        *schedule_lines(found, rotary),
-        *schedule_rows(found, rotary),
-        *refused_lines(found),
-        *missed_lines(found),
-        *set_point_lines(found),
-        *(f"note: {line}" for line in found.remarks),
-    ]
+    return texts_of(design_parts(found, rotary))
 
 
 def other_lines(found: Design) -> list[str]:
@@ -285,11 +272,8 @@ def polynomial_lines(found: Design) -> list[str]:
 
 
 def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
-    """The margins, what the design rests on, and remarks.
-
-    Behind --verbose: the plant, the other controllers' ramps, and the equations that a drive runs,
-    which `export` writes as code.
-    """
+    """The margins, what the design rests on, and remarks; behind --verbose also the plant and the
+    other controllers' ramps."""
     chosen = None if found.recommended == "none" else found.recommended
     ramps = set_point_lines(found)
     return [
@@ -307,5 +291,4 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         listed(missed_lines(found)),
         instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),
         notes(found.remarks),
-        *map(more, drive_lines(found, chosen)),
     ]

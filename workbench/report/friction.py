@@ -2,7 +2,7 @@
 after."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,27 +33,18 @@ LOW_IN_BANDS, LOW_SHARE = 4.0, 0.25  # low speeds: in widths of the band, and of
 UNSEEN_BAND = 1e-4  # of all speeds, up to which a band is not seen
 
 
-@dataclass(frozen=True)
-class FrictionData:
-    """Velocity [m/s], acceleration [m/s^2] and friction force F_e - m a [N] of a log, (n,).
+def _friction_data(model: Model, log: Log) -> tuple[Array, Array]:
+    """Velocity [m/s] and friction force F_e - m a [N] of a log, (n,), both smoothed alike.
 
     Without the model's position-dependent forces (gravity, cogging, a spring), and of two masses
     with the second's own acceleration, so that what is left is friction alone.
     """
-
-    v: Array
-    a: Array
-    F_f: Array
-
-
-def friction_data(model: Model, log: Log) -> FrictionData:
-    """What the log says of friction, force and motion smoothed alike."""
     motion = differentiate(log["y"], log.h)
     F = zoh_force(log["F"]) if model.rig.kind == "motor" else log["F"]
     F = low_pass(F + _of_place(model, log), log.h, motion.cutoff)
     inner = slice(motion.edge, len(F) - motion.edge)
     left = F - _inertia(model, motion.a, log.h)
-    return FrictionData(motion.v[inner], motion.a[inner], left[inner])
+    return motion.v[inner], left[inner]
 
 
 def _of_place(model: Model, log: Log) -> Array:
@@ -112,8 +103,8 @@ def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
 
 def _dots(name: str, model: Model, sources: Sequence[Source]) -> Line:
     """What the logs of these sources say of friction."""
-    data = [friction_data(model, one.log) for one in sources]
-    v, F_f = (np.concatenate([getattr(one, key) for one in data]) for key in ("v", "F_f"))
+    data = [_friction_data(model, one.log) for one in sources]
+    v, F_f = (np.concatenate(one) for one in zip(*data, strict=True))
     return Line(name, v, F_f, "measured", "dots")
 
 

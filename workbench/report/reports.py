@@ -42,6 +42,7 @@ from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
 from workbench.report.view import OUT, Section, View, report_notes, table
+from workbench.screen import more
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.predict import fitted_run
@@ -90,7 +91,11 @@ def identified_view(found: Identified) -> View:
 
 
 def design_view(found: Design, rotary: bool = False) -> View:
-    """The controllers, their margins, what they do to noise, how fast they are."""
+    """The controllers, their margins, what they do to noise, how fast they are.
+
+    Behind --verbose: the equations that a drive runs, which `export` writes as code.
+    """
+    chosen = None if found.recommended == "none" else found.recommended
 
     def sections() -> Sequence[Section]:
         one = found.p_pi
@@ -106,7 +111,7 @@ def design_view(found: Design, rotary: bool = False) -> View:
     return View(
         f"Design for {found.card}",
         design_sentence(found),
-        design_parts(found, rotary),
+        [*design_parts(found, rotary), *map(more, drive_lines(found, chosen))],
         lambda: design_document(found),
         {"design.json": lambda: design_document(found)},
         sections,

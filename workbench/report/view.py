@@ -15,7 +15,7 @@ from workbench.output import OutputFolder, dumps, emit, next_step, written
 from workbench.remarks import Merged, merged, printed_once
 from workbench.report.chart import Chart, chart_assets, chart_html
 from workbench.report.templating import render, safe, used_symbols
-from workbench.screen import Part, Screen, instead, screen
+from workbench.screen import Part, Screen, instead, listed, screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,6 +67,12 @@ def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str]
         "page", title=title, lead=lead, then=then, sections=sections, styles=styles,
         scripts=scripts, symbols=used_symbols(lead + body + "".join(then)),
     )  # fmt: skip
+
+
+def texts_of(parts: Iterable[Part | str]) -> list[str]:
+    """All lines of the parts, as --verbose prints them, tables left out."""
+    every = [one if isinstance(one, Part) else listed([one]) for one in parts]
+    return [str(line) for one in every if not one.full_head for line in one.whole]
 
 
 MOST_NOTES = 6
@@ -136,9 +142,14 @@ class View:
         first, rest = self.parts[: self.then_below], self.parts[self.then_below :]
         return screen(self.sentence, *first, *map(next_step, then), *rest, *where)
 
+    @cached_property
+    def drawn(self) -> Sequence[Section]:
+        """The sections of the page."""
+        return self.sections()
+
     def page(self) -> str:
         """The result as a page of HTML that needs no network."""
-        return page(self.title, self.lead or self.sentence, self.sections(), self._then(None))
+        return page(self.title, self.lead or self.sentence, self.drawn, self._then(None))
 
     def html(self) -> str:
         """The result for a notebook: all that a terminal shows, uncut."""

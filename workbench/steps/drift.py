@@ -12,7 +12,6 @@ from identification.drift.drift_result import DriftTest, DriftVerdict, Shift, St
 from identification.drift.drift_test import DriftSettings, drift_test
 from identification.drift.mewma import DriftState
 from identification.drift.reference_model import ReferenceModel
-from identification.errors import BadModel
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
@@ -21,7 +20,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.documents.plausible import refuse_other_units
+from workbench.documents.plausible import refuse_other_machine, refuse_other_units
 from workbench.documents.reading import as_number, plain, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
@@ -164,7 +163,8 @@ def drift_of(
     where a run is in other units than the model's logs.
     """
     settings = settings or DriftSettings()
-    _same_machine(model, sources)
+    card = f"the card {sources.card.name}"
+    refuse_other_machine(model.rig, sources.rig, card, "motion", "kind")
     refuse_other_units([one.log for one in sources.runs], model.log, sources.rig)
     active = replace(active_model(model, key), rig=sources.rig)
     remarks = [*model.read, *sources.remarks]
@@ -194,16 +194,6 @@ def drift_of(
     seen = (*(stream.seen if stream else ()), *(_seen(one) for one in tests if not one.again))
     after = Stream(state, seen)
     return Drifted(model, key, settings, tuple(tests), after, tuple(remarks), sources.bad)
-
-
-def _same_machine(model: Model, sources: Sources) -> None:
-    for name in ("motion", "kind"):
-        of_model, of_logs = getattr(model.rig, name), getattr(sources.rig, name)
-        if of_model != of_logs:
-            raise BadModel(
-                f"the model is of a rig with {name} {of_model!r}, the card {sources.card.name} says"
-                f" {of_logs!r}; give the model and the card of one machine"
-            )
 
 
 def _seen(one: Tested) -> Seen:

@@ -10,7 +10,7 @@ from identification.model.estimates import Estimate
 from workbench.cards.readable import number
 from workbench.documents.design import Design
 from workbench.documents.model import Model, used
-from workbench.documents.reading import read_document
+from workbench.documents.reading import read_document, read_raw
 from workbench.steps.response import RESPONSE_SCHEMA
 
 
@@ -29,12 +29,7 @@ def with_response(model: Model, file: Path | None) -> Model:
     """
     if file is None:
         return model
-    written = read_document(file)
-    if written.get("schema") != RESPONSE_SCHEMA:
-        raise BadModel(
-            f"{file}: schema {written.get('schema')!r}, {RESPONSE_SCHEMA!r} needed; give the"
-            " response.json of 'workbench response'"
-        )
+    written = read_raw(file, RESPONSE_SCHEMA)
     every = (*written["peaks"], *written.get("felt", ()))
     peaks = sorted(every, key=lambda one: float(one["frequency"]["value"]))
     for low, high in pairwise(peaks):

@@ -5,10 +5,10 @@ import platform
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from workbench.cards.card import load_card
+from workbench.documents.reading import installed
 from workbench.files import shipped_cards
 from workbench.logs.sources import DATA_VARIABLE
 
@@ -41,19 +41,12 @@ def check_installation() -> Installation:
         python=f"{platform.python_version()} ({sys.executable})",
         platform=f"{platform.system()} {platform.release()}, {platform.machine()}",
         processors=os.cpu_count() or 1,
-        packages={name: _version(name) or "missing" for name in SHOWN_VERSIONS},
-        optional={name: _version(name) for name in OPTIONAL},
+        packages={name: installed(name) or "missing" for name in SHOWN_VERSIONS},
+        optional={name: installed(name) for name in OPTIONAL},
         cache=_cache(wrong),
         data=_data(wrong),
         wrong=tuple(wrong),
     )
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _cache(wrong: list[str]) -> dict[str, object]:

@@ -1,6 +1,6 @@
 """Model + log -> prediction: force by the inverse model, force and position by simulation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import of_body, with_motor_force
 from workbench.documents.model import Model
-from workbench.documents.plausible import refuse_other_units
+from workbench.documents.plausible import refuse_other_machine, refuse_other_units
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import (
     force_by_model,
@@ -149,11 +149,7 @@ def predict_sources(
     Raises BadModel where model and card are of unlike machines, BadLog where a run is in other
     units than the model's logs, and as `predict` does.
     """
-    if sources.rig.motion != model.rig.motion:
-        raise BadModel(
-            f"the model is of a {model.rig.motion} machine, but {sources.card.path} says"
-            f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
-        )
+    refuse_other_machine(model.rig, sources.rig, str(sources.card.path), "motion")
     refuse_other_units([one.log for one in sources.runs], model.log, sources.rig)
     found = tuple(predict(model, s.log, drive=drive, window=window) for s in sources.runs)
     of_runs = dict.fromkeys(line for one in found for line in one.remarks)
@@ -168,20 +164,20 @@ def predict_sources(
             "drive": found[0].drive,
             "window": window,
             "samples": sum(len(one.t) for one in found),
-            **{name: _rms_of_runs(found, name) for name in names},
+            **{name: pooled((getattr(one, name), len(one.t)) for one in found) for name in names},
             "run_refused": "; ".join(refused) or None,
             "remarks": (*model.read, *sources.remarks, *other, *of_runs),
         },
     )
 
 
-def _rms_of_runs(found: Sequence[Prediction], name: str) -> float | None:
-    """Root mean square over all runs of the log."""
-    pairs = [(getattr(one, name), len(one.t)) for one in found]
-    known = [(value, n) for value, n in pairs if value is not None]
+def pooled(errors: Iterable[tuple[float | None, int]]) -> float | None:
+    """Root mean square over all runs, of that of each and how many samples it has; None of none."""
+    known = [(value, n) for value, n in errors if value is not None]
     if not known:
         return None
-    return float(np.sqrt(sum(v * v * n for v, n in known) / sum(n for _, n in known)))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(sum(v * v * n for v, n in known) / sum(n for _, n in known)))
 
 
 def why_no_run(model: Model, drive: Drive) -> str | None:

@@ -24,6 +24,7 @@ from identification.model.size import Size
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
+from workbench.documents.plausible import refuse_other_machine
 from workbench.documents.reading import as_number
 from workbench.logs.sources import Source, Sources, fingerprints
 from workbench.steps.identify_sources import identify_sources
@@ -101,11 +102,8 @@ def respond(
     is not to be; lowest [Hz]: the frequency to reach down to. read: more remarks. Raises BadLog
     without an applied force, NotIdentifiable where the runs show nothing.
     """
-    if model is not None and rig.motion != model.rig.motion:
-        raise BadModel(
-            f"the model is of a {model.rig.motion} machine, but the card {card} says"
-            f' motion = "{rig.motion}"; give the model and the card of one machine'
-        )
+    if model is not None:
+        refuse_other_machine(model.rig, rig, f"the card {card}", "motion")
     logs = [with_applied_force(one.log, rig) for one in runs]
     taken = model if left_in is None else None
     found, modes = _measured(logs, rig.kind == "motor", taken, lowest)

@@ -21,6 +21,7 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
+from workbench.documents.plausible import refuse_other_machine
 from workbench.documents.reading import plain, versions
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
@@ -168,13 +169,8 @@ def predict_velocity(
     As in the fit it begins where commands act no more that were given before the log. Raises
     BadModel where model and card are of unlike machines.
     """
-    same = ("motion", "command_unit")
-    for key in same:
-        if getattr(sources.rig, key) != getattr(model.rig, key):
-            raise BadModel(
-                f"the model has {key} = {getattr(model.rig, key)!r}, {sources.card.path}"
-                f" {getattr(sources.rig, key)!r}; give the model and the card of one machine"
-            )
+    path = str(sources.card.path)
+    refuse_other_machine(model.rig, sources.rig, path, "motion", "command_unit")
     valve, out = model.simulated, []
     record = replace(recorded(logs_of_runs(sources)), u_max=model.command_peak)
     if valve.place:

@@ -3,7 +3,6 @@
 Of effects it is to discriminate those that a trace could not.
 """
 
-import json
 import math
 import re
 from collections.abc import Mapping
@@ -19,7 +18,7 @@ from identification.effects._library import Library
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
-from workbench.documents.reading import plain
+from workbench.documents.reading import plain, read_raw
 
 Criterion = Literal["D", "T"]
 FASTER_THAN_LOGS = (
@@ -135,12 +134,7 @@ def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
 
     Raises BadModel where the file is no trace, or leaves nothing open.
     """
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BadModel(f"{path}: cannot be read as trace.json ({error}); give one") from None
-    if not isinstance(found, dict) or found.get("schema") != "trace/1":
-        raise BadModel(f"{path}: no schema 'trace/1'; give the trace.json of 'workbench trace'")
+    found = read_raw(path, "trace/1")
     if found.get("verdict") not in ("inseparable", "unknown"):
         raise BadModel(
             f"{path}: its verdict is {found.get('verdict')!r}; there are rivals to discriminate"
