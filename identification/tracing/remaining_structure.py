@@ -19,8 +19,7 @@ from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.windowed_run.run_errors import soft
-from identification.estimation.windowed_run.windows import freed, starts, window_of
-from identification.estimation.windowed_run.windows import window_residual as left_in_run
+from identification.estimation.windowed_run.windows import left_in_windows, starts, window_of
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
 from identification.thresholds import ASTRAY
@@ -162,7 +161,7 @@ def in_run(
     count = 0
     for one in logs:
         begun = starts(one, drive)
-        r = left_in_run(after.plant, one, drive, freed(after.plant, one, drive, begun))
+        r = left_in_windows(after.plant, one, drive)
         if r is None:
             return Dependence((), 0.0)
         at = np.arange(0, len(one.log), max(THINNED, samples(THINNED, one.log.h)))

@@ -23,6 +23,7 @@ from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
     mean_square,
+    rms,
     rough,
     row_fit,
     settled_fits,
@@ -33,13 +34,13 @@ from identification.estimation.regression.signals_behind_effects import (
     reached,
     shown_to_true,
 )
+from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.progress import Halted, Progress
 from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
 from identification.tracing.regression.candidates import (
     EffectCandidate,
     best_of,
 )
-from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.library_search import at_own_scale, of_sliding, scales_of
 from identification.tracing.regression.significance import by_luck, chance
 
@@ -164,6 +165,21 @@ def trusted(
         kept.append(step)
         stage, base, error = after, found, without
     return stage, base, kept
+
+
+def left_out_error(stage: EffectRows, slowest: float) -> float:
+    """Root mean square of the mechanical equation [N] on each log, fitted on all others.
+
+    Source: cross-validation, Stone (1974). Runs of one file, cut at its gaps, are left out together
+    where there are more files. 0 where there is one log only.
+    """
+    parts = stage.parts[MECHANICAL]
+    if len(parts) < 2:
+        return 0.0
+    names, of_part = np.unique([one.log.name for one in stage.logs], return_inverse=True)
+    of_part = of_part if len(names) > 1 else np.arange(len(parts))
+    rows = replace(stacked(parts), block=np.repeat(of_part, [len(p.b) for p in parts]))
+    return rms(left_unseen(rows.at(rows.speed >= slowest)))
 
 
 def is_trusted(left: float, explained: float) -> bool:

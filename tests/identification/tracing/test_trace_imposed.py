@@ -17,7 +17,7 @@ from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.log import Log, Rig
-from identification.tracing.regression.cross_validation import left_out_error
+from identification.tracing.regression.stepwise import left_out_error
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.tracing.test_trace import PLAIN, made
