@@ -66,8 +66,7 @@ class EffectRows:
     of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
     speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
     out, and when it is crossed is not seen;
-    sliding: friction with its band, once known, by which breakaways are exact; falls:
-    their limit falls to that of `sliding` with the first motion;
+    sliding: friction with its band, once known, by which breakaways are exact;
     scales: by equation, what its rows' squares are divided by; borne: forces [N] up and down, up to
     which a body that is at rest surely stays so, whatever levels an effect leaves to the others.
     """
@@ -82,7 +81,6 @@ class EffectRows:
     band: float = 0.0
     play: bool = False
     sliding: Karnopp | None = None
-    falls: bool = False
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     borne: tuple[float, float] = (np.inf, np.inf)
 
@@ -128,7 +126,7 @@ class EffectRows:
     def events(self) -> tuple[Breakaways, ...]:
         """Breakaways of each log."""
         if self.sliding is not None:
-            return tuple(breakaway_limits(one, self.sliding, self.falls) for one in self.logs)
+            return tuple(breakaway_limits(one, self.sliding) for one in self.logs)
         return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
 
     @property
