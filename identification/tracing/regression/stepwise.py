@@ -46,7 +46,6 @@ from identification.tracing.regression.significance import by_luck, chance
 
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
-REFUSED = 3  # candidates tried in turn
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
 FURTHER_EFFECT = "a further effect beside the first"
@@ -103,10 +102,10 @@ def choose(
     try:
         for turn in range(len(steps), most):
             tried = at_own_scale(stage, base, library, partial(_report, report, turn))
-            found = accepted(tried, stage, base, rng)
-            if found is None:
+            step = next_step(tried, stage, base, rng)
+            if step is None:
                 break
-            step, stage, base = found
+            stage, base = with_candidate(step.stage, step.candidate)
             steps = [*steps, step]
             if len(stage.chosen) > 1:
                 stage, base, steps = polished(stage, base, steps)
@@ -115,27 +114,6 @@ def choose(
     if steps and rough(base):
         stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
-
-
-def accepted(
-    tried: Sequence[EffectCandidate],
-    stage: EffectRows,
-    base: Mapping[str, RowFit],
-    rng: np.random.Generator,
-) -> tuple[Step, EffectRows, Mapping[str, RowFit]] | None:
-    """The best step that does not gain at the price of what it bends, and what is then left."""
-    for _ in range(REFUSED):
-        step = next_step(tried, stage, base, rng)
-        if step is None:
-            return None
-        after, left = with_candidate(step.stage, step.candidate)
-        without = base_fits(replace(stage, scales=after.scales))
-        both = without.keys() & left.keys()
-        if sum(left[e].criterion for e in both) <= sum(without[e].criterion for e in both):
-            return step, after, left
-        key = step.candidate.effect.key
-        tried = [one for one in tried if one.effect.key != key]
-    return None
 
 
 def trusted(
