@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.estimation.regression.effect_rows import EffectRows, one_way
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
     BREAKAWAY,
     MECHANICAL,
     REST,
@@ -43,8 +42,6 @@ def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
         if o.robust and mean_square(o) < ASTRAY:
             continue
         keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
-        if equation == ACTUATOR and choice.end.play:
-            keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
         found = _in_equation(choice, equation, keep)
         if found is None:
             continue

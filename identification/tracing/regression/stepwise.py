@@ -387,5 +387,4 @@ def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
             more = {"F": driven(one, whole)} if one.held else {}
             log = one.log.with_signals(u=command_of(one, whole), **more)
         logs.append(again(one, log))
-    play = stage.play or (effect.place.shows and effect.evolve is not None)
-    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)
+    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key))
