@@ -23,8 +23,6 @@ from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
     mean_square,
-    rms,
-    rough,
     row_fit,
     settled_fits,
 )
@@ -34,9 +32,8 @@ from identification.estimation.regression.signals_behind_effects import (
     reached,
     shown_to_true,
 )
-from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.progress import Halted, Progress
-from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
+from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
     best_of,
@@ -111,59 +108,7 @@ def choose(
                 stage, base, steps = polished(stage, base, steps)
     except Halted:
         start.logs[0].halt.left_out(FURTHER_EFFECT if steps else EFFECTS)
-    if steps and rough(base):
-        stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
-
-
-def trusted(
-    start: EffectRows, steps: Sequence[Step]
-) -> tuple[EffectRows, Mapping[str, RowFit], list[Step]]:
-    """The leading steps that carry over to logs left out, or else explain most of what is missing.
-
-    Where much is left whatever is added, a term that explains a part of it lowers the training
-    error and may raise that of another run (measured on EMPS). Source: cross-validation, Stone
-    (1974); `README.md` of `tracing`, (5).
-    """
-    kept: list[Step] = []
-    stage, base = start, base_fits(start)
-    slowest = base[MECHANICAL].slowest
-    error = left_out_error(stage, slowest)
-    missing = mean_square(base[MECHANICAL]) - 1.0
-    for step in steps:
-        after, found = with_candidate(scaled_as(step, stage), step.candidate)
-        without = left_out_error(after, slowest)
-        if error > 0 and MECHANICAL in step.candidate.outcomes:
-            less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
-            stays = is_trusted(without / error, less / max(missing, 1e-300))
-        else:
-            stays = is_trusted(np.inf, share(step.candidate, step.base))
-        if not stays:
-            break
-        kept.append(step)
-        stage, base, error = after, found, without
-    return stage, base, kept
-
-
-def left_out_error(stage: EffectRows, slowest: float) -> float:
-    """Root mean square of the mechanical equation [N] on each log, fitted on all others.
-
-    Source: cross-validation, Stone (1974). Runs of one file, cut at its gaps, are left out together
-    where there are more files. 0 where there is one log only.
-    """
-    parts = stage.parts[MECHANICAL]
-    if len(parts) < 2:
-        return 0.0
-    names, of_part = np.unique([one.log.name for one in stage.logs], return_inverse=True)
-    of_part = of_part if len(names) > 1 else np.arange(len(parts))
-    rows = replace(stacked(parts), block=np.repeat(of_part, [len(p.b) for p in parts]))
-    return rms(left_unseen(rows.at(rows.speed >= slowest)))
-
-
-def is_trusted(left: float, explained: float) -> bool:
-    """Whether an effect carries over, or explains most; left: share of the error on logs left out,
-    explained: of what is missing. Ours: `../README.md`, (5)."""
-    return left * WORSE < 1.0 or explained >= HALF
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
