@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.effects._library import Library
-from identification.estimation.regression.effect_columns import Values, slow_motion
+from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -36,7 +36,6 @@ from identification.progress import Halted, Progress
 from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
-    best_of,
 )
 from identification.tracing.regression.library_search import all_candidates, of_sliding, scales_of
 from identification.tracing.regression.significance import by_luck, chance
@@ -104,8 +103,6 @@ def choose(
                 break
             stage, base = with_candidate(step.stage, step.candidate)
             steps = [*steps, step]
-            if len(stage.chosen) > 1:
-                stage, base, steps = polished(stage, base, steps)
     except Halted:
         start.logs[0].halt.left_out(FURTHER_EFFECT if steps else EFFECTS)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
@@ -113,33 +110,6 @@ def choose(
 
 def _report(report: Progress, turn: int, part: float) -> None:
     report("tracing", (turn + part) / MOST_EFFECTS)
-
-
-def polished(
-    stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
-) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
-    """Every effect that is in columns at its best beside the others; those not needed any more go.
-
-    Source: the backward part of stepwise regression, Efroymson (1960).
-    """
-    scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
-    best = {step.candidate.effect.key: step.candidate for step in steps}
-
-    def kept(but: str = "") -> tuple[tuple[Effect, Values], ...]:
-        """The effects in columns that have not gone, but one."""
-        keys = [e.key for e, _ in stage.chosen if e.key in best and e.key != but]
-        return tuple((best[key].effect, best[key].values) for key in keys)
-
-    for effect, _ in stage.chosen[:-1]:
-        without = replace(stage, chosen=kept(effect.key), scales=scales)
-        candidate = best_of(without, effect, base_fits(without))
-        if candidate is None or merit(candidate) <= 0:
-            del best[effect.key]
-        else:
-            best[effect.key] = replace(best[effect.key], values=candidate.values)
-    after, found = settled_fits(of_sliding(replace(stage, chosen=kept()), stage.scale(MECHANICAL)))
-    left = [s for s in steps if s.candidate.effect.key in best]
-    return after, found, [replace(s, candidate=best[s.candidate.effect.key]) for s in left]
 
 
 def scaled_as(step: Step, stage: EffectRows) -> EffectRows:
@@ -164,10 +134,7 @@ def next_step(
     worth = [
         c
         for c in ranked
-        if material(c, scaled, base)
-        and share(c, base) >= 1.0 - EARNS
-        and shows_fast(c, scaled, base)
-        and gives_way(c, base)
+        if material(c, scaled, base) and share(c, base) >= 1.0 - EARNS and gives_way(c, base)
     ]
     if not worth:
         return None
@@ -194,26 +161,6 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
     return tuple(
         c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
     )
-
-
-def shows_fast(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
-    """Whether an effect that acts at any speed gains where the base explains the motion at all.
-
-    In the band the body takes any force, so some effect always fits a few of its rows.
-    """
-    effect = candidate.effect
-    if not effect.place.any_speed or slow_motion(effect):
-        return True
-    gain = 0.0
-    for equation, after in candidate.outcomes.items():
-        before = base[equation]
-        keep = before.rows.speed >= before.slowest
-        if before.robust or not np.any(np.isfinite(before.rows.speed)):
-            gain += before.criterion - after.criterion
-            continue
-        less = np.sum(before.fit.residual[keep] ** 2) - np.sum(after.fit.residual[keep] ** 2)
-        gain += float(less) / stage.scale(equation) + before.rows.lost - after.rows.lost
-    return gain > PENALTY * len(effect.params)
 
 
 def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:

@@ -1,4 +1,4 @@
-"""Choice on the equations: the next best where the best bends the rest, and bristles by rest."""
+"""Choice on the equations: rows of rest, and bristles by rest."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import REST
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
-from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import (
     absorb,
     choose,
@@ -17,6 +17,7 @@ from identification.tracing.regression.stepwise import (
     gives_way,
 )
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
+from tests.identification.tracing.settings import best_of
 
 
 def quiet(_stage: str, _share: float) -> None:
