@@ -5,10 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from identification.effects._library import Library
+from identification.estimation.regression.effect_columns import slow_motion
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL
-from identification.estimation.regression.row_fit import RowFit, mean_square
-from identification.thresholds import HOPELESS
+from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
+from identification.thresholds import ADEQUATE, HOPELESS
 from identification.tracing.regression.candidates import (
     EffectCandidate,
     FirstShape,
@@ -18,6 +19,25 @@ from identification.tracing.regression.candidates import (
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 IN_SIGHT = 0.1  # of what the best shape of any effect's grid gains, from which a shape is refined
+
+
+def at_own_scale(
+    stage: EffectRows, base: Mapping[str, RowFit], library: Library, report: Callable[[float], None]
+) -> list[EffectCandidate]:
+    """Every effect of the library, those of slow motion at the scale at which all are compared.
+
+    Where more than the sensors' noise is left whatever is added, at noise alone every row of
+    sliding would cost more than one left out for its low speed, and an effect of slow motion be
+    left out with them. Ours: `../README.md`, (1).
+    """
+    found = all_candidates(stage, base, library, lambda part: report(0.5 * part))
+    scaled = of_sliding(stage, scales_of(found, base).get(MECHANICAL, 1.0))
+    if 1.0 / ADEQUATE <= scaled.scale(MECHANICAL) / stage.scale(MECHANICAL) <= ADEQUATE:
+        return found
+    slow = {key: effect for key, effect in library.items() if slow_motion(effect)}
+    again = all_candidates(scaled, base_fits(scaled), slow, lambda part: report(0.5 + 0.5 * part))
+    told = {one.effect.key for one in again}
+    return [*again, *(one for one in found if one.effect.key not in told)]
 
 
 def all_candidates(

@@ -37,7 +37,7 @@ from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
 )
-from identification.tracing.regression.library_search import all_candidates, of_sliding, scales_of
+from identification.tracing.regression.library_search import at_own_scale, of_sliding, scales_of
 from identification.tracing.regression.significance import by_luck, chance
 
 MOST_EFFECTS = 4  # effects in one machine
@@ -97,7 +97,7 @@ def choose(
         stage, base, steps, tried = begun.end, begun.base, list(begun.steps), begun.tried
     try:
         for turn in range(len(steps), most):
-            tried = all_candidates(stage, base, library, partial(_report, report, turn))
+            tried = at_own_scale(stage, base, library, partial(_report, report, turn))
             step = next_step(tried, stage, base, rng)
             if step is None:
                 break
