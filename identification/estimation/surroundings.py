@@ -21,15 +21,12 @@ from identification.estimation.estimates import effect_estimates, reported_estim
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import OF_EQUATION, rows_and_windows
+from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
     OVERLAP,
     left_out,
-    solve_rows,
     spread_of_left_out,
-    stacked,
-    without_each_block,
 )
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
@@ -156,30 +153,7 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
     h = logs[0].h
     gives = rig.force_per_command if held else None
     lag = Size(lag.value * h, lag.sd * h)
-    around = Surroundings(lag, force, sine, cosine, (), gives, sampled)
-    return _in_chosen_windows(around, logs, held and not sampled) if used is GRAVITY else around
-
-
-def _in_chosen_windows(around: Surroundings, logs: Sequence[Log], held: bool) -> Surroundings:
-    """The same with gravity as the windows show it that suit these logs best, where many enough."""
-    rest = [around.taken_out(log) for log in logs]
-    moved = [motion_log(log, held=held, by_command=False) for log in rest]
-    made = rows_and_windows(moved, NOTHING_KNOWN)
-    rows = stacked([one.rows for one in made])
-    if len(rows.b) < FEWEST_WINDOWS:
-        return around
-    waves = [
-        np.column_stack([one.windows.mean @ wave(log["y"]) for wave in (np.sin, np.cos)])
-        for one, log in zip(made, rest, strict=True)
-    ]
-    rows = replace(rows, X=np.column_stack([rows.X, np.concatenate(waves)]))
-    more = solve_rows(rows).theta[-2:]
-    spread = spread_of_left_out(without_each_block(rows))[-2:]
-    sine, cosine = (
-        Size(one.value + float(off), float(sd))
-        for one, off, sd in zip((around.sine, around.cosine), more, spread, strict=True)
-    )
-    return replace(around, sine=sine, cosine=cosine)
+    return Surroundings(lag, force, sine, cosine, (), gives, sampled)
 
 
 def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:

@@ -46,7 +46,6 @@ PLAIN_COLUMNS = 7  # columns beside those of the orders
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
 OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or a stop
-BESIDE_ORDER = np.array([-0.5, -0.25, 0.25, 0.5])  # where no order may fit better
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +163,6 @@ def _chosen(found: _Turning) -> tuple[int, ...]:
         after = before - float(explained[best])
         if n in chosen or after > EARNS * before:
             break
-        beside = max(_explained(found.pair(n + off), base, left) for off in BESIDE_ORDER)
-        if before - beside < EARNS * after:
-            break  # it repeats with something else than the turn
         chosen.append(n)
         base = np.linalg.qr(np.column_stack([base, pairs[best]]))[0]
     return tuple(chosen)

@@ -183,38 +183,32 @@ def free_run(
 
 
 def released(
-    friction: Sequence[Karnopp], force: Array, h: float, *, hold: bool, level: float, at: IntArray
+    friction: Sequence[Karnopp], force: Array, h: float, *, hold: bool, level: float
 ) -> Array:
-    """Positions (k, n) [m] of bodies of such friction, which rest at `level` until a sample each,
-    `at` (k,), and from there on are free under the force (n,) [N], held between samples or linear.
+    """Positions (k, n) [m] of bodies of such friction, which rest at `level` and are free under the
+    force (n,) [N], held between samples or linear.
 
     Source: as `free_run`.
     """
     rows = np.array([kernel_parameters(one.array, 0.0, 0.0) for one in friction])
     out = np.full((len(rows), len(force)), level)
     slope = force_slope(force, h, hold)
-    released_kernel(rows, h, read_only(force), slope, at.astype(np.int64), out)
+    released_kernel(rows, h, read_only(force), slope, out)
     return out
 
 
 @compiled
-def released_kernel(
-    p: Array, h: float, force: Array, slope: Array, at: IntArray, out: Array
-) -> None:
-    """Plants p (k, 11), released at samples `at` (k,): out (k, n) holds the positions at rest and
-    takes those of the motion."""
+def released_kernel(p: Array, h: float, force: Array, slope: Array, out: Array) -> None:
+    """Plants p (k, 11) that begin at rest: out (k, n) holds their positions and takes those of the
+    motion."""
     first, rest = np.zeros(1, dtype=np.int64), np.zeros(1)
     for i in range(len(p)):
-        begin = at[i]
-        if begin >= len(force):
-            continue
-        own, rate, seen = force[begin:], slope[begin:], out[i, begin:]
-        run, modes = np.zeros((4, len(own))), np.zeros(len(own), dtype=np.int64)
+        run, modes = np.zeros((4, len(force))), np.zeros(len(force), dtype=np.int64)
         run_kernel(
-            p[i : i + 1], h, True, 0.0, own, own, rate, seen, first, seen[:1].copy(), rest,
-            own[:1].copy(), run, modes,
+            p[i : i + 1], h, True, 0.0, force, force, slope, out[i], first, out[i, :1].copy(), rest,
+            force[:1].copy(), run, modes,
         )  # fmt: skip
-        out[i, begin:] = run[0]
+        out[i] = run[0]
 
 
 def _force(plant: Plant, log: Log, drive: Drive, seen: bool) -> tuple[float, Array]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.estimation.regressed_plant import deviations
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -128,18 +129,9 @@ def changes(
         return []
     inverse = np.linalg.pinv(gram[np.ix_(free, free)])
     sd = np.sqrt(np.diag(inverse) * noise * OVERLAP)
-    half = NORMAL_95 * np.hypot(sd, _own_sd(mine, own)[free])  # of the change's interval
+    half = NORMAL_95 * np.hypot(sd, deviations(mine)[free])  # of the change's interval
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))
         for i, s, least in zip(free, sd, half, strict=True)
         if abs(best[i] - theta[i]) > max(MATERIAL * abs(theta[i]), least)
     ]
-
-
-def _own_sd(mine: RowFit, noise: float) -> Array:
-    """Deviations (k,) of the parameters on the logs of their fit; noise: mean square left there."""
-    keep = mine.rows.speed >= mine.slowest
-    A = (mine.rows.X / mine.rows.sd[:, np.newaxis])[keep]
-    size = np.sqrt(np.maximum(np.sum(A**2, axis=0), 1e-300))
-    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-10, hermitian=True)
-    return np.asarray(np.sqrt(np.diag(inverse) * max(noise, 1.0) * OVERLAP) / size)

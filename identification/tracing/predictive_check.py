@@ -12,10 +12,9 @@ import numpy as np
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, mean_loss
 from identification.estimation.windowed_run.windows import (
-    freed,
+    left_in_windows,
     starts,
     window_of,
-    window_residual,
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
@@ -63,10 +62,9 @@ def _error(plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float
     """Robust error of the position over all logs, in units of its noise."""
     squares = []
     for one in logs:
-        begun = starts(one, drive, seconds)
-        r = window_residual(plant, one, drive, freed(plant, one, drive, begun, even=True))
+        r = left_in_windows(plant, one, drive, seconds, even=True)
         if r is None or not np.all(np.isfinite(r[0])):
             return CANNOT_BE_FOLLOWED
         moves = one.signals["d"] != 0
-        squares.append(mean_loss(r[0], window_of(begun, len(one.log)), moves))
+        squares.append(mean_loss(r[0], window_of(starts(one, drive, seconds), len(one.log)), moves))
     return float(np.sqrt(np.mean(squares)))

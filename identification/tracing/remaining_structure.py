@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.estimation.regression.effect_rows import EffectRows, one_way
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
     BREAKAWAY,
     MECHANICAL,
     REST,
@@ -19,8 +18,7 @@ from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.windowed_run.run_errors import soft
-from identification.estimation.windowed_run.windows import freed, starts, window_of
-from identification.estimation.windowed_run.windows import window_residual as left_in_run
+from identification.estimation.windowed_run.windows import left_in_windows, starts, window_of
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
 from identification.thresholds import ASTRAY
@@ -44,8 +42,6 @@ def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
         if o.robust and mean_square(o) < ASTRAY:
             continue
         keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
-        if equation == ACTUATOR and choice.end.play:
-            keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
         found = _in_equation(choice, equation, keep)
         if found is None:
             continue
@@ -162,7 +158,7 @@ def in_run(
     count = 0
     for one in logs:
         begun = starts(one, drive)
-        r = left_in_run(after.plant, one, drive, freed(after.plant, one, drive, begun))
+        r = left_in_windows(after.plant, one, drive)
         if r is None:
             return Dependence((), 0.0)
         at = np.arange(0, len(one.log), max(THINNED, samples(THINNED, one.log.h)))

@@ -20,7 +20,6 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from identification.model.surroundings import Surroundings
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
@@ -28,7 +27,6 @@ from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.judgement import judgement
-from identification.tracing.lag_beside import follows_with_lag, lag_beside
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
@@ -89,7 +87,6 @@ def trace(
     by_command = rig.kind != "motor" and told.plant.actuator is not None
     if told.verdict == "unknown" and by_command and not halt.reached():
         told = _by_force(told, train, test, rig, library, rng, report, halt)
-    beside, told = _with_lag(beside, told, recorded_as, rig, library, rng, report, halt)
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
     if not beside.none:
@@ -126,26 +123,6 @@ def _by_force(
 
 def _without_command(log: Log) -> Log:
     return replace(log, signals={key: x for key, x in log.signals.items() if key != "u"})
-
-
-def _with_lag(
-    beside: Surroundings, told: Trace, recorded_as: tuple[Sequence[Log], Sequence[Log]], rig: Rig,
-    library: Library, rng: np.random.Generator, report: Progress, halt: Halt,
-) -> tuple[Surroundings, Trace]:  # fmt: skip
-    """What acts beside the applied force and the trace, with a lag of the columns that an effect
-    has hidden, where less is left with it."""
-    if told.complete or beside.lag.value or halt.reached():
-        return beside, told
-    lag = lag_beside(told.plant, [beside.taken_out(log) for log in recorded_as[0]], rig)
-    if not lag.value:
-        return beside, told
-    late = replace(beside, lag=lag)
-    train, test = ([late.taken_out(log) for log in logs] for logs in recorded_as)
-    try:
-        again = _traced(train, test, rig, library, rng, report, halt)
-    except NotIdentifiable:
-        return beside, told
-    return (late, again) if follows_with_lag(told, again) else (beside, told)
 
 
 def _traced(

@@ -103,7 +103,6 @@ from identification.tracing.regression.stepwise import (
     Step,
     equal_rivals,
     gives_way,
-    is_trusted,
     material,
     merit,
 )
@@ -364,8 +363,6 @@ def test_half() -> None:
     assert explains_most(1.0, 0.45) and not explains_most(1.0, 0.55)
     assert 1.0 + 0.24 < decisive(1.6, ()) < 1.0 + 0.375
     assert not is_unexplained(0.4) and is_unexplained(0.625)
-    # Where much is left, an effect that does not carry over has to explain most of it.
-    assert not is_trusted(1.0, 0.44) and is_trusted(1.0, 0.69)
 
 
 def test_far_less() -> None:
@@ -407,7 +404,6 @@ def test_worse() -> None:
     assert LeftOfEquation(1.06, 1.0, 9.0).surer
     assert not is_worse(10.0, 10.3) and is_worse(10.0, 10.8)
     assert not is_worse(1.0, 1.4)  # both are noise
-    assert is_trusted(0.94, 0.0) and not is_trusted(0.97, 0.0)
 
 
 def test_of_account() -> None:

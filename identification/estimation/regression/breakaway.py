@@ -44,20 +44,19 @@ UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as un
 
 
 @lru_cache(maxsize=16)
-def breakaway_limits(one: MotionLog, friction: Karnopp, falls: bool = False) -> Breakaways:
+def breakaway_limits(one: MotionLog, friction: Karnopp) -> Breakaways:
     """Breakaways of a log: a rest of at least 48 ms, then motion; `force` is the stick limit.
 
-    friction: sliding and band as the model without effects has them; falls: with the first motion
-    the limit falls to that of `friction`, so it is no less. Source: stick limits of the paper's eq.
-    (1) (Karnopp 1985); their estimate is ours.
+    friction: sliding and band as the model without effects has them. Source: stick limits of the
+    paper's eq. (1) (Karnopp 1985); their estimate is ours.
     """
     stretches = rest_stretches(one, 3 * samples(MEAN, one.log.h))
-    events = (_event(one, friction, falls, low, high) for low, high in stretches)
+    events = (_event(one, friction, low, high) for low, high in stretches)
     return Breakaways.of([event for event in events if event is not None])
 
 
 def _event(
-    one: MotionLog, friction: Karnopp, falls: bool, low: int, high: int
+    one: MotionLog, friction: Karnopp, low: int, high: int
 ) -> tuple[float, float, float, float, float] | None:
     """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
     y, F, h = one.log["y"], one.log["F"], one.log.h
@@ -82,7 +81,7 @@ def _event(
     best, left, span = 0.0, np.inf, highest - lowest
     tried = np.linspace(lowest, highest, GRID)
     for _ in range(NARROWED + 1):
-        costs = _costs(one, friction, falls, part, level, way, tried)
+        costs = _costs(one, friction, part, level, way, tried)
         left = float(np.min(costs))
         best = float(np.mean(tried[costs <= left * (1.0 + 1e-9)]))  # it may jump
         span = 2.0 * span / (GRID - 1)
@@ -96,20 +95,13 @@ def _event(
 
 
 def _costs(
-    one: MotionLog, friction: Karnopp, falls: bool, part: Log, level: float, way: float,
-    limits: Array,
-) -> Array:  # fmt: skip
+    one: MotionLog, friction: Karnopp, part: Log, level: float, way: float, limits: Array
+) -> Array:
     """Mean square of the position's error in noise units from rest on with these stick limits [N],
     (k,) each."""
     name = "F_sp" if way > 0 else "F_sn"
-    least, begin = limits, np.zeros(len(limits), dtype=np.int64)
-    if falls:
-        least = np.minimum(limits, way * getattr(friction, name))
-        beyond = way * part["F"] > limits[:, np.newaxis]
-        begin = np.where(np.any(beyond, axis=1), np.argmax(beyond, axis=1), len(part))
-        begin[begin >= len(part) - 1] = len(part)  # no motion in one sample
-    nine = [replace(friction, **{name: way * float(limit)}) for limit in least]
-    y = released(nine, part["F"], one.log.h, hold=one.held, level=level, at=begin)
+    nine = [replace(friction, **{name: way * float(limit)}) for limit in limits]
+    y = released(nine, part["F"], one.log.h, hold=one.held, level=level)
     r = (y - part["y"]) / max(one.noise.y, EXACT_POSITION)
     return np.asarray(np.mean(np.minimum(np.nan_to_num(r**2, nan=LOST), LOST), axis=1))
 

@@ -49,7 +49,6 @@ from identification.simulation.effect_along_motion import (
     elastic_share,
 )
 
-BLURRED = 1e3  # times the noise, of a row that says nothing
 COMMAND_STEP = 1e-6  # of the largest command, a step by which its passing is found
 FLAT = 0.2  # of the time in sliding, that a command may leave a motor without force
 SLOPE_STEP = 1e-3  # of a level of friction, over which a slope is taken
@@ -60,16 +59,14 @@ UNEXPLAINED = 1e3  # times the force to be explained
 class EffectRows:
     """Logs and the structure found so far.
 
-    logs: with sensor and command effects found already taken out; theta: m, F_cp, F_cn, F_vp,
-    F_vn; theta_a: k1, k2, offset; chosen: effects found so far whose sizes are fitted anew with
-    every candidate, at these values; taken: keys of those taken out of the logs; theta_f: in place
-    of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
-    speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
-    out, and when it is crossed is not seen;
-    sliding: friction with its band, once known, by which breakaways are exact; falls:
-    their limit falls to that of `sliding` with the first motion;
-    scales: by equation, what its rows' squares are divided by; borne: forces [N] up and down, up to
-    which a body that is at rest surely stays so, whatever levels an effect leaves to the others.
+    logs: with sensor and command effects found already taken out; theta: m, F_cp, F_cn, F_vp, F_vn;
+    theta_a: k1, k2, offset; chosen: effects found so far whose sizes are fitted anew with every
+    candidate, at these values; taken: keys of those taken out of the logs; theta_f: in place of
+    theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
+    speed [m/s] up to which friction is not that of sliding; sliding: friction with its band, once
+    known, by which breakaways are exact; scales: by equation, what its rows' squares are divided
+    by; borne: forces [N] up and down, up to which a body that is at rest surely stays so, whatever
+    levels an effect leaves to the others.
     """
 
     logs: tuple[MotionLog, ...]
@@ -80,9 +77,7 @@ class EffectRows:
     taken: tuple[str, ...] = ()
     theta_f: Array | None = None
     band: float = 0.0
-    play: bool = False
     sliding: Karnopp | None = None
-    falls: bool = False
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     borne: tuple[float, float] = (np.inf, np.inf)
 
@@ -128,7 +123,7 @@ class EffectRows:
     def events(self) -> tuple[Breakaways, ...]:
         """Breakaways of each log."""
         if self.sliding is not None:
-            return tuple(breakaway_limits(one, self.sliding, self.falls) for one in self.logs)
+            return tuple(breakaway_limits(one, self.sliding) for one in self.logs)
         return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
 
     @property
@@ -158,22 +153,10 @@ def plain_rows(
         rows = mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
         return rows if u is None else replace(rows, b=one.sliding.held @ driven(one, u))
     if equation == ACTUATOR:
-        rows = actuator(one, stage.theta_a, y, u)
-        if stage.play:
-            rows = replace(rows, sd=np.where(one_way(one), rows.sd, BLURRED * rows.sd))
-        return rows
+        return actuator(one, stage.theta_a, y, u)
     if equation == REST:
         return rest_rows(one, stage.at_rest[i], None if y is None else one.log["y"] - y)
     return breakaway_rows(one, stage.events[i])
-
-
-def one_way(one: MotionLog) -> BoolArray:
-    """Rows of the actuator equation without a reversal, in which a play may be crossed, (r,)."""
-    assert one.whole is not None
-    way = np.sign(one.signals["v"])
-    turns = np.concatenate([[0], np.cumsum((way[1:] != way[:-1]) | (one.signals["d"][1:] == 0))])
-    low, high = one.whole.start, one.whole.start + one.whole.length
-    return np.asarray(turns[high] == turns[low])
 
 
 def with_effect(

@@ -22,7 +22,6 @@ from identification.estimation.gauss_newton import (
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import (
     even,
-    loose,
     names_of,
     on_bristle,
     plant_with,
@@ -37,7 +36,6 @@ from identification.estimation.windowed_run.run_errors import (
 )
 from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, start_band
 from identification.estimation.windowed_run.windows import (
-    COARSE,
     RUN_WINDOW,
     freed,
     longest_window,
@@ -48,7 +46,6 @@ from identification.estimation.windowed_run.windows import (
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halted
-from identification.simulation.effect_table import LONGEST_BRISTLE
 from identification.thresholds import ADEQUATE, COMPLETE, HOPELESS
 
 # Of `descended`: windows [s] in which hardly a stop is lost first, samples that each has at least,
@@ -59,7 +56,6 @@ PASSES, IN_FULL_WITHIN = 2, 10.0
 PASSING = 0.03  # share of the cost, below which a step of an approach is the last
 # At most, of a refinement, of one on a bristle and of a quick one
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
-IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
 FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
@@ -155,16 +151,14 @@ class _Unknowns:
         """The plant of the unknowns (d,)."""
         return plant_with(self.plant, self.names, self.full(x))
 
-    def misfit(self, x: Array, bristle: float = COARSE) -> float:
+    def misfit(self, x: Array) -> float:
         """What the free run of the unknowns (d,) leaves."""
-        return misfit(self.plant_at(x), self.logs, self.drive, bristle)
+        return misfit(self.plant_at(x), self.logs, self.drive)
 
-    def refined(
-        self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE
-    ) -> Minimum:
+    def refined(self, x: Array, seconds: float, tie: bool, part: float = 0.0) -> Minimum:
         """The nearest minimum over windows of so many seconds; tie: the regression is the prior."""
         now = self.plant_at(x)
-        errors_of = judge(now, self.logs, self.drive, seconds, bristle)
+        errors_of = judge(now, self.logs, self.drive, seconds)
         # While most is far off, what is far off must still pull.
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST_FROM, FARTHEST))
         tied = np.flatnonzero(np.isfinite(self.trust) & (self.trust > 0))
@@ -236,7 +230,7 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
     """The minimum that a refinement of this effort ends in, its misfit, and whether it is one of
     runs as long as the command's can be followed."""
     plant, logs, drive = unknowns.plant, unknowns.logs, unknowns.drive
-    quick, slow = effort == "quick", on_bristle(plant)
+    quick = effort == "quick"
     at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bias what the equations give.
@@ -250,12 +244,6 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
         if again.followed and not (seconds == longest and _worse(unknowns, again, at)):
             at = again
     at, found = _ended(unknowns, at, quick)
-    if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
-        # Without a spring the errors of the sub-steps add up.
-        trial = unknowns.refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
-        left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
-        if left_by < found:
-            at, found = trial, left_by
     if effort == "long" and longest > RUN_WINDOW and found <= ADEQUATE:
         return _over_long_runs(unknowns, at, found, longest)
     return at, found, False

@@ -8,7 +8,6 @@ from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import loose
 from identification.estimation.windowed_run.windows import (
-    COARSE,
     RUN_WINDOW,
     WHOLE,
     Freed,
@@ -28,16 +27,14 @@ ROBUST_FROM = 3.0  # residual in noise units from which it counts less
 Judge = Callable[[Plant], Array]
 
 
-def judge(
-    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, bristle: float = COARSE
-) -> Judge:
+def judge(plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float) -> Judge:
     """Errors of a plant like this one, in units of the sensors' noise: position (and, driven by the
     command, force) over all logs, less what the windows' uncertain states account for.
 
-    Windows that this plant loses by chance (`misfit`) are left out: 0. bristle [s]: longest
-    sub-step of one. Sources: windows, Bock (1983); states, Robinson (1991): `README.md`, (1), (2).
+    Windows that this plant loses by chance (`misfit`) are left out: 0. Sources: windows, Bock
+    (1983); states, Robinson (1991): `README.md`, (1), (2).
     """
-    free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
+    free = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
     sizes = [len(one.log) * (1 if one.is_forced(drive) else 2) for one in logs]
     lost = [_lost(plant, one, drive, own) for one, own in zip(logs, free, strict=True)]
 
@@ -82,18 +79,18 @@ def soft(r: Array, far: float = ROBUST_FROM) -> Array:
 
 
 def misfit(
-    plant: Plant, logs: Sequence[MotionLog], drive: Drive, bristle: float = COARSE, *,
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, *,
     every: bool = False, weighed_by: Plant | None = None,
 ) -> float:  # fmt: skip
     """What the free run leaves of that signal of that log which it follows worst.
 
-    Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
-    longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
-    just reaches is a matter of chance and takes its window with it: the worst windows do not count,
-    unless every one is to. weighed_by: plant whose drift by the noise of force and command weighs
-    the errors, by default the run's own: two plants are compared at the weights of one, or the one
-    that drifts more would be the better. Robust as Cauchy's function (Holland, Welsch 1977);
-    `README.md`, (4).
+    Robust mean square in units of the sensors' noise: 1 where noise alone is left. Where
+    nothing brings the position back, a breakaway that the force only just reaches is a matter
+    of chance and takes its window with it: the worst windows do not count, unless every one is
+    to. weighed_by: plant whose drift by the noise of force and command weighs the errors, by
+    default the run's own: two plants are compared at the weights of one, or the one that drifts
+    more would be the better. Robust as Cauchy's function (Holland, Welsch 1977); `README.md`,
+    (4).
     """
     worst = 0.0
     free = loose(plant, drive) and not every
@@ -101,9 +98,9 @@ def misfit(
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not one.walks(drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
-            r = left_in_windows(plant, one, drive, seconds, bristle, weighed_by=weighed_by)
+            r = left_in_windows(plant, one, drive, seconds, weighed_by=weighed_by)
             if r is not None:
-                begun = starts(one, drive, seconds, bristle)
+                begun = starts(one, drive, seconds)
                 window = window_of(begun, len(one.log)) if free else None
                 moves = one.signals["d"] != 0
                 least = min(least, max(mean_loss(own, window, moves) for own in r))

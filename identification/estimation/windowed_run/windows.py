@@ -41,8 +41,7 @@ STATE_STEP = 0.3  # of a state's deviation, by which the change with it is taken
 class Starts:
     """Samples (k,) at which the windows of a log begin, states there, and their deviations.
 
-    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known. step [s]:
-    longest sub-step of a bristle in the runs.
+    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known.
     """
 
     at: IntArray
@@ -50,16 +49,12 @@ class Starts:
     v: Array
     F: Array
     sd: Array
-    step: float = COARSE
 
 
-def starts(
-    one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW, bristle: float = COARSE
-) -> Starts:
+def starts(one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW) -> Starts:
     """Windows of about so many seconds, begun at rest where the body rests near by.
 
-    bristle [s]: longest sub-step of one. Source: restarts as in multiple shooting, Bock (1983);
-    where they lie is ours.
+    Source: restarts as in multiple shooting, Bock (1983); where they lie is ours.
     """
     index, rest = window_places(one, seconds)
     y, around = np.asarray(one.log["y"]), samples(AROUND, one.log.h)
@@ -82,7 +77,6 @@ def starts(
         np.where(rest, 0.0, one.signals["v"][index]),
         np.asarray(one.log["F"])[index],
         sd,
-        bristle,
     )
 
 
@@ -115,7 +109,7 @@ def window_run(
             drive,
             restarts=(begun.at, y, v, F),
             gain=one.noise.corrected if drive == "command" else 0.0,
-            bristle_step=begun.step,
+            bristle_step=COARSE,
         )
 
     sensors = [acting.effect for acting in plant.effects if acting.effect.place.shows]
@@ -319,13 +313,13 @@ def longest_window(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> flo
 
 
 def left_in_windows(
-    plant: Plant, one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW,
-    bristle: float = COARSE, *, even: bool = False, weighed_by: Plant | None = None,
+    plant: Plant, one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW, *,
+    even: bool = False, weighed_by: Plant | None = None,
 ) -> Array | None:  # fmt: skip
     """Errors of a plant in its own windows of so many seconds, less their states' part, (k, n);
-    None: not to be followed. bristle, even: as `starts` and `freed` have them; weighed_by: plant of
-    the weights and states' part, by default the same. Source: Robinson (1991)."""
-    begun = starts(one, drive, seconds, bristle)
+    None: not to be followed. even: as `freed` has it; weighed_by: plant of the weights and states'
+    part, by default the same. Source: Robinson (1991)."""
+    begun = starts(one, drive, seconds)
     by = plant if weighed_by is None else weighed_by
     return window_residual(plant, one, drive, freed(by, one, drive, begun, even=even))
 

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from identification.effects._base import Effect
-from identification.estimation.regression.effect_columns import by_load, equations_of
+from identification.estimation.regression.effect_columns import equations_of
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.structure_fit import FittedStructure
@@ -30,7 +29,7 @@ from identification.tracing.free_run.backward_elimination import (
     with_steps,
 )
 from identification.tracing.free_run.contenders import RunContender, contender, on_whole_logs
-from identification.tracing.free_run.trial_structures import driven_only, structures
+from identification.tracing.free_run.trial_structures import structures
 from identification.tracing.regression.candidates import EffectCandidate, trial
 from identification.tracing.regression.stepwise import Choice, Step, with_candidate
 
@@ -74,18 +73,9 @@ def contest(
     winner = min(found, key=lambda one: one.misfit)
     done = on_whole_logs(winner, setting)
     rivals = [one for one in found if one.effect.key != winner.effect.key]
-    if done.misfit > decisive(model.misfit, rivals) or scales_alone(
-        winner.effect, done.plant, setting.logs
-    ):
+    if done.misfit > decisive(model.misfit, rivals):
         return None
     return _taken(winner, done, rivals, setting, model.misfit)
-
-
-def scales_alone(effect: Effect, plant: Plant, logs: Sequence[MotionLog]) -> bool:
-    """Whether an effect of the plant is friction by load, alike in both directions, where nothing
-    brakes: it but scales the other parameters there, and a better run was found by luck."""
-    values = next(acting.values for acting in plant.effects if acting.key == effect.key)
-    return by_load(effect) and values.get("asymmetry", 0.0) == 0.0 and driven_only(logs)
 
 
 def decisive(before: float, others: Sequence[RunContender]) -> float:

@@ -1,7 +1,7 @@
 """Structures to try in the forward run, and the values from which each begins."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -10,14 +10,13 @@ from identification.arrays import Array
 from identification.effects._base import Effect, Param
 from identification.estimation.regressed_plant import inside
 from identification.estimation.regression.effect_columns import by_load, slow_motion
-from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import BREAKAWAY, FIVE, REST, MotionLog
-from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
+from identification.estimation.regression.equation_rows import REST, MotionLog
+from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import loose
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without
-from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.library_search import ABSORBED
 from identification.tracing.regression.shape_grid import median_rest, shape_grid
 from identification.tracing.regression.stepwise import Choice, Step, gives_way
@@ -26,7 +25,6 @@ RIGID_CONTACT = 2.0  # square of what is seen of it at rest, in noise units, of 
 RIVALS_TRIED = 3  # rivals of an effect taken that are tried in its place
 MOST_TRIED = 40  # starts of one effect
 FORCE_LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
-GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
 REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 
@@ -74,40 +72,10 @@ def _beside(
             continue
         # Where every trial is a search, what the equations chose is not contested by all.
         if key in shown or (seen_in_run(effect) and not (instead and free)):
-            own = base
             values = [inside(effect, regressed[key].values)] if key in regressed else []
-            if values and effect.place.in_stops:
-                own, values = grown(regressed[key], base, setting.plain.start)
             values += grid(effect, base, setting.short)
             if values:
-                yield Trial(steps, own, effect, values)
-
-
-def grown(
-    one: EffectCandidate, base: Plant, start: EffectRows
-) -> tuple[Plant, list[dict[str, float]]]:
-    """Stick limits and sizes from which stiction that grows is tried.
-
-    The first motion was told as if the limit stayed, which shows less growth than there is: the
-    breakaways are told anew, with a limit that falls to what it is without a rest.
-    """
-    effect = one.effect
-    values = [
-        inside(effect, {**one.values, **{k: a * one.values[k] for k in effect.linear}})
-        for a in GROWN
-    ]
-    up, down = (float(x) for x in one.outcomes[BREAKAWAY].fit.theta[:2])
-    if min(up, down) <= 0.0:
-        return base, values
-    friction = replace(base.friction, F_sp=up, F_sn=-down)
-    if not base.effects and np.all(start.theta > 0.0):  # the run bent its sliding
-        five = dict(zip(FIVE, start.theta.tolist(), strict=True))
-        friction = replace(friction, **five)
-    stage = replace(start, sliding=friction, falls=True)
-    outcomes = base_fits(stage)
-    again = best_of(stage, effect, outcomes) if BREAKAWAY in outcomes else None
-    more = [inside(effect, again.values)] if again is not None else []
-    return replace(base, friction=friction), more + values
+                yield Trial(steps, base, effect, values)
 
 
 def rigid(first: Mapping[str, RowFit]) -> bool:

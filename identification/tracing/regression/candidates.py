@@ -123,14 +123,6 @@ def first_shape(stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]) -
     return replace(begun, shape=best, gain=float(begun.without - least))
 
 
-def best_of(
-    stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]
-) -> EffectCandidate | None:
-    """The effect at its best beside what the stage holds; None where it cannot show or stand."""
-    start = first_shape(stage, effect, base)
-    return None if start is None else refined(start)
-
-
 def refined(start: FirstShape) -> EffectCandidate | None:
     """The effect at its best; None where it cannot stand.
 

@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.effects._library import Library
-from identification.estimation.regression.effect_columns import Values, slow_motion
+from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -23,7 +23,6 @@ from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
     mean_square,
-    rough,
     row_fit,
     settled_fits,
 )
@@ -34,18 +33,15 @@ from identification.estimation.regression.signals_behind_effects import (
     shown_to_true,
 )
 from identification.progress import Halted, Progress
-from identification.thresholds import EARNS, FAR_LESS, HALF, MATERIAL, PENALTY, WORSE
+from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
-    best_of,
 )
-from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.library_search import at_own_scale, of_sliding, scales_of
 from identification.tracing.regression.significance import by_luck, chance
 
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
-REFUSED = 3  # candidates tried in turn
 # What a halted choice leaves out
 EFFECTS = "the effects of the library"
 FURTHER_EFFECT = "a further effect beside the first"
@@ -102,105 +98,18 @@ def choose(
     try:
         for turn in range(len(steps), most):
             tried = at_own_scale(stage, base, library, partial(_report, report, turn))
-            found = accepted(tried, stage, base, rng)
-            if found is None:
+            step = next_step(tried, stage, base, rng)
+            if step is None:
                 break
-            step, stage, base = found
+            stage, base = with_candidate(step.stage, step.candidate)
             steps = [*steps, step]
-            if len(stage.chosen) > 1:
-                stage, base, steps = polished(stage, base, steps)
     except Halted:
         start.logs[0].halt.left_out(FURTHER_EFFECT if steps else EFFECTS)
-    if steps and rough(base):
-        stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
-
-
-def accepted(
-    tried: Sequence[EffectCandidate],
-    stage: EffectRows,
-    base: Mapping[str, RowFit],
-    rng: np.random.Generator,
-) -> tuple[Step, EffectRows, Mapping[str, RowFit]] | None:
-    """The best step that does not gain at the price of what it bends, and what is then left."""
-    for _ in range(REFUSED):
-        step = next_step(tried, stage, base, rng)
-        if step is None:
-            return None
-        after, left = with_candidate(step.stage, step.candidate)
-        without = base_fits(replace(stage, scales=after.scales))
-        both = without.keys() & left.keys()
-        if sum(left[e].criterion for e in both) <= sum(without[e].criterion for e in both):
-            return step, after, left
-        key = step.candidate.effect.key
-        tried = [one for one in tried if one.effect.key != key]
-    return None
-
-
-def trusted(
-    start: EffectRows, steps: Sequence[Step]
-) -> tuple[EffectRows, Mapping[str, RowFit], list[Step]]:
-    """The leading steps that carry over to logs left out, or else explain most of what is missing.
-
-    Where much is left whatever is added, a term that explains a part of it lowers the training
-    error and may raise that of another run (measured on EMPS). Source: cross-validation, Stone
-    (1974); `README.md` of `tracing`, (5).
-    """
-    kept: list[Step] = []
-    stage, base = start, base_fits(start)
-    slowest = base[MECHANICAL].slowest
-    error = left_out_error(stage, slowest)
-    missing = mean_square(base[MECHANICAL]) - 1.0
-    for step in steps:
-        after, found = with_candidate(scaled_as(step, stage), step.candidate)
-        without = left_out_error(after, slowest)
-        if error > 0 and MECHANICAL in step.candidate.outcomes:
-            less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
-            stays = is_trusted(without / error, less / max(missing, 1e-300))
-        else:
-            stays = is_trusted(np.inf, share(step.candidate, step.base))
-        if not stays:
-            break
-        kept.append(step)
-        stage, base, error = after, found, without
-    return stage, base, kept
-
-
-def is_trusted(left: float, explained: float) -> bool:
-    """Whether an effect carries over, or explains most; left: share of the error on logs left out,
-    explained: of what is missing. Ours: `../README.md`, (5)."""
-    return left * WORSE < 1.0 or explained >= HALF
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
     report("tracing", (turn + part) / MOST_EFFECTS)
-
-
-def polished(
-    stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
-) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
-    """Every effect that is in columns at its best beside the others; those not needed any more go.
-
-    Source: the backward part of stepwise regression, Efroymson (1960).
-    """
-    scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
-    best = {step.candidate.effect.key: step.candidate for step in steps}
-
-    def kept(but: str = "") -> tuple[tuple[Effect, Values], ...]:
-        """The effects in columns that have not gone, but one."""
-        keys = [e.key for e, _ in stage.chosen if e.key in best and e.key != but]
-        return tuple((best[key].effect, best[key].values) for key in keys)
-
-    for effect, _ in stage.chosen[:-1]:
-        without = replace(stage, chosen=kept(effect.key), scales=scales)
-        candidate = best_of(without, effect, base_fits(without))
-        if candidate is None or merit(candidate) <= 0:
-            del best[effect.key]
-        else:
-            best[effect.key] = replace(best[effect.key], values=candidate.values)
-    after, found = settled_fits(of_sliding(replace(stage, chosen=kept()), stage.scale(MECHANICAL)))
-    left = [s for s in steps if s.candidate.effect.key in best]
-    return after, found, [replace(s, candidate=best[s.candidate.effect.key]) for s in left]
 
 
 def scaled_as(step: Step, stage: EffectRows) -> EffectRows:
@@ -225,10 +134,7 @@ def next_step(
     worth = [
         c
         for c in ranked
-        if material(c, scaled, base)
-        and share(c, base) >= 1.0 - EARNS
-        and shows_fast(c, scaled, base)
-        and gives_way(c, base)
+        if material(c, scaled, base) and share(c, base) >= 1.0 - EARNS and gives_way(c, base)
     ]
     if not worth:
         return None
@@ -255,26 +161,6 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
     return tuple(
         c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
     )
-
-
-def shows_fast(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
-    """Whether an effect that acts at any speed gains where the base explains the motion at all.
-
-    In the band the body takes any force, so some effect always fits a few of its rows.
-    """
-    effect = candidate.effect
-    if not effect.place.any_speed or slow_motion(effect):
-        return True
-    gain = 0.0
-    for equation, after in candidate.outcomes.items():
-        before = base[equation]
-        keep = before.rows.speed >= before.slowest
-        if before.robust or not np.any(np.isfinite(before.rows.speed)):
-            gain += before.criterion - after.criterion
-            continue
-        less = np.sum(before.fit.residual[keep] ** 2) - np.sum(after.fit.residual[keep] ** 2)
-        gain += float(less) / stage.scale(equation) + before.rows.lost - after.rows.lost
-    return gain > PENALTY * len(effect.params)
 
 
 def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:
@@ -393,5 +279,4 @@ def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
             more = {"F": driven(one, whole)} if one.held else {}
             log = one.log.with_signals(u=command_of(one, whole), **more)
         logs.append(again(one, log))
-    play = stage.play or (effect.place.shows and effect.evolve is not None)
-    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)
+    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key))

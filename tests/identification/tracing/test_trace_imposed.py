@@ -12,12 +12,11 @@ from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
+from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.log import Log, Rig
-from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.tracing.test_trace import PLAIN, made
@@ -113,21 +112,6 @@ def test_test_logs_are_recorded_as_the_training_logs_are() -> None:
     found = traced([one], [one])
     sizes = (found.before["train"].force_rms, found.before["test"].force_rms)
     assert sizes[0] is not None and sizes[0] == pytest.approx(sizes[1])
-
-
-def test_runs_of_one_file_are_left_out_together() -> None:
-    def error(*names: str) -> float:
-        logs = [strokes(bar, [9e-3] * 3, bar) for bar in (1, 5, 5)]
-        parts: list[MotionLog] = [
-            motion_log(Log(name, log.signals), held=False, by_command=False, imposed=True)
-            for name, log in zip(names, logs, strict=True)
-        ]
-        zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
-        return left_out_error(EffectRows(tuple(parts), *zeros, by_command=False), 0.0)
-
-    # Two runs at 5 bar tell of each other, unless they are one file's.
-    assert error("a", "b", "b") > 1.3 * error("a", "b", "c")
-    assert error("a", "a", "a") == pytest.approx(error("a", "b", "c"))
 
 
 @pytest.mark.parametrize("imposed", [True, False])

@@ -22,7 +22,6 @@ from identification.tracing.free_run.forward_selection import (
     judged_forward,
     luck,
     most_left,
-    scales_alone,
 )
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, choose
@@ -153,21 +152,6 @@ def test_asymmetries_of_zero_are_held() -> None:
     assert held == {"stribeck.asymmetry": 0.0, "stribeck.delta": 0.0}
     uneven = {"F_s": 1.0, "v_s": 0.1, "asymmetry": 0.1, "delta": 1.5}
     assert even(plant({"stribeck": uneven})) == {}
-
-
-def test_friction_by_load_that_only_scales_is_not_taken() -> None:
-    one = seen(made(6))
-    load = built_in()["load_dependent_friction"]
-    alike, uneven = (
-        plant({load.key: {"mu": 0.2, "asymmetry": asymmetry}}) for asymmetry in (0.0, 0.2)
-    )
-    assert scales_alone(load, alike, [one])
-    assert not scales_alone(load, uneven, [one])
-    braking = np.where(one.log["t"] % 1.0 < 0.1, -1.0, 1.0) * one.log["F"]
-    brakes = replace(one, log=one.log.with_signals(F=braking))
-    assert not scales_alone(load, alike, [brakes])
-    spring = plant({"spring": {"k": 40.0}})
-    assert not scales_alone(built_in()["spring"], spring, [one])
 
 
 def test_no_contest_where_sliding_itself_is_not_explained() -> None:

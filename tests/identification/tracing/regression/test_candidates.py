@@ -11,8 +11,9 @@ from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.model.karnopp import Karnopp
-from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.candidates import EffectCandidate
 from tests.identification.motor_logs import NINE, made, seen
+from tests.identification.tracing.settings import best_of
 
 
 def best(

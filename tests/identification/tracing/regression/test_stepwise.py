@@ -1,26 +1,23 @@
-"""Choice on the equations: the next best where the best bends the rest, and bristles by rest."""
+"""Choice on the equations: rows of rest, and bristles by rest."""
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, REST
-from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.regression.equation_rows import REST
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
-from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import (
     absorb,
     choose,
     explained_part,
     gives_way,
-    trusted,
 )
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
-from tests.identification.tracing.test_trace import made as pneumatic
+from tests.identification.tracing.settings import best_of
 
 
 def quiet(_stage: str, _share: float) -> None:
@@ -64,17 +61,6 @@ def test_a_bristle_that_explains_rest_gives_way() -> None:
     start, first = first_stage([seen(log)], False)
     candidate = best_of(start, built_in()["presliding"], first)
     assert candidate is not None and gives_way(candidate, first)
-
-
-@pytest.mark.slow
-def test_logs_left_out_say_nothing_against_an_effect_of_another_equation() -> None:
-    effects = {"leakage": {"leak": 1.5}}
-    logs = [motion_log(pneumatic(seed, effects), held=False, by_command=True) for seed in (21, 22)]
-    start, first = first_stage(logs, True)
-    library = {"leakage": built_in()["leakage"]}
-    found = choose(start, first, library, np.random.default_rng(0), quiet)
-    assert list(found.steps[0].candidate.outcomes) == [ACTUATOR]
-    assert trusted(start, found.steps)[2] == list(found.steps)
 
 
 def test_the_part_explained_is_that_of_the_square_beyond_the_noise() -> None:
