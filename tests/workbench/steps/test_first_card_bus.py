@@ -9,6 +9,7 @@ import pytest
 
 from identification.errors import BadLog
 from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.registers import read_register
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
 H, HOLD, LATE = 0.005, 4, 20  # s a row; rows for which a value is held; rows of a speed's mean
@@ -102,3 +103,25 @@ def test_a_filtered_copy_is_no_reference(tmp_path: Path) -> None:
                     current + 0.01 * noise[1])  # fmt: skip
     columns = {one.name: one.column for one in found.signals}
     assert columns["y"] == "distance" and "r" not in columns
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_a_sign_bit_is_seen_where_a_stroke_is_a_few_rows(tmp_path: Path, rows: int) -> None:
+    """A bus servo's load: at each step of its target it turns within a row, and decays to zero."""
+    n, h = 6000, 0.01
+    target = 2047.0 + 200.0 * np.sign(np.sin(2.0 * np.pi * 0.4 * h * np.arange(n)))
+    y, v, load = np.full(n, 2047.0), 0.0, np.zeros(n)
+    for k in range(1, n):
+        load[k] = np.clip(16.0 * (target[k] - y[k - 1]), -1000.0, 1000.0)
+        v += 0.1 * (2.0 * load[k] - v)
+        y[k] = y[k - 1] + h * v
+    words = np.where(load < 0.0, 1024.0 - np.round(load), np.round(load))
+    with pytest.raises(BadLog, match=r"'load' jumps by 1024 .*sign and magnitude, bit 10"):
+        propose(tmp_path, "time_s,target,pos,load", h * np.arange(n)[::rows], target[::rows],
+                np.round(y)[::rows], words[::rows])  # fmt: skip
+
+
+def test_a_signal_that_goes_through_a_power_of_two_has_no_sign_bit() -> None:
+    swing = np.round(1024.0 + 900.0 * np.sin(0.05 * np.arange(4000)))
+    steps = np.where(np.arange(4000) // 40 % 2, 1500.0, 0.0) + np.arange(4000.0) % 3.0
+    assert read_register(swing) is None and read_register(steps) is None
