@@ -140,7 +140,8 @@ def _seen_smoother(way: Way) -> Way:
     (drive,), y = way.columns.values(), way.seen.y
     motions = (differentiate(y.x, 1.0, way.seen.motion.cutoff / less) for less in MORE_SMOOTHED)
     laws = [law for one in motions if (law := force_law(one, y.x, drive.x)) is not None]
-    best = max(laws, key=lambda law: law.share, default=own)
+    onwards = [law for law in laws if law.friction is None]
+    best = max(onwards, key=lambda law: law.share, default=own)
     return replace(way, law=best) if best.share >= MOSTLY_ITS_LAW else way
 
 
