@@ -58,6 +58,7 @@ NO_REST_WHY = (
     "{}: no rest that ends is seen in it, and the force changes between its samples; log starts"
     " from rest, at the rate of the drive's loop"
 )
+STOP_TURNS_ON_LESS = "a stop turns on less than the noise there"
 RESIDUAL_DRIFT_SAID = (
     "the run drifts slowly from the log (by {:.3g} deviations in all), less than the noise at any"
     " sample: a sample of the command may be wrong, or the body was touched; intervals are widened"
@@ -147,7 +148,7 @@ def _why_windows(recorded: RecordedLogs) -> str:
     if walk == 0.0:
         return MinorRemark(
             "the model follows the logs in windows of 2 s from measured states, but not the whole:"
-            " a stop turns on less than the noise there"
+            f" {STOP_TURNS_ON_LESS}"
         )
     return MinorRemark(
         "the logged command has noise of its own: integrated, it takes the force"

@@ -20,6 +20,7 @@ MIN_SAMPLES = 64
 ORDER = 4
 LOCAL_DEGREE = 5
 CUTOFF_MARGIN = 2.0
+MOST_CUTOFF = 0.4  # of the sampling
 # Share of the samples at which it stands, and levels at which it does
 RESTED, LEVELS_AT_REST = 0.05, 8
 MOST_STEPS = 1e8  # in the range of a position that is counted
@@ -52,7 +53,7 @@ class Motion:
 class Spectrum:
     """What a position's spectrum says: `noise` [m] (white, one sigma), `cutoff` [Hz] to smooth at.
 
-    `cutoff` is twice the frequency where signal and noise are equal, at most 0.4 of the sampling.
+    `cutoff` is twice the frequency where signal and noise are equal, at most `MOST_CUTOFF`.
     """
 
     noise: float
@@ -81,7 +82,7 @@ def spectrum(y: Array, h: float) -> Spectrum:
     floor = max(floor, 2.0 * resolution(y) ** 2 / 12.0)
     above = np.flatnonzero(_smooth(ratio) > 2.0 * floor)
     cut = float(f[above[-1]]) if len(above) else float(f[0])
-    return Spectrum(float(np.sqrt(floor / 2.0)), min(CUTOFF_MARGIN * cut, 0.4) / h)
+    return Spectrum(float(np.sqrt(floor / 2.0)), min(CUTOFF_MARGIN * cut, MOST_CUTOFF) / h)
 
 
 def is_long_enough(y: Array) -> bool:

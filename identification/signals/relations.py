@@ -13,7 +13,13 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
 from identification.signals.check import work_share
-from identification.signals.differentiate import Motion, differentiate, low_pass
+from identification.signals.differentiate import (
+    MOST_CUTOFF,
+    Motion,
+    differentiate,
+    low_pass,
+    spectrum,
+)
 
 SURE_OF_MOTION = 4.0  # times the velocity's noise, from which a sample counts as moving
 LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
@@ -59,12 +65,15 @@ class Lead(NamedTuple):
     either: bool = False
 
 
-def motion_of(x: Array) -> Motion | None:
-    """The motion of a signal in samples; None where it is too short or does not change."""
+def motion_of(x: Array, renewed: float = 1.0) -> Motion | None:
+    """The motion of a signal in samples; None where it is too short or does not change.
+
+    renewed: samples from one new value to the next, between which it is interpolated.
+    """
     if np.ptp(x) == 0.0:
         return None
     try:
-        return differentiate(x, 1.0)
+        return differentiate(x, 1.0, min(spectrum(x, 1.0).cutoff, MOST_CUTOFF / renewed))
     except BadLog:
         return None
 

@@ -15,7 +15,7 @@ Quantity = Literal[
     "time", "position", "velocity", "acceleration", "force", "pressure", "command", "temperature",
     "count", "other",
 ]  # fmt: skip
-Purpose = Literal["reference", "demand", "measured", "error", "model", ""]
+Purpose = Literal["reference", "demand", "measured", "error", "model", "filtered", ""]
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class WrittenUnit:
 class Header:
     """A header read: its text, the name without the unit, the unit (None: none), the quantities
     that its words mean with their weight, what the signal is for ("model": what another model
-    says), and whether it speaks of an angle.
+    says; "filtered": a smoothed copy), and whether it speaks of an angle.
 
     doubtful: the unit may as well belong to the name, as the m of "y_m"; turning: log-odds of a
     machine that turns, by words that others have too.
@@ -184,6 +184,8 @@ _ERRORS = (
     "following",
     "误差",
 )
+_FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
+_FILTERED_SHORT = ("filt", "lpf")
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
@@ -323,4 +325,6 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
         return "measured"
     if any(one.startswith("ist") for one in words):  # Istposition, Istwert
         return "measured"
+    if any(one in whole for one in _FILTERED) or any(one in _FILTERED_SHORT for one in words):
+        return "filtered"
     return ""

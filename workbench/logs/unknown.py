@@ -314,10 +314,27 @@ def _rows_of(path: Path) -> tuple[str | None, str]:
     run, said = _run_of([place for _, place in long])
     own = [(one, place) for one, place in long if place[: len(run)] == run]
     if isinstance(own[0][0][0], dict | list):
-        return ".".join(own[0][1]) or None, said
+        return ".".join(own[0][1]) or None, said or _more_runs(lists, *own[0])
     levels = zip(*(place for _, place in own), strict=False)
     place = tuple(keys[0] for keys in takewhile(lambda keys: len(set(keys)) == 1, levels))
     return ".".join(place[:-1] if len(own) == 1 else place) or None, said
+
+
+def _more_runs(
+    lists: Sequence[tuple[list[Any], tuple[str, ...]]], rows: list[Any], place: tuple[str, ...]
+) -> str:
+    """What is said of further lists that hold rows as the one that is read does."""
+    more = [repr(".".join(other)) for one, other in lists
+            if other != place and _shape(one[0]) == _shape(rows[0])]  # fmt: skip
+    if not more:
+        return ""
+    runs = f"{', '.join(more)} hold rows as {'.'.join(place)!r} does"
+    return f"{runs}, which the card reads; give another run by the card's [file] rows"
+
+
+def _shape(row: Any) -> Any:
+    """What rows of one kind have in common: their keys, or how many values they hold."""
+    return sorted(row) if isinstance(row, dict) else len(row) if isinstance(row, list) else None
 
 
 def _run_of(places: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], str]:

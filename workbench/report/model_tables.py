@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from identification.effects._base import Param
 from identification.estimation.latent_force import LatentForces
+from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
@@ -186,10 +187,12 @@ def _found(model: Model, missing: float | None) -> str:
 
 def _noise_of(model: Model) -> str:
     """Whose noise an adequate model leaves: that of what drives its run is larger in position than
-    the position sensor's."""
+    the position sensor's, and so is what a stop leaves that comes a row sooner or later."""
     off, drive = _off(model), model.fit.drive
     if off is None or off <= ASTRAY * model.fit.noise_y:
         return "sensor noise"
+    if any(STOP_TURNS_ON_LESS in remark for remark in model.fit.remarks):
+        return "sensor noise, and what follows where a stop turns on less than it"
     return f"what noise of the {'command' if drive == 'command' else 'measured force'} makes"
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from tests.chain import EMPS, model_of, short_recipe
@@ -49,6 +50,18 @@ def test_a_force_that_shows_is_not_called_noise() -> None:
     said = summary(by_equation(1.0, replace(EMPS, F_cp=2.0, F_cn=2.0)), found.before)
     assert "little more than noise, but a force is missing" in said
     assert "Force missing: " in said
+
+
+def test_stops_that_turn_on_noise_are_no_noise_of_the_command() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    entry = replace(model.log[0], position_rms=1e3 * model.fit.noise_y)
+    fit = replace(model.fit, drive="command", adequate=True)
+    for remarks, said in (
+        ((f"{WINDOWED}: {STOP_TURNS_ON_LESS}",), "sensor noise, and what follows where a stop"),
+        ((), "nothing but what noise of the command makes"),
+    ):
+        left = replace(model, log=(entry,), fit=replace(fit, remarks=remarks))
+        assert said in summary(left, None)
 
 
 WINDOWED = "the model follows the logs in windows of 2 s from measured states, but not the whole"

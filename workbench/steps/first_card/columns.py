@@ -17,6 +17,7 @@ from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.noise import local_noise
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
+from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header
 from workbench.logs.faulty_rows import (
@@ -54,7 +55,8 @@ MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 @dataclass(frozen=True, eq=False)
 class Column:
     """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
-    as its register means them; axis: which of several machines of the log it is of ("": of all)."""
+    as its register means them; axis: which of several machines of the log it is of ("": of all);
+    renewed: samples of `x` from one new value to the next of a column that is held, else 1."""
 
     raw: RawColumn
     header: Header
@@ -62,6 +64,7 @@ class Column:
     x: Array
     register: Register | None = None
     axis: str = ""
+    renewed: float = 1.0
 
     @property
     def bits(self) -> int | None:
@@ -90,7 +93,7 @@ class Column:
     @cached_property
     def motion(self) -> Motion | None:
         """The column as if it were a position."""
-        return motion_of(self.x)
+        return motion_of(self.x, self.renewed)
 
     @cached_property
     def noise(self) -> float:
@@ -184,7 +187,7 @@ def columns_of(log: UnknownLog) -> Columns:
     whole = [_unwrapped(clock.values, one) for one in others]
     log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
     signals = [
-        replace(one, x=_on_grid(clock.values, x, step, grid))
+        _on_grid(one, clock.values, x, step, grid)
         for one, (x, _) in zip(others, whole, strict=True)
     ]
     phases = _phases(signals)
@@ -256,6 +259,7 @@ def _ticks(one: Column) -> bool:
     """Whether a column only goes up, by steps that are mostly alike or called times."""
     means, unit = one.header.means, one.header.unit
     other = {"position", "velocity", "force", "pressure"} & set(means) and "time" not in means
+    other = other or ("command" in means and not {"time", "count"} & set(means))  # a ramp of it
     if not _rises(one) or other or (unit and unit.quantity not in ("time", "count")):
         return False
     step = np.diff(one.values)
@@ -333,8 +337,7 @@ def _unwrapped(t: Array, one: Column) -> tuple[Array, str]:
     """A column (n,), unwrapped as whoever reads a position by a card does where it is a counter or
     an angle that wraps, and what is said of that; any other as it is."""
     known = np.isfinite(one.values)
-    may_be = not one.header.means or "position" in one.header.means
-    if not may_be or np.sum(known) < SHORTEST_LOG:
+    if not _may_be_position(one) or np.sum(known) < SHORTEST_LOG:
         return one.values, ""
     made, found = unwrapped(Log("", {"t": t[known], "y": one.values[known]}), rotary=True)
     size = found[0].size if found else None
@@ -347,13 +350,27 @@ def _unwrapped(t: Array, one: Column) -> tuple[Array, str]:
     return x, f"{one.shown} leaps by {size:.7g} {found[0].samples} times, {what}: unwrapped"
 
 
-def _on_grid(t: Array, x: Array, step: float, size: int) -> Array:
-    """The column at even times, its means over so many steps of the clock, (k,)."""
+def _on_grid(one: Column, t: Array, x: Array, step: float, size: int) -> Column:
+    """The column at even times, its values x (n,) means over so many steps of the clock, (k,).
+
+    One that may be a position, and is held while the clock goes on, is interpolated between its new
+    values: its steps are no motion.
+    """
     good = np.isfinite(x)
+    held = held_for(x) if _may_be_position(one) else 1
+    held = held if USUAL_FROM <= held <= LONGEST_HOLD else 1
+    if held > 1:
+        good = np.isin(np.arange(len(x)), np.union1d(0, new_values(x, held)))
     count = min(round((t[-1] - t[0]) / step) + 1, 50 * len(t))
     even = np.interp(t[0] + step * np.arange(count), t[good], x[good])
     whole = len(even) // size
-    return np.asarray(even[: whole * size].reshape(whole, size).mean(axis=1))
+    means = np.asarray(even[: whole * size].reshape(whole, size).mean(axis=1))
+    return replace(one, x=means, renewed=max(1.0, held / size))
+
+
+def _may_be_position(one: Column) -> bool:
+    """Whether no header denies that a column is a position."""
+    return not one.header.means or "position" in one.header.means
 
 
 def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int, str]]:

@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from itertools import permutations
 
+import numpy as np
+
 from identification.errors import BadLog
-from identification.signals.relations import lead
+from identification.signals.relations import FEWEST_MOVING, lead, moving
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import PHASE_CURRENT, Column, Columns
 from workbench.steps.first_card.motion_guess import is_current
 from workbench.steps.first_card.roles import Roles
-from workbench.steps.first_card.weights import SURE, said
+from workbench.steps.first_card.weights import SURE, said, together
 
 FOLLOWED = 0.95  # likeness of a position and its reference in a log without a drive
 NO_DRIVE = 0.0  # log-odds of a force by its header, of what may be a reference at most
@@ -36,7 +38,10 @@ def no_body(columns: Columns) -> BadLog:
             " every card needs; log the position too, or add a column of it, the speed summed over"
             f" time{how}"
         )
-    if (pair := _followed(columns.signals)) is not None:
+    pair = _followed(columns.signals)
+    if pair is not None and (told := _hardly_moves(pair, columns.signals)):
+        return BadLog(f"{columns.log.path}: {told}")
+    if pair is not None:
         return BadLog(
             f"{columns.log.path}: column {pair[0].shown} follows its reference {pair[1].shown}, and"
             " no force and no command of the motor is logged; log its current, torque or force too:"
@@ -59,9 +64,26 @@ def _followed(signals: Sequence[Column]) -> tuple[Column, Column] | None:
     """A position and the reference that it follows; None where there are no such two."""
     for y, r in permutations(signals, 2):
         other = max(said(r, "F"), said(r, "p")) <= NO_DRIVE and r.header.purpose != "model"
+        other &= not r.header.speed
         if said(y, "y") >= SAID_SO and other and lead(r.x, y.x).likeness > FOLLOWED:
             return y, r
     return None
+
+
+def _hardly_moves(pair: Sequence[Column], signals: Sequence[Column]) -> str:
+    """Why a drive that is logged is not known beside a position and its reference: too few rows in
+    which the body moves; empty where no header speaks of a drive, or enough moves."""
+    y = pair[0]
+    drives = [one for one in signals if max(said(one, "F"), said(one, "u")) >= SAID_SO]
+    drives = sorted((one for one in drives if one not in pair), key=lambda one: -together(y, one))
+    rows = 0 if y.motion is None else int(np.sum(moving(y.motion)))
+    if not drives or rows >= FEWEST_MOVING:
+        return ""
+    return (
+        f"column {y.shown} moves in {rows} of its {len(y.x)} rows, too few to see whether"
+        f" {drives[0].shown} drives it (at least {FEWEST_MOVING} needed); log more strokes, or more"
+        " rows of each"
+    )
 
 
 def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Column | None]:

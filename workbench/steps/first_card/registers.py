@@ -10,6 +10,9 @@ BITS = (16, 32)  # of a register that counts below zero as two's complement
 FEWEST_BITS = 8  # of a magnitude beside its sign
 BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
 NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
+# Of leaps at a bit of sign: how many at least, the share of those near zero, how far it goes both
+# ways, and times all magnitudes that the bit is far above them.
+FEWEST_LEAPS, OFTEN_NEAR, BOTH_WAYS, FAR_ABOVE = 4, 0.25, 0.25, 2.0
 SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
 COUNT_PARTS = 256.0  # of a count that is halved again and again
 LONG_WAY_OF_COUNTS = 1000.0  # that such a position covers at least
@@ -43,21 +46,29 @@ def read_register(x: Array) -> Register | None:
 
 
 def _sign_and_magnitude(x: Array) -> Register | None:
-    """The column whose topmost bit is the sign: it leaps by that bit where it passes zero."""
+    """The column whose topmost bit is the sign: it leaps by that bit where it passes zero.
+
+    In a few rows a stroke it passes zero within a row: then by those leaps that are near it, which
+    no signal has that goes through the bit's value; or, where that is far above all else, by this.
+    """
     finite = x[np.isfinite(x)]
     bit = int(np.log2(max(finite.max(), 1.0)))
     top = 2.0**bit
     if bit < FEWEST_BITS or not np.any(finite < top):
         return None
     read = np.where(x >= top, top - x, x)
+    most, least = float(np.nanmax(np.abs(read))), float(min(np.nanmax(read), -np.nanmin(read)))
     step, smooth = np.abs(np.diff(x)), np.abs(np.diff(read))
     leaps = np.flatnonzero((x[1:] >= top) != (x[:-1] >= top))
-    if not len(leaps) or np.nanmax(smooth) > SMOOTHER * np.nanmax(step):
+    if not len(leaps):
         return None
-    size = np.maximum(np.abs(read[leaps]), np.abs(read[leaps + 1]))
-    if np.nanmedian(size) > NEAR_ZERO * float(np.nanmax(np.abs(read))):
-        return None
-    return Register(read, None, bit, int(leaps[0]) + 2)
+    near = np.maximum(np.abs(read[leaps]), np.abs(read[leaps + 1])) <= NEAR_ZERO * most
+    slow = np.nanmax(smooth) <= SMOOTHER * np.nanmax(step) and np.mean(near) >= 0.5
+    both = len(leaps) >= FEWEST_LEAPS and least > BOTH_WAYS * most
+    apart = FAR_ABOVE * most < top and finite[finite >= top].min() - top <= NEAR_ZERO * most
+    if slow or (both and (np.mean(near) >= OFTEN_NEAR or apart)):
+        return Register(read, None, bit, int(leaps[0]) + 2)
+    return None
 
 
 def halved_counts(x: Array) -> bool:

@@ -33,7 +33,8 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
             f" position by this clock: the clock runs {slow}, or the unit of position"
             f" ({units['y'].unit}) or velocity ({units['v'].unit}) is another"
         )
-    if roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
+    both = roles.law.friction is not None  # of a motion one way, what is off zero may be friction
+    if both and roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
         balance, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
         if balance > BALANCED * coulomb:
             yield (

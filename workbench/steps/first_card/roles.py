@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from identification.log import RigKind
+from identification.signals.differentiate import differentiate
 from identification.signals.relations import (
     GIVES_SIGN,
     ForceLaw,
@@ -46,6 +47,11 @@ from workbench.steps.first_card.weights import (
 MOST_WAYS = 14  # ways to drive a body, that every other role is asked about
 FRICTION_GIVES_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
 HARDLY_ITS_LAW = 0.05  # the same of columns that are rather no position and force of one body
+MORE_SMOOTHED = (
+    2.0,
+    4.0,
+    8.0,
+)  # times smoother than by its own noise, that a position is looked at
 MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
 WORK_GIVES_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
 COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
@@ -113,12 +119,30 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     ways.sort(key=lambda one: -with_reference(one))
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
+    choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
     same = (one for one in choices if one.way.y is best.way.y)
     other = next((one for one in same if one.way.kind != best.way.kind), None)
     rest = None if other is None else _roles_of(other, [one for one in choices if one is not best])
     ahead = np.inf if other is None else best.score - other.score
     return replace(_roles_of(best, choices), other=rest, ahead=ahead)
+
+
+def _seen_smoother(way: Way) -> Way:
+    """The way with the law that more smoothing shows, of a drive that it then explains mostly.
+
+    Of a motion one way, in which all but a constant is inertia: by the position's own smoothing its
+    acceleration may be noise or steps. Both ways friction's step is seen without, and blurred so.
+    """
+    own = way.law
+    if own.share >= MOSTLY_ITS_LAW or own.friction is not None or len(way.columns) != 1:
+        return way
+    (drive,), y = way.columns.values(), way.seen.y
+    motions = (differentiate(y.x, 1.0, way.seen.motion.cutoff / less) for less in MORE_SMOOTHED)
+    laws = [law for one in motions if (law := force_law(one, y.x, drive.x)) is not None]
+    onwards = [law for law in laws if law.friction is None]
+    best = max(onwards, key=lambda law: law.share, default=own)
+    return replace(way, law=best) if best.share >= MOSTLY_ITS_LAW else way
 
 
 def _roles_of(best: _Choice, choices: Sequence[_Choice]) -> Roles:

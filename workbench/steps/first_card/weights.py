@@ -54,6 +54,7 @@ A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
 OF_A_CONTROLLER = -6.0  # for a drive whose difference from the position another column follows
 STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
+OF_A_COPY = -5.0  # for a reference that is filtered from a position, or filtered to one
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
@@ -100,6 +101,8 @@ def _by_purpose(one: Column, role: str) -> float:
         return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
         return -1.0 if role == "u" else 0.0
+    if purpose == "filtered":
+        return {"r": OF_A_COPY, "y": -1.0}.get(role, 0.0)
     return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
 
 
@@ -252,6 +255,8 @@ def ahead_of(seen: Seen, k: int) -> float:
     pair = (min(k, seen.at), max(k, seen.at))
     if k in seen.controlled or any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
+    if y.header.purpose == "filtered" and one.header.purpose != "reference" and said(one, "y") > 0:
+        score += OF_A_COPY
     return score + _named_for(seen, k)
 
 
