@@ -100,7 +100,7 @@ def gauss_newton(
             size = np.sum(J**2, axis=0)
             by = np.clip(SPAN / np.sqrt(np.maximum(size, 1e-30)), NARROWEST_SPAN, WIDEST_SPAN)
             span = np.where(size > 0.0, by, span)
-            if gained < LEAST_FALL:
+            if gained < max(LEAST_FALL, little * cost):
                 break
             continue
         damping *= 0.1 * power

@@ -95,7 +95,7 @@ def fitted_structure(
         again = refit(plant, logs, drive, band=slow, prior=prior, effort=effort)
         done = again if done is None or again.misfit <= done.misfit else done
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
-        if smooth and not (hopeless and effects):
+        if smooth and not hopeless:
             done = _from_far_off(done, [] if effects else [plant], recorded)
         return model.refined(replace(done, prior=prior))
     except Halted as halted:

@@ -15,11 +15,13 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.estimation.gauss_newton import (
     FINE_STEP,
+    LITTLE,
     ROUGH_STEP,
     Minimum,
     gauss_newton,
 )
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.parameters import (
     even,
     names_of,
@@ -34,7 +36,7 @@ from identification.estimation.windowed_run.run_errors import (
     misfit,
     soft,
 )
-from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, start_band
+from identification.estimation.windowed_run.stick_search import PIECE, SHORT_WINDOW, start_band
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     freed,
@@ -177,7 +179,7 @@ class _Unknowns:
         errors_of = judge(self.plant_at(x), self.logs, self.drive, seconds)
         found = gauss_newton(
             lambda at: soft(errors_of(self.plant_at(at)), IN_FULL_WITHIN), x,
-            step_by=ROUGH_STEP, rough=True,
+            step_by=ROUGH_STEP, little=self.little, rough=True,
         )  # fmt: skip
         self.reached[:] = [found.x]
         return found.x
@@ -297,7 +299,8 @@ def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     """The plant refined from far off, through windows that grow, with directions that may be
     unequal. Ours: `README.md`, (7)."""
     held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
-    unknowns = _Unknowns.of(plant, logs, drive, held, REFIT_STEPS, 0.0)
+    part = [shortened(one, PIECE) for one in logs]
+    unknowns = _Unknowns.of(plant, part, drive, held, REFIT_STEPS, LITTLE)
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:
