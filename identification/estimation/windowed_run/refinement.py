@@ -15,7 +15,6 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.estimation.gauss_newton import (
     FINE_STEP,
-    LITTLE,
     ROUGH_STEP,
     Minimum,
     gauss_newton,
@@ -300,7 +299,7 @@ def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     unequal. Ours: `README.md`, (7)."""
     held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     part = [shortened(one, PIECE) for one in logs]
-    unknowns = _Unknowns.of(plant, part, drive, held, REFIT_STEPS, LITTLE)
+    unknowns = _Unknowns.of(plant, part, drive, held, REFIT_STEPS, PASSING)
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:
