@@ -59,8 +59,8 @@ def is_refined(one: Change, after: FittedStructure) -> bool:
     """Whether the run, which follows the training logs, has the changed value already."""
     if one.name not in FIVE or after.imposed or after.misfit > COMPLETE:
         return False
-    value = float(getattr(after.plant.friction, one.name))
-    return abs(one.after - value) <= max(NORMAL_95 * one.sd, MATERIAL * abs(value))
+    value, half = float(getattr(after.plant.friction, one.name)), NORMAL_95 * one.sd
+    return abs(one.after - value) <= max(half, MATERIAL * abs(value))
 
 
 def with_changes(model: FittedStructure, changed: Sequence[Change]) -> FittedStructure:

@@ -53,7 +53,7 @@ from identification.thresholds import ADEQUATE, COMPLETE, HOPELESS
 # how often each is gone through, since what a plant loses by chance is judged by the plant; errors
 # count in full within so many deviations
 GROWING_WINDOWS, FEWEST_IN_WINDOW = (0.1, 0.3, 1.0, RUN_WINDOW), 20
-PASSES, IN_FULL_WITHIN = 2, 10.0
+GONE_THROUGH, IN_FULL_WITHIN = 2, 10.0
 PASSING = 0.03  # share of the cost, below which a step of an approach is the last
 # At most, of a refinement, of one on a bristle and of a quick one
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
@@ -303,7 +303,7 @@ def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:
-            for _ in range(PASSES):
+            for _ in range(GONE_THROUGH):
                 x = unknowns.descended(x, max(seconds, shortest))
         return refit(unknowns.plant_at(x), logs, drive, prior=held, effort="near")
     except Halted:
