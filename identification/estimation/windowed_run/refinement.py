@@ -180,7 +180,6 @@ class _Unknowns:
             lambda at: soft(errors_of(self.plant_at(at)), IN_FULL_WITHIN), x,
             step_by=ROUGH_STEP, little=self.little, rough=True,
         )  # fmt: skip
-        self.reached[:] = [found.x]
         return found.x
 
 
@@ -194,9 +193,9 @@ def refit(
     deviations from the regression by name (others are free); effort: "quick" takes a few
     steps from the plant as it is, "near" goes on from there, "long" to the end over whole runs, if
     these are followed, "rough" searches the band first and goes on while much is gained, "whole" as
-    long as anything is. Sources: multiple shooting, Bock
-    (1983); Levenberg (1944), Marquardt (1963); Cauchy's weights, Holland, Welsch (1977);
-    covariance, Liang, Zeger (1986): `README.md`, (5), (8) to (10).
+    long as anything is. Sources: multiple shooting, Bock (1983); Levenberg (1944), Marquardt
+    (1963); Cauchy's weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`,
+    (5), (8) to (10).
     """
     quick = effort == "quick"
     if effort in ("rough", "whole"):

@@ -47,11 +47,8 @@ from workbench.steps.first_card.weights import (
 MOST_WAYS = 14  # ways to drive a body, that every other role is asked about
 FRICTION_GIVES_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
 HARDLY_ITS_LAW = 0.05  # the same of columns that are rather no position and force of one body
-MORE_SMOOTHED = (
-    2.0,
-    4.0,
-    8.0,
-)  # times smoother than by its own noise, that a position is looked at
+# Times smoother than by its own noise, that a position is looked at
+MORE_SMOOTHED = (2.0, 4.0, 8.0)
 MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
 WORK_GIVES_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
 COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
