@@ -20,13 +20,16 @@ from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
-from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import OF_EQUATION
+from identification.estimation.regression.motion_log import again, motion_log
+from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
     OVERLAP,
     left_out,
+    solve_rows,
     spread_of_left_out,
+    stacked,
+    without_each_block,
 )
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
@@ -137,9 +140,14 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
         other = _lag(current, used)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
+    h = logs[0].h
+    gives = rig.force_per_command if held else None
     theta, sd = _with_spread(found, used, lag.value)
     force = sine = cosine = NOT_SHOWN
     if used is GRAVITY:
+        late = Surroundings(Size(lag.value * h), gives=gives, sampled=sampled)
+        in_time = [again(one, late.of_one_instant(one.log)) for one in moved]
+        theta, sd = _beside_gravity(in_time) or (theta, sd)
         sine, cosine = (Size(float(theta[i]), float(sd[i])) for i in (-2, -1))
     up, down = float(theta[1]), float(theta[2])
     ways = np.concatenate([one.up for one in moved])
@@ -150,8 +158,6 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
             # As far as friction is equal in both directions, which it is about.
             unequal = OF_ACCOUNT * 0.5 * abs(up + down) / NORMAL_95
             force = replace(always, sd=float(np.hypot(always.sd, unequal)))
-    h = logs[0].h
-    gives = rig.force_per_command if held else None
     lag = Size(lag.value * h, lag.sd * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled)
 
@@ -229,6 +235,16 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     at = (0.0, around.lag.value / logs[0].h)
     without, with_it = (np.sqrt(np.interp(lag, found.lags, left) / found.rows) for lag in at)
     return float(without), float(with_it)
+
+
+def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
+    """Coefficients of friction and gravity (7,) and their deviations, in the windows of sliding
+    that suit these logs best: wide ones would leave out quick motion, and let gravity have what
+    friction makes of it. None where there are too few."""
+    rows = stacked([one.rows for one in settled_rows(moved, gravity=True)])
+    if len(rows.b) < FEWEST_WINDOWS:
+        return None
+    return solve_rows(rows).theta, spread_of_left_out(without_each_block(rows))
 
 
 def _has_gravity(found: _Squares) -> bool:

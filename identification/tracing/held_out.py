@@ -152,9 +152,12 @@ class HeldOut:
             return "more than half of what was missing on the test logs is left"
         if self.hides_friction:
             return AS_LARGE_AS_FRICTION
-        was, now = (one["test"].force_rms for one in (self.before, self.after))
-        if was is not None and now is not None and now > WORSE * was:
-            return f"the force of the test logs is predicted worse ({was:.3g} -> {now:.3g})"
+        lacked = self.missing
+        if lacked is not None and (lacked.share_left or 0.0) > WORSE:
+            return (
+                "the force of the test logs is predicted worse"
+                f" ({lacked.before.rms:.3g} -> {lacked.after.rms:.3g})"
+            )
         plain = self.plain.model
         if (
             not self.seen

@@ -58,7 +58,9 @@ class MotionRows:
         return np.asarray(self.windows.mean @ (1.0 * within) < WITHIN_BAND)
 
 
-def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows]:
+def rows_and_windows(
+    logs: Sequence[MotionLog], theta: Array, *, gravity: bool = False
+) -> list[MotionRows]:
     """The equation's rows of each log, in the windows that suit all of them best.
 
     theta: a first estimate of m, F_cp, F_cn, F_vp, F_vn, for the rows' noise. None of them where
@@ -67,7 +69,7 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
     """
     shortest = min(len(one.log) for one in logs)
     tried = [
-        [rows_of_width(one, half, theta) for one in logs]
+        [rows_of_width(one, half, theta, gravity=gravity) for one in logs]
         for half in HALF_WIDTHS
         if SHORTEST_LOGS * half < shortest or half == HALF_WIDTHS[0]
     ]
@@ -81,19 +83,22 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
     return next(one.made for one in fits if one.share <= enough)
 
 
-def settled_rows(logs: Sequence[MotionLog]) -> list[MotionRows]:
+def settled_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[MotionRows]:
     """The same, their noise that of the mass and damping that they show themselves.
 
     Source: iterated weighted least squares (Aitken 1936).
     """
     theta = NOTHING_KNOWN
     for _ in range(NOISE_ROUNDS):
-        theta = solve_rows(stacked([one.rows for one in rows_and_windows(logs, theta)])).theta
-    return rows_and_windows(logs, theta)
+        made = rows_and_windows(logs, theta, gravity=gravity)
+        theta = solve_rows(stacked([one.rows for one in made])).theta[: len(FIVE)]
+    return rows_and_windows(logs, theta, gravity=gravity)
 
 
-def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
+def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = False) -> MotionRows:
     """The rows of one log in windows of twice `half` samples; speed (r,): the mean in each.
+
+    gravity: with the sine and cosine of the angle as columns beside.
 
     Source: weak form, Messenger, Bortz, J. Comput. Phys. 443 (2021) 110525; `README.md`, (3).
     """
@@ -113,9 +118,13 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
         [w.second @ y, w.mean @ (1.0 * up), -(w.mean @ (1.0 * down)), w.mean @ (v * up),
          w.mean @ (v * down)]
     )  # fmt: skip
+    names = FIVE
+    if gravity:
+        X = np.column_stack([X, w.mean @ np.sin(y), w.mean @ np.cos(y)])
+        names = (*FIVE, "a", "b")
     b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
     sd = sliding_sd(one, w, over > 0.0, theta)
-    return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), FIVE), w, v)
+    return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), names), w, v)
 
 
 @dataclass(frozen=True, eq=False)
