@@ -44,7 +44,6 @@ from identification.thresholds import HALF
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_COMPARED = 48  # windows of sliding, by which a fit is compared with the equation
-WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
@@ -81,7 +80,7 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
     squares = [(left / part.sd) ** 2 for left, part in zip(fit.residuals, rows, strict=True)]
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
-    nine = _assumed(center, recorded, _slightest_mass(rows))
+    nine = _assumed(center, recorded, stacked(rows))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -198,23 +197,21 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
     return replace(fit, estimates=found)
 
 
-def _slightest_mass(data: Sequence[Rows]) -> float:
+def _slightest_mass(rows: Rows) -> float:
     """A mass [kg] whose inertia is next to nothing of the force."""
-    rows = stacked(data)
     force, a = (float(np.sqrt(np.mean(x**2))) for x in (rows.b, rows.X[:, 0]))
     return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
 
 
-def _assumed(center: Array, recorded: RecordedLogs, slight: float) -> Array:
-    """All nine for simulation: the five of sliding of their signs, stick just above slip;
-    slight: a mass [kg] that the equation does without."""
+def _assumed(center: Array, recorded: RecordedLogs, rows: Rows) -> Array:
+    """All nine for simulation: the five of sliding of their signs, a band no wider than the slowest
+    sliding in the rows, stick just above slip."""
     first = first_plant(recorded).friction
-    m = center[0] if center[0] > 0 else slight
+    m = center[0] if center[0] > 0 else _slightest_mass(rows)
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
-    fastest = float(np.median([np.max(np.abs(one.signals["v"])) for one in recorded.logs]))
-    edge = np.minimum([first.dv_p, -first.dv_n], WIDEST_ASSUMED * fastest)
+    edge = np.minimum([first.dv_p, -first.dv_n], float(np.min(rows.speed)))
     stick = coulomb + viscous * edge
     return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 

@@ -114,11 +114,16 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
         orders = turn_orders(logs, rig)
     gives = rig.force_per_command if rig.kind == "motor" else None
     known = Surroundings(orders=orders, gives=gives)
-    return replace(_beside([known.taken_out(log) for log in logs], rig), orders=orders)
+    found = _beside(logs, rig, known)
+    if orders and found.lag.value:
+        orders = turn_orders([found.of_one_instant(log) for log in logs], rig)
+        found = _beside(logs, rig, Surroundings(orders=orders, gives=gives))
+    return replace(found, orders=orders)
 
 
-def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
-    """The same but for orders of a turn."""
+def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
+    """The same beside orders of a turn that are known."""
+    logs = [known.taken_out(log) for log in logs]
     held = rig.kind == "motor"
     try:
         moved = [motion_log(log, held=held, by_command=False) for log in logs]
@@ -128,7 +133,7 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
     direct = held or chosen_drive(logs, rig, None) == "force"
     turns = direct and max(float(np.ptp(log["y"])) for log in logs) > TURNS
     turns = turns and rig.motion == "rotary"
-    found = _squares(moved, turns, held)
+    found = _squares(moved, turns, held, known)
     if found is None:
         return NO_SURROUNDINGS
     used = GRAVITY if turns and _has_gravity(found) else PLAIN
@@ -136,7 +141,7 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
-        current = _squares(moved, turns, held=False) or found
+        current = _squares(moved, turns, False, known) or found
         other = _lag(current, used)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
@@ -336,7 +341,9 @@ def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
     return block
 
 
-def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | None:
+def _squares(
+    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings = NO_SURROUNDINGS
+) -> _Squares | None:
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
     held: the force's column is a zero-order hold.
@@ -355,7 +362,10 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
         if turns:
             X = np.column_stack([X, w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y)])
         own_lags = lags * (moved[0].log.h / one.log.h)  # lags are in samples of the first log
-        B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in own_lags])
+        place = known.of_angle(y)  # which is of the angle at that instant, whatever the lag
+        B = np.column_stack(
+            [mean @ (np.interp(at - lag, at, F - place) + place) for lag in own_lags]
+        )
         inside = (w.start >= LAG) & (w.start + w.length < len(F) + lead) & (plain.speed >= slow)
         block = _blocks_of_each_way(one.up, inside)
         for k in range(BLOCKS):

@@ -28,6 +28,7 @@ from identification.estimation.regression.motion_log import (
     motion_log,
 )
 from identification.estimation.regression.weighted_rows import (
+    OVERLAP,
     Rows,
     least_squares,
     left_out,
@@ -38,10 +39,9 @@ from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Order, Surroundings
 from identification.signals.weak_form import WeakWindows, sliding_windows
-from identification.thresholds import BEYOND_CHANCE, EARNS, HALF
+from identification.thresholds import BEYOND_CHANCE, CHANCE_LEVEL, HALF, MATERIAL
 
 HIGHEST = 100  # order that the windows are made short enough for
-MOST_ORDERS = 8
 PLAIN_COLUMNS = 7  # columns beside those of the orders
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
@@ -83,7 +83,7 @@ class _Turning:
 
 def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     """Orders of the turn whose forces explain most of what friction and inertia leave, each
-    significant.
+    significant and material beside the largest.
 
     None where a machine does not turn, too little of its motion slides, or the whole of what is
     left is not mostly theirs: a small one is an effect as any other, for a trace to find. Sources:
@@ -109,8 +109,9 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
         for value, s in zip(theta[PLAIN_COLUMNS:], sd[PLAIN_COLUMNS:], strict=True)
     ]
     made = [Order(n, sizes[2 * i], sizes[2 * i + 1]) for i, n in enumerate(chosen)]
-    significant = (one for one in made if is_significant(one.size, one.sd))
-    return tuple(sorted(significant, key=lambda one: -one.size))
+    least = MATERIAL * max(one.size for one in made)
+    named = (one for one in made if is_significant(one.size, one.sd) and one.size > least)
+    return tuple(sorted(named, key=lambda one: -one.size))
 
 
 def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:
@@ -150,22 +151,29 @@ def turns(angle: float) -> bool:
 
 
 def _chosen(found: _Turning) -> tuple[int, ...]:
-    """Orders in the order in which they join, each with most of what the others leave."""
+    """Orders in the order in which they join, each with more of what the others leave than the best
+    of all would have by chance."""
     orders = np.arange(2, found.highest + 1)
     pairs = np.stack([found.pair(float(n)) for n in orders])  # (orders, r, 2)
     base, b = np.linalg.qr(_kept(found.rows.X))[0], found.rows.b
     chosen: list[int] = []
-    while len(chosen) < MOST_ORDERS:
+    while True:
         left = b - base @ (base.T @ b)
         explained = np.array([_explained(pair, base, left) for pair in pairs])
         best, before = int(np.argmax(explained)), float(left @ left)
         n = int(orders[best])
-        after = before - float(explained[best])
-        if n in chosen or after > EARNS * before:
+        free = len(b) / OVERLAP - base.shape[1]
+        if n in chosen or explained[best] <= _by_chance(len(orders), free) * before:
             break
         chosen.append(n)
         base = np.linalg.qr(np.column_stack([base, pairs[best]]))[0]
     return tuple(chosen)
+
+
+def _by_chance(orders: int, free: float) -> float:
+    """Share of the square of so many free rows of noise that the best of the orders explains with
+    the chance CHANCE_LEVEL: of a pair of columns it is exponential, of mean 2 / free."""
+    return 2.0 * float(np.log(orders / CHANCE_LEVEL)) / max(free, 1.0)
 
 
 def _explained(pair: Array, base: Array, left: Array) -> float:

@@ -83,7 +83,7 @@ class Surroundings:
             log
         )[0]
 
-    def _of_place(self, y: Array) -> Array:
+    def of_angle(self, y: Array) -> Array:
         """Gravity and the orders of a turn at angles y [rad], (n,) [N m]: at each sample, or over
         the period that follows it where the force is a command that is held for so long."""
         force = sum((one.force(y) for one in self.orders), np.zeros(len(y)))
@@ -100,7 +100,7 @@ class Surroundings:
         # What a measured current is until the next sample is its mean between both.
         behind, n = self.lag.value / log.h - 0.5 * self.sampled, len(log)
         y, at = np.asarray(log["y"]), np.arange(n)
-        force = np.interp(at - behind, at, log["F"]) + self.force.value + self._of_place(y)
+        force = np.interp(at - behind, at, log["F"]) + self.force.value + self.of_angle(y)
         signals = {"F": force}
         if self.gives:
             signals["u"] = force / self.gives

@@ -32,7 +32,7 @@ ENOUGH = {
 # Where a search begins, what it tries and when it ends.
 STEER = {
     "FAR_BEYOND", "LAG", "LASTING_SHARE", "LASTING_STEP", "LONG_TIME",
-    "MOST_ORDERS", "SLIGHT", "SLOW_LOG", "WIDEST_SEEN",
+    "SLIGHT", "SLOW_LOG", "WIDEST_SEEN",
 }  # fmt: skip
 # What still decides outside of `thresholds`.
 ELSEWHERE = {
