@@ -16,7 +16,7 @@ from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor
 from identification.signals.differentiate import differentiate
-from identification.signals.initial_state import measured_start
+from identification.signals.initial_state import measured_start, measured_states
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import of_body, with_motor_force
 from workbench.documents.model import Model
@@ -271,9 +271,7 @@ def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:
     """Samples, positions and velocities of the measured state every `window` [s]."""
     step = max(1, round(window / log.h))
     at = np.arange(step, len(log), step, dtype=np.int64)
-    motion = differentiate(log["y"], log.h)
-    v = np.where(np.abs(motion.v) > SURE_SLIDING * motion.v_noise, motion.v, 0.0)
-    return at, motion.y[at], v[at]
+    return at, *measured_states(log, at)
 
 
 def _rms_where(values: Array) -> float | None:

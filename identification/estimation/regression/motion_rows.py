@@ -110,7 +110,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
     v = np.correlate(padded, fine, "valid")[:n]
     sure = SURE_OF_DIRECTION * one.noise.y * float(np.sqrt(noise_gain(first)))
-    sure = max(sure, SLOWEST_SLIDING * float(np.quantile(np.abs(v), FAST_SPEEDS)))
+    sure = max(sure, slowest_sliding(np.abs(v)))
     over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
     w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
     over, up, down = w.first @ y, v > 0.0, v < 0.0
@@ -125,6 +125,11 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
     sd = sliding_sd(one, w, over > 0.0, theta)
     return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), names), w, v)
+
+
+def slowest_sliding(speed: Array) -> float:
+    """The speed below which a body of these speeds (n,) may as well be at rest. Ours."""
+    return SLOWEST_SLIDING * float(np.quantile(speed, FAST_SPEEDS))
 
 
 @dataclass(frozen=True, eq=False)
