@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.regressed_plant import deviations
@@ -21,7 +22,7 @@ from identification.estimation.structure_fit import FittedStructure, band
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95
 from identification.model.plant import units_of
-from identification.thresholds import BEYOND_CHANCE, COMPLETE, MATERIAL, OF_ACCOUNT
+from identification.thresholds import BEYOND_CHANCE, CHANCE_LEVEL, COMPLETE, MATERIAL, OF_ACCOUNT
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.stepwise import Step
 from identification.tracing.remaining_structure import FEWEST_ROWS
@@ -91,7 +92,8 @@ def changes(
 
     One is freed at a time, the one that lowers the error most, as long as it lowers it by a
     material share and significantly: parameters that a short log cannot separate do not all change.
-    One that differs by less than the error of both logs together has not.
+    One that differs by no more than the largest change would by the error of both logs together has
+    not.
     blur (k,): square sum that noise makes of each whitened column. Source: Fuller (1987), moments
     less those of the noise.
     """
@@ -129,7 +131,8 @@ def changes(
         return []
     inverse = np.linalg.pinv(gram[np.ix_(free, free)])
     sd = np.sqrt(np.diag(inverse) * noise * OVERLAP)
-    half = NORMAL_95 * np.hypot(sd, deviations(mine)[free])  # of the change's interval
+    surely = float(norm.isf(0.5 * CHANCE_LEVEL / len(names)))  # of the largest of so many changes
+    half = surely * np.hypot(sd, deviations(mine)[free])
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))
         for i, s, least in zip(free, sd, half, strict=True)
