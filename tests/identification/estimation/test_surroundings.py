@@ -47,6 +47,30 @@ def test_gravity_is_found_with_its_interval(a: float, b: float) -> None:
     assert found.sine.sd < 0.05
 
 
+def swung(seed: int) -> list[Log]:
+    """Coarse logs of a rod that is led to and fro quickly."""
+    h, rng, logs = 1.0 / 190.0, np.random.default_rng(seed), []
+    t = h * np.arange(1140, dtype=np.float64)
+    for k, both in enumerate(
+        (((1.2, 0.35), (0.3, 1.1)), ((0.9, 0.5), (0.25, 1.5)), ((0.6, 0.9), (0.4, 0.6)))
+    ):
+        y, v, a = np.zeros((3, len(t)))
+        for size, f in both:
+            w, phase = 2.0 * np.pi * f, rng.uniform(0, 2 * np.pi)
+            y += size * np.sin(w * t + phase)
+            v += size * w * np.cos(w * t + phase)
+            a -= size * w**2 * np.sin(w * t + phase)
+        F = 0.01 * a + 0.05 * np.sign(v) + 0.1 * v + 0.8 * np.sin(y)
+        noise = rng.standard_normal((2, len(t)))
+        logs.append(Log(f"{k}", {"t": t, "y": y + 1e-3 * noise[0], "F": F + 0.05 * noise[1]}))
+    return logs
+
+
+def test_quick_motion_does_not_bias_gravity() -> None:
+    sizes = [surroundings(swung(seed), TURNING).sine.value for seed in range(6)]
+    assert np.mean(sizes) == pytest.approx(0.8, abs=2.5e-3)
+
+
 def test_a_rod_without_weight_has_none() -> None:
     assert surroundings([pendulum(2, 0.0)], TURNING).none
 

@@ -7,7 +7,12 @@ from identification.arrays import Array
 from identification.effects._library import built_in, numbered, of_key
 from identification.estimation.imposed_motion import way_of
 from identification.estimation.surroundings import surroundings
-from identification.estimation.turn_orders import orders_explain, turn_orders
+from identification.estimation.turn_orders import (
+    _by_chance,
+    _explained,
+    orders_explain,
+    turn_orders,
+)
 from identification.log import Log, Rig
 from identification.model.surroundings import Surroundings
 
@@ -48,6 +53,23 @@ def test_its_interval_holds_the_size() -> None:
         (one,) = turn_orders([log_of(BOTH_WAYS, {12: 0.8}, seed=seed)], RIG)
         off.append((one.size - 0.8) / one.sd)
     assert np.mean(np.abs(off) < 3.0) > 0.8
+
+
+def test_as_many_orders_are_found_as_there_are() -> None:
+    many = {n: 0.8 / (1 + i) for i, n in enumerate((7, 28, 14, 12, 36, 35, 56, 21, 8, 64, 43, 42))}
+    assert sizes(BOTH_WAYS, many) == pytest.approx(many, rel=0.1)
+
+
+def test_noise_alone_has_an_order_as_seldom_as_by_chance() -> None:
+    rng, found = np.random.default_rng(0), 0
+    for _ in range(300):
+        pairs = rng.standard_normal((40, 250, 2))
+        left = rng.standard_normal(250)
+        base = np.linalg.qr(rng.standard_normal((250, 7)))[0]
+        left = left - base @ (base.T @ left)
+        most = max(_explained(pair, base, left) for pair in pairs)
+        found += most > _by_chance(40, 250.0 - 7.0) * float(left @ left)
+    assert found <= 9
 
 
 def test_gravity_and_friction_alone_have_none() -> None:

@@ -106,3 +106,12 @@ def test_a_force_that_is_explained_as_measured_is_not_outvoted_by_the_position(
         {name: getattr(held, name) for name in ("share", "before", "after", "changed")}
     )
     assert "position" in other.against
+
+
+def test_an_effect_is_not_named_with_which_a_plant_predicts_the_force_worse() -> None:
+    """The equation's own coefficients may explain a force that the refined plant does not have."""
+    held = judged()
+    assert held.against == ""
+    wrong = plant({"spring": {"k": 300.0}})
+    other = replace(held, model=replace(held.model, plant=wrong))
+    assert "the force of the test logs is predicted worse" in other.against

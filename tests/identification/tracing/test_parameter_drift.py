@@ -9,6 +9,7 @@ from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.regression.weighted_rows import Rows
 from identification.estimation.structure_fit import FittedStructure
+from identification.tracing import parameter_drift
 from identification.tracing.parameter_drift import changes, is_refined
 from identification.tracing.result import Change
 from tests.identification.motor_logs import NINE, made, plant, seen
@@ -57,6 +58,17 @@ def test_a_change_within_the_error_of_the_training_is_none() -> None:
     ((name, *_),) = found(mine, rows, 0.5)
     assert name == "F_cp"
     assert found(vague, rows, 0.5) == []
+
+
+def test_the_largest_of_several_changes_is_none_by_chance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two and a half deviations are significant of one parameter, not of the largest of five."""
+    mine, rows = trained()
+    for many, named in ((2.5, []), (4.0, ["F_cp"])):
+        sd = np.full(5, 0.5 / many)
+        monkeypatch.setattr(parameter_drift, "deviations", lambda _, sd=sd: sd)
+        assert [name for name, *_ in found(mine, rows, 0.5)] == named
 
 
 @pytest.mark.parametrize(
