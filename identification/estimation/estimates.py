@@ -100,6 +100,17 @@ def reported_estimate(
     return Estimate(value, unit, sd, max(low, bounds[0]), min(high, bounds[1]))
 
 
+def widened(one: Estimate, times: float) -> Estimate:
+    """The same estimate with an interval so many times as wide, of its sign; ours."""
+    if one.value is None or one.sd is None or one.low is None or one.high is None:
+        return one
+    low, high = (one.value + times * (end - one.value) for end in (one.low, one.high))
+    bounds = (0.0, np.inf) if one.value > 0.0 else (-np.inf, 0.0)
+    return reported_estimate(
+        one.value, one.unit, times * one.sd, interval=(low, high), bounds=bounds, at_bound=0.0
+    )
+
+
 def _beyond(value: float, bounds: tuple[float, float]) -> str | None:
     """Reason where a value lies beyond its bounds, which for most is a matter of sign."""
     if bounds[0] <= value <= bounds[1]:

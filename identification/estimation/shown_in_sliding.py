@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.estimation.estimates import widened
 from identification.estimation.imposed_motion import WHY_NOT
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import FIVE
@@ -26,6 +27,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
+from identification.signals.steps import MEDIAN_OF_NOISE
 from identification.thresholds import FOURFOLD, HALF, MATERIAL, NEARLY_ALL, OF_ACCOUNT, TWICE
 
 COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
@@ -70,7 +72,23 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
         if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
-    return _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
+    fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
+    if recorded.drive == "command" or fit.imposed or not fit.adequate:
+        return fit
+    left = (every.b - every.X @ theta) / every.sd
+    return _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
+
+
+def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
+    """The fit of a run that follows by a measured force, of which the equation leaves so many times
+    its noise: that noise was estimated too small, and so are the deviations.
+
+    Source: scale by the median of what is left, Huber, Robust Statistics (1981), 5.1.
+    """
+    if noises <= 1.0:
+        return fit
+    wider = {name: widened(one, noises) for name, one in fit.estimates.items()}
+    return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
 
 
 def _of_one_speed(steady: Rows, column: int) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.estimates import effect_estimates, reported_estimate
+from identification.estimation.estimates import effect_estimates, reported_estimate, widened
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
 from identification.estimation.regression.motion_log import again, motion_log
@@ -199,7 +199,7 @@ def widened_friction(
     ways = {"F_cp": up, "F_cn": ~up}
     out: dict[str, Estimate] = {}
     for name, one in ((name, friction[name]) for name in NAMES if name in friction):
-        if one.value is None or one.sd is None or one.low is None or one.high is None:
+        if one.value is None or one.sd is None:
             continue
         parts = [OF_TAKEN_OUT * one.value]
         if name in ways:
@@ -210,10 +210,7 @@ def widened_friction(
                 for size, wave in ((around.sine, np.sin), (around.cosine, np.cos))
             ]
         more = float(np.linalg.norm(parts))
-        wider = float(np.hypot(one.sd, more)) / one.sd
-        low, high = (one.value + wider * (end - one.value) for end in (one.low, one.high))
-        least = 0.0 if one.value > 0.0 else -np.inf
-        out[name] = replace(one, sd=wider * one.sd, low=max(low, least), high=high)
+        out[name] = widened(one, float(np.hypot(one.sd, more)) / one.sd)
     return out
 
 

@@ -5,11 +5,15 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from identification.arrays import Array
+from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.simulation.free_run import free_run
 
 H = 2e-3
 M, F_CP, F_CN, F_VP, F_VN = 5.0, 16.0, 14.0, 22.0, 19.0
@@ -78,3 +82,31 @@ def test_a_mass_in_one_sine_is_a_springs_too() -> None:
     assert found["F_vp"].value is not None
     assert of_velocity(one).estimates["m"].value == pytest.approx(M, rel=0.05)
     assert of_velocity(two).estimates["m"].value == pytest.approx(M, rel=0.05)
+
+
+RUNS_BY = Karnopp(2.0, 4.0, 4.0, 10.0, 10.0, 0.005, -0.005, 5.0, -5.0)
+
+
+def by_a_force_that_is_noisy_in_motion(seed: int) -> Log:
+    """A body driven by the measured force, whose sensor is quiet for a quarter, at rest."""
+    h, n, rng = 1e-3, 6000, np.random.default_rng(seed)
+    t = h * np.arange(n, dtype=np.float64)
+    slow, quick = rng.uniform(0, 6, 2)
+    F = 12.0 * np.sin(1.8 * np.pi * t + slow) + 6.0 * np.sin(4.6 * np.pi * t + quick)
+    F[:1500] = 1.0
+    blank = Log("noisy.csv", {"t": t, "y": np.zeros(n), "F": F})
+    run = free_run(Plant(RUNS_BY), blank, (0.0, 0.0, 1.0), "force")
+    noise = rng.standard_normal((2, n))
+    return blank.with_signals(
+        y=run.y + 2e-6 * noise[0], F=F + np.where(t < 1.5, 0.01, 0.3) * noise[1]
+    )
+
+
+def test_noise_of_the_force_that_is_larger_in_motion_widens_what_the_run_gives() -> None:
+    """The quiet part alone shows the noise; the equation leaves thirty times as much."""
+    log = by_a_force_that_is_noisy_in_motion(0)
+    found = fit_plant([log], np.random.default_rng(0), rig=Rig("force")).estimates
+    for name in ("m", "F_cp", "F_cn", "F_vp"):
+        one = found[name]
+        assert one.low is not None and one.high is not None
+        assert one.low < getattr(RUNS_BY, name) < one.high
