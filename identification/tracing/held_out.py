@@ -9,7 +9,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, OF_ACCOUNT, WORSE
+from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT, WORSE
 from identification.tracing.model_errors import (
     OnTest,
     errors_of,
@@ -153,7 +153,7 @@ class HeldOut:
         if self.hides_friction:
             return AS_LARGE_AS_FRICTION
         lacked = self.missing
-        if lacked is not None and (lacked.share_left or 0.0) > WORSE:
+        if lacked is not None and lacked.after.rms > self._worse_from(lacked.before.rms):
             return (
                 "the force of the test logs is predicted worse"
                 f" ({lacked.before.rms:.3g} -> {lacked.after.rms:.3g})"
@@ -173,6 +173,11 @@ class HeldOut:
             f"the position of the test logs is predicted worse over {worse.seconds:g} s"
             f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)"
         )
+
+    def _worse_from(self, lacked: float) -> float:
+        """The missing force [N] from which a model predicts worse than one that lacks so much: what
+        is immaterial beside friction is no worse."""
+        return max(WORSE * lacked, MATERIAL * self.coulomb)
 
     @property
     def _measured_force_is_explained(self) -> bool:

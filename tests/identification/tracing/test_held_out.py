@@ -115,3 +115,9 @@ def test_an_effect_is_not_named_with_which_a_plant_predicts_the_force_worse() ->
     wrong = plant({"spring": {"k": 300.0}})
     other = replace(held, model=replace(held.model, plant=wrong))
     assert "the force of the test logs is predicted worse" in other.against
+    friction = held.plain.model.plant.friction
+    strong = plant(friction=replace(friction, F_cp=1e5, F_cn=1e5))  # beside which it is immaterial
+    immaterial = replace(
+        other, plain=replace(held.plain, model=replace(held.plain.model, plant=strong))
+    )
+    assert "force of the test logs" not in immaterial.against
