@@ -28,7 +28,15 @@ from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.signals.steps import MEDIAN_OF_NOISE
-from identification.thresholds import FOURFOLD, HALF, MATERIAL, NEARLY_ALL, OF_ACCOUNT, TWICE
+from identification.thresholds import (
+    FAR_LESS,
+    FOURFOLD,
+    HALF,
+    MATERIAL,
+    NEARLY_ALL,
+    OF_ACCOUNT,
+    TWICE,
+)
 
 COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
 TURNING_WHY = (
@@ -73,10 +81,12 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
-    if recorded.drive == "command" or fit.imposed or not fit.adequate:
+    if recorded.drive == "command":
         return fit
-    left = (every.b - every.X @ theta) / every.sd
-    return _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
+    if fit.adequate and not fit.imposed:
+        left = (every.b - every.X @ theta) / every.sd
+        fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
+    return _of_any_instant(fit, recorded.plain[0].h)
 
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
@@ -89,6 +99,24 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
         return fit
     wider = {name: widened(one, noises) for name, one in fit.estimates.items()}
     return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
+
+
+def _of_any_instant(fit: KarnoppFit, h: float) -> KarnoppFit:
+    """The fit whose mass may err by the part of a period h [s] by which the columns of a measured
+    force and of the position may be apart unseen: of viscous friction a lag makes inertia.
+
+    F_v y'(t - lag) = F_v y' - F_v lag y'', to first order; ours.
+    """
+    one, viscous = fit.estimates["m"], 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
+    if one.sd is None:
+        return fit
+    more = viscous * h * FAR_LESS / 3.0**0.5  # of a lag as likely anywhere up to where it is seen
+    wider = widened(one, float(np.hypot(one.sd, more)) / one.sd)
+    covariance = fit.covariance.copy()
+    if "m" in fit.free:
+        at = fit.free.index("m")
+        covariance[at, at] += more**2
+    return replace(fit, estimates={**fit.estimates, "m": wider}, covariance=covariance)
 
 
 def _of_one_speed(steady: Rows, column: int) -> bool:
