@@ -118,7 +118,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
         [w.second @ y, w.mean @ (1.0 * up), -(w.mean @ (1.0 * down)), w.mean @ (v * up),
          w.mean @ (v * down)]
     )  # fmt: skip
-    names = FIVE
+    names: tuple[str, ...] = FIVE
     if gravity:
         X = np.column_stack([X, w.mean @ np.sin(y), w.mean @ np.cos(y)])
         names = (*FIVE, "a", "b")

@@ -56,7 +56,7 @@ def test_its_interval_holds_the_size() -> None:
 
 
 def test_as_many_orders_are_found_as_there_are() -> None:
-    many = {n: 0.8 / (1 + i) for i, n in enumerate((7, 28, 14, 12, 36, 35, 56, 21, 8, 64, 43, 42))}
+    many: dict[float, float] = {n: 0.8 / (1 + i) for i, n in enumerate((7, 28, 14, 12, 36, 35, 56, 21, 8, 64, 43, 42))}
     assert sizes(BOTH_WAYS, many) == pytest.approx(many, rel=0.1)
 
 
