@@ -116,16 +116,11 @@ def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
     return [at_needed_rate(log) for log in logs]
 
 
-def with_clocks(
-    recorded: RecordedLogs, said: Sequence[str], share: float | None = None
-) -> RecordedLogs:
-    """Logs, recorded as they were read, with what is known and said of their clocks.
-
-    said: of their rates; share: of the command's step to the next sample, by default what a machine
-    without effects shows of it.
-    """
+def with_clocks(recorded: RecordedLogs, said: Sequence[str]) -> RecordedLogs:
+    """Logs, recorded as they were read, with what is known and said of their clocks; said: of their
+    rates."""
     recorded = replace(recorded, remarks=(*said, *clock_remarks(recorded.logs)))
-    return with_share(recorded, plain_share(recorded) if share is None else share)
+    return with_share(recorded, plain_share(recorded))
 
 
 def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:

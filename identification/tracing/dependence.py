@@ -75,7 +75,7 @@ def dependence(
         swing = periodic_share(r, signals["t"], rate, block)
         # A periodic motion makes all that depends on place or speed periodic as well.
         apart = swing[0] > OF_ACCOUNT + max(share for share, _ in best.values())
-        if apart and not _of_the_motion(signals, rate, block):
+        if apart:
             best["t"] = swing
         else:
             rate = 0.0
@@ -90,16 +90,6 @@ def dependence(
             named.append(name)
     return Dependence(
         tuple(named[:MOST_SIGNALS]), best[order[0]][0], rate if named[0] == "t" else 0.0
-    )
-
-
-def _of_the_motion(signals: Mapping[str, Array], rate: float, block: IntArray) -> bool:
-    """Whether the motion itself goes at this rate [Hz], or at one of which it is a harmonic."""
-    t = signals["t"]
-    return any(
-        periodic_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_ACCOUNT
-        for x in (signals[name] for name in ("y", "v") if name in signals)
-        for harmonic in range(1, HARMONICS + 1)
     )
 
 

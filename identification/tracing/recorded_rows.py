@@ -52,19 +52,16 @@ class RecordedRows:
         return self.recorded.drive
 
 
-def recorded_rows(
-    train: Sequence[Log], rig: Rig, halt: Halt | None = None, share: float | None = None
-) -> RecordedRows:
+def recorded_rows(train: Sequence[Log], rig: Rig, halt: Halt | None = None) -> RecordedRows:
     """The training logs as rows; raises NotIdentifiable where too little of the motion slides.
 
-    halt: asked before whatever is made of them; share: of the command's step to the next sample, by
-    default what a machine without effects shows of it.
+    halt: asked before whatever is made of them.
     """
     slower = needed(train, rig)
     drive: Drive = "command" if rig.kind == "motor" else chosen_drive(slower, rig, None)
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(slower)
     recorded, refused = _prescribed_if_needed(recorded)
-    recorded = with_clocks(recorded, slower_remarks(train, slower), share)
+    recorded = with_clocks(recorded, slower_remarks(train, slower))
     told = (COMMAND_SAYS_LITTLE,) if drive == "force" and commanded(slower) else ()
     return RecordedRows(recorded, refused, (*recorded.remarks, *told))
 

@@ -22,7 +22,7 @@ from identification.estimation.windowed_run.windows import left_in_windows, star
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
 from identification.thresholds import ASTRAY
-from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, SEPARATE, dependence
+from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, dependence
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import joined, signals_at, signals_of
 from identification.tracing.result import Dependence
@@ -49,15 +49,6 @@ def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
         if named.depends_on and (much := left * np.count_nonzero(keep)) > most:
             best, most = named, much
     return best
-
-
-def at_breakaway(choice: Choice) -> Dependence:
-    """On what the forces at which the body lets go depend, however little; they are few."""
-    if BREAKAWAY not in choice.base:
-        return Dependence((), 0.0)
-    keep = np.isfinite(choice.base[BREAKAWAY].rows.sd)
-    found = _in_equation(choice, BREAKAWAY, keep, SEPARATE)
-    return Dependence((), 0.0) if found is None else found[0]
 
 
 def _in_equation(
@@ -130,7 +121,7 @@ def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
 def strongest(
     choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
 ) -> Dependence:
-    """The strongest of the structures left in the equations, at breakaways and in the free run,
+    """The strongest of the structures left in the equations and in the free run,
     however little it is, as something surely is missing."""
     found = remaining_structure(choice, after)
     if after.imposed:
@@ -140,8 +131,6 @@ def strongest(
         return one.explained if one.depends_on else 0.0
 
     found = max(found, in_run(after, logs, drive), key=told)
-    few = at_breakaway(choice)
-    found = few if told(few) > CLEARLY * told(found) else found
     return found if found.depends_on else in_run(after, logs, drive, least=SLIGHT_SHARE)
 
 

@@ -28,16 +28,14 @@ from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.judgement import judgement
 from identification.tracing.plain_model import plain_model
-from identification.tracing.recorded_rows import RecordedRows, recorded_rows
+from identification.tracing.recorded_rows import recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Trace
 from identification.tracing.structure_search import (
-    first_effect,
     refinement,
     selection,
     settled_plain,
-    share_beside,
 )
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
 
@@ -163,30 +161,17 @@ def _chosen(
     train: Sequence[Log], rig: Rig, library: Library,
     rngs: tuple[np.random.Generator, np.random.Generator], report: Progress, halt: Halt,
 ) -> tuple[Setting, Choice]:  # fmt: skip
-    """The effects that the equations call for, on logs whose command is known between its samples,
-    and what trying them needs.
+    """The effects that the equations call for, and what trying them needs.
 
     rngs: of the plain model, which is begun as `fit_plant` begins, and of the choice of effects.
     """
     begin, choose = rngs
     report("recording", 0.0)
-
-    def first(rows: RecordedRows) -> tuple[Setting, Choice]:
-        """The plain model of the rows, and the effect that they call for first beside it."""
-        report("refining", 0.0)
-        plain = plain_model(rows, library, begin)
-        report("tracing", 0.0)
-        return first_effect(plain, choose, report)
-
-    setting, choice = first(recorded_rows(train, rig, halt))
-    share = share_beside(setting.recorded, choice)
-    if share == 0.0:  # or it shows beside several effects alone
-        choice = selection(choice, setting, choose, report)
-        share = 0.0 if halt.reached() else share_beside(setting.recorded, choice)
-        if share == 0.0:
-            return setting, choice
-    setting, choice = first(recorded_rows(train, rig, halt, share))
-    return setting, selection(choice, setting, choose, report)
+    rows = recorded_rows(train, rig, halt)
+    report("refining", 0.0)
+    plain = plain_model(rows, library, begin)
+    report("tracing", 0.0)
+    return selection(plain, choose, report)
 
 
 def _for_now(told: Trace, held: HeldOut, not_tried: tuple[str, ...]) -> Trace:

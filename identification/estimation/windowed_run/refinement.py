@@ -241,7 +241,7 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
         rounds.append(longest)
     for seconds in rounds:
         again = unknowns.refined(at.x, seconds, False)
-        if again.followed and not (seconds == longest and _worse(unknowns, again, at)):
+        if again.followed:
             at = again
     at, found = _ended(unknowns, at, quick)
     if effort == "long" and longest > RUN_WINDOW and found <= ADEQUATE:
@@ -267,12 +267,6 @@ def _over_long_runs(
     if whole.followed and left_by <= max(found, COMPLETE):
         return whole, left_by, True
     return at, found, False
-
-
-def _worse(unknowns: _Unknowns, again: Minimum, at: Minimum) -> bool:
-    """Whether a minimum over long windows, in which a run may lose a stop, follows the log less."""
-    left = unknowns.misfit(again.x)
-    return left > COMPLETE and left > unknowns.misfit(at.x)
 
 
 def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:

@@ -19,7 +19,7 @@ from identification.tracing.free_run.backward_elimination import Setting, withou
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.library_search import ABSORBED
 from identification.tracing.regression.shape_grid import median_rest, shape_grid
-from identification.tracing.regression.stepwise import Choice, Step, gives_way
+from identification.tracing.regression.stepwise import Choice, Step
 
 RIGID_CONTACT = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 RIVALS_TRIED = 3  # rivals of an effect taken that are tried in its place
@@ -67,8 +67,6 @@ def _beside(
         if setting.drive == "force" and effect.place.in_actuator:
             continue
         if effect.place.elastic and rigid(setting.plain.first):
-            continue
-        if not all(gives_way(one, setting.plain.first) for one in tried if one.effect.key == key):
             continue
         # Where every trial is a search, what the equations chose is not contested by all.
         if key in shown or (seen_in_run(effect) and not (instead and free)):

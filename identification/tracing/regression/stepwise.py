@@ -22,7 +22,6 @@ from identification.estimation.regression.motion_log import again
 from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
-    mean_square,
     row_fit,
     settled_fits,
 )
@@ -33,7 +32,7 @@ from identification.estimation.regression.signals_behind_effects import (
     shown_to_true,
 )
 from identification.progress import Halted, Progress
-from identification.thresholds import EARNS, FAR_LESS, MATERIAL, PENALTY
+from identification.thresholds import EARNS, MATERIAL, PENALTY
 from identification.tracing.regression.candidates import (
     EffectCandidate,
 )
@@ -131,11 +130,7 @@ def next_step(
     base = base_fits(scaled)
     ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
     # What explains little of what is missing in its own equations must not hide the next.
-    worth = [
-        c
-        for c in ranked
-        if material(c, scaled, base) and share(c, base) >= 1.0 - EARNS and gives_way(c, base)
-    ]
+    worth = [c for c in ranked if material(c, scaled, base) and share(c, base) >= 1.0 - EARNS]
     if not worth:
         return None
     best = worth[0]
@@ -161,20 +156,6 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
     return tuple(
         c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
     )
-
-
-def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:
-    """Whether a bristle that gains most at rest explains most of the motion seen there.
-
-    What creeps from one short stop to the next moves there as well, but not with the force.
-    """
-    if not candidate.effect.place.elastic or REST not in base or REST not in candidate.outcomes:
-        return True
-    at_rest = base[REST].criterion - candidate.outcomes[REST].criterion
-    if at_rest < 0.5 * candidate.gain:
-        return True
-    left = mean_square(candidate.outcomes[REST]) - 1.0
-    return left <= FAR_LESS * max(mean_square(base[REST]) - 1.0, 0.0)
 
 
 def share(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> float:

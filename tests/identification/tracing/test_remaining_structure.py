@@ -17,7 +17,6 @@ from identification.estimation.structure_fit import FittedStructure, fitted_stru
 from identification.log import Rig
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import (
-    at_breakaway,
     in_run,
     remaining_structure,
     strongest,
@@ -130,15 +129,6 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
         after,
     )
     assert found.depends_on == ()
-
-
-def test_breakaways_tell_that_they_depend_on_the_time_at_rest() -> None:
-    seeds = (5, 6, 7)  # few breakaways tell nothing
-    grows = json.dumps({"rising_stiction": {"F_r": 6.0, "tau": 0.3}})
-    choice, plain = (equations_of(one, False, seeds) for one in (grows, "{}"))
-    assert at_breakaway(choice).depends_on == ("rest",)
-    assert at_breakaway(plain).depends_on == ()
-    assert at_breakaway(replace(choice, base={})).depends_on == ()
 
 
 @pytest.mark.method

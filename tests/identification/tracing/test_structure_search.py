@@ -1,6 +1,5 @@
 """Whose numbers a structure has: the run's where it is followed, else those of the equations."""
 
-import importlib
 from dataclasses import replace
 from functools import cache
 
@@ -10,14 +9,12 @@ import pytest
 from identification.effects._library import built_in
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure
-from identification.progress import Halt
 from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.free_run.backward_elimination import Setting
-from identification.tracing.recorded_rows import RecordedRows
 from identification.tracing.regression.stepwise import Choice, choose
-from identification.tracing.structure_search import all_but_explained, by_equations
+from identification.tracing.structure_search import by_equations
 from tests.identification.motor_logs import made, plant, seen
-from tests.identification.tracing.settings import MOTOR, setting_of
+from tests.identification.tracing.settings import setting_of
 
 BENT = {"m": 0.5, "spring.k": 30.0, "F_sp": 2.0}  # deviations of a run that is not followed
 
@@ -57,12 +54,6 @@ def test_between_a_run_and_equations_that_are_explained_the_surer_numbers_stand(
     assert found.plant.friction.m == between.plant.friction.m and found.sd["m"] == 1e-6
 
 
-def test_all_but_the_whole_equation_is_enough() -> None:
-    _, choice = spring()
-    assert all_but_explained(choice)
-    assert not all_but_explained(replace(choice, base=choice.first))
-
-
 def test_equations_that_are_explained_answer_for_a_run_that_is_not_followed() -> None:
     setting, choice = spring()
     found = by_equations(choice, model(90.0), setting)
@@ -72,28 +63,3 @@ def test_equations_that_are_explained_answer_for_a_run_that_is_not_followed() ->
     assert found.sd["F_sp"] == BENT["F_sp"]  # of which the equations of sliding say nothing
     unexplained = replace(choice, base=setting.plain.first)
     assert by_equations(unexplained, model(90.0), setting).plant.effects[0].values["k"] == 55.0
-
-
-def test_a_command_between_the_samples_that_several_effects_hid_is_looked_for_beside_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Beside the first effect alone what the second does may be as large as any share."""
-    module = importlib.import_module("identification.tracing.trace")
-    setting, both = spring()
-    one = replace(both, steps=())
-    shares = iter([0.0, 0.4])
-    asked = list[tuple[float, ...]]()
-
-    def rows(_train: object, _rig: object, _halt: object, *share: float) -> RecordedRows:
-        asked.append(share)
-        return setting.plain.rows
-
-    monkeypatch.setattr(module, "recorded_rows", rows)
-    monkeypatch.setattr(module, "plain_model", lambda *_: setting.plain)
-    monkeypatch.setattr(module, "first_effect", lambda *_: (setting, one))
-    monkeypatch.setattr(module, "selection", lambda *_: both)
-    monkeypatch.setattr(module, "share_beside", lambda *_: next(shares))
-    rng = np.random.default_rng(0)
-    found = module._chosen([], MOTOR, {}, (rng, rng), lambda _stage, _share: None, Halt())
-    assert asked == [(), (0.4,)]
-    assert found == (setting, both)

@@ -6,7 +6,6 @@ import numpy as np
 
 from identification.effects._library import built_in
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import REST
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.tracing.regression.candidates import EffectCandidate
@@ -14,10 +13,8 @@ from identification.tracing.regression.stepwise import (
     absorb,
     choose,
     explained_part,
-    gives_way,
 )
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
-from tests.identification.tracing.settings import best_of
 
 
 def quiet(_stage: str, _share: float) -> None:
@@ -45,22 +42,6 @@ def test_rows_of_rest_stay_where_an_effect_leaves_higher_levels_to_friction() ->
     (before,), (after,) = stage.at_rest, with_it.at_rest
     assert np.array_equal(before.start, after.start) and len(before.start) > 10
     assert len(replace(stage, theta=higher).at_rest[0].start) > len(before.start)
-
-
-def test_steps_at_rest_are_no_bristle() -> None:
-    effect = built_in()["presliding"]
-    stage = at_rest(made(4), 5e-5, np.random.default_rng(3))
-    start, first = first_stage(stage.logs, False)
-    candidate = best_of(start, effect, first)
-    assert candidate is not None and REST in first
-    assert not gives_way(candidate, first)
-
-
-def test_a_bristle_that_explains_rest_gives_way() -> None:
-    log = made(4, {"presliding": {"sigma_0": 1e5}})
-    start, first = first_stage([seen(log)], False)
-    candidate = best_of(start, built_in()["presliding"], first)
-    assert candidate is not None and gives_way(candidate, first)
 
 
 def test_the_part_explained_is_that_of_the_square_beyond_the_noise() -> None:
