@@ -25,11 +25,12 @@ from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.model.size import NOT_SHOWN, Size
 from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import WORSE
+from identification.thresholds import FAR_LESS, WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,8 @@ class RecordedLogs:
     drive: what drives their runs; imposed: the motion is prescribed by a rig; halt: whether
     whatever is made of them is to go on; share: of the step of the command to the next sample, by
     which its mean between them is another than the logged one: it is in these logs, and `given`
-    puts it into others. remarks: what became of logs whose clock is faster than their motion.
+    puts it into others; share_sd: its deviation. remarks: what became of logs whose clock is faster
+    than their motion.
     """
 
     logs: tuple[MotionLog, ...]
@@ -48,6 +50,7 @@ class RecordedLogs:
     imposed: bool = False
     halt: Halt = field(default_factory=Halt)
     share: float = 0.0
+    share_sd: float = 0.0
     remarks: tuple[str, ...] = ()
 
     @property
@@ -69,6 +72,13 @@ class RecordedLogs:
     def command_period(self) -> float | None:
         """Time [s] after which the loop gives its next command, None where it is the samples'."""
         return period_of(self.share, self.logs[0].log.h)
+
+    @property
+    def instant_sd(self) -> float:
+        """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
+        share above, of a measured one as likely anywhere up to where its lag would be seen."""
+        samples = self.share_sd if self.held else FAR_LESS / 3.0**0.5
+        return samples * self.logs[0].log.h
 
     @property
     def name(self) -> str:
@@ -147,8 +157,9 @@ def slower_remarks(logs: Sequence[Log], slower: Sequence[Log]) -> tuple[str, ...
     )
 
 
-def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
+def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
     """Logs, recorded as they were read, with the command between their samples."""
+    recorded, share = replace(recorded, share_sd=found.sd), found.value
     if share == 0.0:
         return recorded
     means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
@@ -159,19 +170,19 @@ def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
     return replace(recorded, share=share, remarks=(*recorded.remarks, said)).of(means)
 
 
-def plain_share(recorded: RecordedLogs) -> float:
+def plain_share(recorded: RecordedLogs) -> Size:
     """Share of the command's step to the next sample, as a machine without effects shows it.
 
     Ours: `regression/README.md`, (13).
     """
     if not (recorded.held or recorded.by_command):
-        return 0.0
+        return NOT_SHOWN
     if recorded.held and any(not len(one.sliding.start) for one in recorded.logs):
-        return 0.0
+        return NOT_SHOWN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
     stage = first_stage(recorded.logs, recorded.by_command)[1]
     shown = stage.get(MECHANICAL if recorded.held else ACTUATOR)
-    return share_between(recorded.logs, shown.rows, shown.slowest) if shown else 0.0
+    return share_between(recorded.logs, shown.rows, shown.slowest) if shown else NOT_SHOWN
 
 
 def recorded_logs(

@@ -29,7 +29,6 @@ from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.signals.steps import MEDIAN_OF_NOISE
 from identification.thresholds import (
-    FAR_LESS,
     FOURFOLD,
     HALF,
     MATERIAL,
@@ -81,12 +80,12 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
-    if recorded.drive == "command":
+    if recorded.by_command:
         return fit
-    if fit.adequate and not fit.imposed:
+    if recorded.drive == "force" and fit.adequate and not fit.imposed:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
-    return _of_any_instant(fit, recorded.plain[0].h)
+    return _of_any_instant(fit, recorded.instant_sd)
 
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
@@ -101,16 +100,16 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
     return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
 
 
-def _of_any_instant(fit: KarnoppFit, h: float) -> KarnoppFit:
-    """The fit whose mass may err by the part of a period h [s] by which the columns of a measured
-    force and of the position may be apart unseen: of viscous friction a lag makes inertia.
+def _of_any_instant(fit: KarnoppFit, instant_sd: float) -> KarnoppFit:
+    """The fit whose mass errs by as much as it is unsure when the force acts, deviation [s]: of
+    viscous friction a lag makes inertia.
 
     F_v y'(t - lag) = F_v y' - F_v lag y'', to first order; ours.
     """
     one, viscous = fit.estimates["m"], 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
-    if one.sd is None:
+    more = viscous * instant_sd
+    if one.sd is None or not more:
         return fit
-    more = viscous * h * FAR_LESS / 3.0**0.5  # of a lag as likely anywhere up to where it is seen
     wider = widened(one, float(np.hypot(one.sd, more)) / one.sd)
     covariance = fit.covariance.copy()
     if "m" in fit.free:

@@ -22,6 +22,7 @@ from identification.estimation.regression.weighted_rows import (
     without_each_block,
 )
 from identification.log import Log
+from identification.model.size import NOT_SHOWN, Size
 from identification.thresholds import BEYOND_CHANCE, MATERIAL
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
@@ -29,23 +30,23 @@ FAR_FASTER = 50.0  # periods a sample, as which any more count
 STRETCH_OF_LOOP = 25  # samples
 
 
-def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -> float:
+def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -> Size:
     """Share of the step to the next sample, by which what the machine was given is another command
-    than the logged.
+    than the logged, with its deviation.
 
     rows: of the equation of motion of a motor, else of the actuator's, over all logs; slowest
-    [m/s]: of those that count. 0 where none shows beside what the rows leave: where an effect is
-    missing it may be confounded with the command's rate, and that is no share. Ours: `README.md`,
-    (13).
+    [m/s]: of those that count. The value is 0 where none shows beside what the rows leave: where an
+    effect is missing it may be confounded with the command's rate, and that is no share. Ours:
+    `README.md`, (13).
     """
     by_motor, keep = logs[0].held, np.asarray(rows.speed >= slowest)
     rate = np.concatenate([_rate_column(one) for one in logs])
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
     if len(with_rate.b) < 4 * with_rate.X.shape[1]:
-        return 0.0
+        return NOT_SHOWN
     found, without = solve_rows(with_rate), solve_rows(rows.at(keep)).cost
     if without <= 0.0:
-        return 0.0
+        return NOT_SHOWN
 
     def share_of(theta: Array) -> float:
         # A motor's force stands on the left; an actuator's command is in the first column.
@@ -53,7 +54,8 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
 
     apart = [share_of(theta) for theta in without_each_block(with_rate)]
     sd = float(spread_of_left_out(np.array(apart)))
-    return significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
+    share = significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
+    return Size(share, sd)
 
 
 def _rate_column(one: MotionLog) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from benchmarks.drives_rig import make
 from identification.arrays import Array
 from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
@@ -110,3 +111,14 @@ def test_noise_of_the_force_that_is_larger_in_motion_widens_what_the_run_gives()
         one = found[name]
         assert one.low is not None and one.high is not None
         assert one.low < getattr(RUNS_BY, name) < one.high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("family", "seed"), [("force", 1306), ("motor", 1301)])
+def test_a_mass_is_as_unsure_as_the_instants_of_the_force(family: str, seed: int) -> None:
+    """A measured force that lags by half a period, and a command whose loop is four times faster
+    than its log: what viscous friction makes of either is mass."""
+    made = make(family, ("none",), seed, 0.2)
+    one = fit_plant([made.train], np.random.default_rng(0), rig=made.machine.rig).estimates["m"]
+    assert one.value is not None and one.sd is not None
+    assert abs(one.value - made.machine.nine.m) < 3.0 * one.sd < 0.03 * one.value
