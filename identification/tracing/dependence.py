@@ -13,7 +13,7 @@ from identification.tracing.result import Dependence
 BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
 FEW_VALUES = 8  # values of a signal (a switch, a gear) that are each a level of its own
 MOST_SIGNALS = 3  # signals named
-OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
+OVERLAPPING = 20  # rows to a level, since they share samples
 SECOND_SIGNAL = 0.15  # share of what is left that a second signal must explain
 FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length resolves
 GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
@@ -59,23 +59,23 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 def dependence(
     r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray,
-    each: int = OVERLAPPING, least: float | None = None,
+    least: float | None = None,
 ) -> Dependence:  # fmt: skip
     """Signals on which a whitened residual (n,) depends, most of all first.
 
     signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time, left
-    out in turn; each: rows that a level of a signal needs; least: share of the residual from which
-    a signal is named, None: the usual. Each signal may act otherwise in the two directions. Source:
-    cross-validation, Stone (1974); `README.md`, (10).
+    out in turn; least: share of the residual from which a signal is named, None: the usual. Each
+    signal may act otherwise in the two directions. Source: cross-validation, Stone (1974);
+    `README.md`, (10).
     """
     least = OF_ACCOUNT if least is None else least
-    best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
+    best = {name: smooth_share(r, x, up, block) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
         swing = periodic_share(r, signals["t"], rate, block)
         # A periodic motion makes all that depends on place or speed periodic as well.
         apart = swing[0] > OF_ACCOUNT + max(share for share, _ in best.values())
-        if apart:
+        if apart and not _of_the_motion(signals, rate, block):
             best["t"] = swing
         else:
             rate = 0.0
@@ -85,11 +85,21 @@ def dependence(
     left = r - best[order[0]][1]
     named = [order[0]]
     for name in order[1:]:
-        again = smooth_share(left, signals[name], up, block, each)
+        again = smooth_share(left, signals[name], up, block)
         if best[name][0] > least / 2 and again[0] > SECOND_SIGNAL:
             named.append(name)
     return Dependence(
         tuple(named[:MOST_SIGNALS]), best[order[0]][0], rate if named[0] == "t" else 0.0
+    )
+
+
+def _of_the_motion(signals: Mapping[str, Array], rate: float, block: IntArray) -> bool:
+    """Whether the motion itself goes at this rate [Hz], or at one of which it is a harmonic."""
+    t = signals["t"]
+    return any(
+        periodic_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_ACCOUNT
+        for x in (signals[name] for name in ("y", "v") if name in signals)
+        for harmonic in range(1, HARMONICS + 1)
     )
 
 
@@ -128,16 +138,14 @@ def periodic_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[fl
     return explained_by(r, np.column_stack(own), block)
 
 
-def smooth_share(
-    r: Array, x: Array, up: BoolArray, block: IntArray, each: int = OVERLAPPING
-) -> tuple[float, Array]:
+def smooth_share(r: Array, x: Array, up: BoolArray, block: IntArray) -> tuple[float, Array]:
     """The better of a coarse and a fine function of one signal and the direction.
 
     Source: as `explained_by`, Stone (1974).
     """
     found = []
     for levels in BINS:
-        if len(r) < each * levels:
+        if len(r) < OVERLAPPING * levels:
             continue
         columns = hats(x, levels)
         both = np.column_stack([columns * up[:, np.newaxis], columns * ~up[:, np.newaxis]])

@@ -22,7 +22,7 @@ from identification.estimation.windowed_run.windows import left_in_windows, star
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
 from identification.thresholds import ASTRAY
-from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, dependence
+from identification.tracing.dependence import MOST_SIGNALS, dependence
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import joined, signals_at, signals_of
 from identification.tracing.result import Dependence
@@ -30,7 +30,6 @@ from identification.tracing.result import Dependence
 FEWEST_ROWS = 30
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
-CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
 SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
 
@@ -51,9 +50,7 @@ def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
     return best
 
 
-def _in_equation(
-    choice: Choice, equation: str, keep: BoolArray, each: int = OVERLAPPING
-) -> tuple[Dependence, float] | None:
+def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Dependence, float] | None:
     """On what an equation's residual depends at these rows, and the square [noise units] that the
     signals named explain; None where there are too few rows."""
     o = choice.base[equation]
@@ -81,7 +78,7 @@ def _in_equation(
         # Those far off draw on the mean, on which no signal has a part.
         r = r - np.where(way, _mean(r[way]), _mean(r[~way]))
     n = len(r)  # fine stretches in turn, or no function of time could be judged
-    found = dependence(r, signals, way, np.arange(n) * LEFT_OUT_STRETCHES // n % BLOCKS, each)
+    found = dependence(r, signals, way, np.arange(n) * LEFT_OUT_STRETCHES // n % BLOCKS)
     names = found.depends_on
     if equation == REST and names:  # it is left since the body stands still, and not before
         names = (*names, "reversal")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array, IntArray
-from identification.tracing.dependence import SEPARATE, dependence
+from identification.tracing.dependence import dependence
 
 
 def signals(n: int, rng: np.random.Generator) -> dict[str, Array]:
@@ -101,6 +101,6 @@ def test_few_rows_tell_no_swing() -> None:
     for seed in range(200):  # the frequency that fits best is one of many
         rng = np.random.default_rng(seed)
         s = {"t": np.sort(rng.uniform(0.0, 60.0, 40)), "v": rng.standard_normal(40)}
-        found = dependence(rng.standard_normal(40), s, s["v"] > 0, np.arange(40) % 8, SEPARATE)
+        found = dependence(rng.standard_normal(40), s, s["v"] > 0, np.arange(40) % 8)
         swings += found.swing > 0.0
     assert swings == 0
