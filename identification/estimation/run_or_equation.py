@@ -35,6 +35,10 @@ from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
 
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+STEPS_WHY = (
+    "nothing is identifiable from the equation of motion of steps of force; log a force that"
+    " changes in a run"
+)
 FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
@@ -83,6 +87,8 @@ def answered(
     """
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else "no free run follows these logs"
+        if recorded.steps:
+            raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
         return fit_imposed(recorded, why)
     if quick and not is_adequate(found.misfit):
         fit = by_equation_if_surer(found.plant.friction, recorded)
@@ -188,7 +194,12 @@ def _identified(fit: KarnoppFit) -> int:
 
 
 def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
-    """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
+    """The fit by the equation of motion, of both ways or of the one that there is, if it can be:
+    not of steps, whose force has no errors, but velocity and acceleration have, so that least
+    squares would draw mass and viscous friction to nothing (errors in variables: Söderström, Stoica
+    (1989), 8.6)."""
+    if recorded.steps:
+        return None
     for by in (fit_imposed, fit_one_way):
         with suppress(NotIdentifiable):
             return by(recorded, why)

@@ -42,7 +42,10 @@ from identification.tracing.structure_search import (
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
-MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing can be tested"
+MOVE_IT = (
+    "a held-out run in which the body slides for longer: in this one too little, so nothing can be"
+    " tested"
+)
 ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
@@ -64,8 +67,8 @@ def trace(
     it says no, the best so far is the result, and `not_tried` says what is not in it. Raises BadLog
     where a signal is missing, NotIdentifiable where too little of the motion slides.
     """
-    for log in (*train, *test):
-        check_driven(log)
+    check_driven(train)
+    check_driven((*train, *test))
     report = on_progress or quiet
     halt = Halt(keep_going)
     beside = what_acts_beside(train, rig, halt)

@@ -139,7 +139,7 @@ def axis_test(
     earlier: what the registry has of the machine. Raises NotIdentifiable where too little slides.
     """
     source = max(sources.runs, key=lambda one: one.log.duration)
-    check_driven(source.log)
+    check_driven([source.log])
     around = surroundings([source.log], sources.rig)
     found = axis_equation(around.taken_out(source.log), sources.rig)
     units = limit_units(sources.rig)

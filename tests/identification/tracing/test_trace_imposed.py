@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from identification.arrays import Array
 from identification.effects._library import built_in
-from identification.errors import BadLog, NotIdentifiable
+from identification.errors import NotIdentifiable
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL
@@ -192,5 +192,4 @@ def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
     assert found.before["test"].force_rms is None
     assert any("does not slide in the test logs" in remark for remark in found.remarks)
     dead = still.with_signals(F=np.zeros(n))
-    with pytest.raises(BadLog, match="still: the applied force is constant"):
-        traced(train, [dead])
+    assert any("does not slide in the test logs" in r for r in traced(train, [dead]).remarks)
