@@ -34,6 +34,7 @@ from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
 
+WAYS_OF_SLIDING = (("F_cp", "F_vp"), ("F_cn", "F_vn"))
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 STEPS_WHY = (
     "nothing is identifiable from the equation of motion of steps of force; log a force that"
@@ -138,12 +139,17 @@ def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if other is None or _identified(other) < _identified(fit):
         return fit
     five = {name: getattr(other.friction, name) for name in FIVE}
+    told = {name: other.estimates[name] for name in FIVE}
+    for level, slope in WAYS_OF_SLIDING:  # neither knows the one apart from the other
+        one = fit.estimates[level]
+        if one.value is None and not told[slope].known:
+            told[level] = told[level].withheld(one.reason or "", five[level])
     stops = [name for name in fit.free if name not in FIVE]
     at = [fit.free.index(name) for name in stops]
     return replace(
         fit,
         friction=replace(fit.friction, **five),
-        estimates={**fit.estimates, **{name: other.estimates[name] for name in FIVE}},
+        estimates={**fit.estimates, **told},
         free=(*other.free, *stops),
         covariance=block_diag(other.covariance, fit.covariance[np.ix_(at, at)]),
         left=other.left,

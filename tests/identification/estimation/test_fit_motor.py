@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from identification.errors import NotIdentifiable
+from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
+from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
@@ -96,3 +98,20 @@ def test_steps_that_no_run_follows_identify_nothing() -> None:
         NotIdentifiable, match="nothing is identifiable from the equation of motion of steps"
     ):
         fit_plant(logs, np.random.default_rng(0), rig=Rig("force", motion="rotary"))
+
+
+def test_a_coulomb_force_of_an_equation_without_its_viscous_term_is_none_of_a_run_that_shows_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    logs, rig = steps((1.0, -1.0, 0.6, -0.6)), Rig("motor", force_per_command=1.0, motion="rotary")
+    fit = fit_plant(logs, np.random.default_rng(0), rig=rig)
+    without = {**fit.estimates} | {"F_vp": fit.estimates["F_vp"].withheld("dropped", 0.0)}
+    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: replace(fit, estimates=without))
+    shown = run_or_equation._with_stops(fit, recorded_logs(logs, rig))
+    assert shown.estimates["F_cp"].value == fit.estimates["F_cp"].value
+    hidden = {**fit.estimates} | {
+        name: fit.estimates[name].withheld("too wide", 0.1) for name in ("F_cp", "F_cn", "F_vp")
+    }
+    shown = run_or_equation._with_stops(replace(fit, estimates=hidden), recorded_logs(logs, rig))
+    assert shown.estimates["F_cp"].value is None and shown.estimates["F_cp"].reason == "too wide"
+    assert shown.estimates["F_cn"].value == fit.estimates["F_cn"].value
