@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from identification.errors import BadLog
+from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card.columns import columns_of
 from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.refusals import no_body
 from workbench.steps.first_card.registers import read_register
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
@@ -160,3 +163,17 @@ def test_a_drive_that_is_constant_in_the_longest_run_is_said(tmp_path: Path) -> 
 def test_a_clock_that_begins_again_too_soon_is_said(tmp_path: Path) -> None:
     with pytest.raises(BadLog, match="begins again in data row 71, as that of several runs in one"):
         propose(tmp_path, "time_s,voltage_V,angle_deg", *steps(70, 120, 60))
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_command_without_its_sign_is_named(tmp_path: Path, signed: bool) -> None:
+    """A hoist by pulses of the motor, whose direction stands nowhere; rests between."""
+    u = np.tile(np.repeat([70.0, 0.0, -30.0, 0.0], [8, 20, 16, 20]), 4)
+    y = np.cumsum(np.where(u > 0.0, 1500.0, np.where(u < 0.0, -750.0, 0.0)))
+    y = np.round(y + 40.0 * np.random.default_rng(2).standard_normal(len(y)) * (u != 0.0))
+    u = u if signed else np.abs(u)
+    said = "'MotorPWM' is never negative, though 'Encoder' goes both ways"
+    found = propose(tmp_path, "time_ms,MotorPWM,Encoder", 100.0 * np.arange(len(u)), u, y)
+    assert any(said in remark for remark in found.remarks) is not signed
+    told = no_body(columns_of(read_unknown(tmp_path / "run.csv")))
+    assert (said in str(told)) is not signed

@@ -11,6 +11,7 @@ from identification.signals.relations import lead
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.pairs import follows
+from workbench.steps.first_card.refusals import without_sign
 from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, are_constant
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
@@ -48,6 +49,8 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
             f"inertia and friction explain only {roles.law.share:.0%} of what drives: a weight or a"
             " spring is in it, or it is not what drives this position"
         )
+    if "u" in roles.columns and (unsigned := without_sign([roles.columns[k] for k in "uy"])):
+        yield unsigned
     if "u" in roles.columns and set(words_of(roles.columns["u"].raw.header)) & CONTROLLERS:
         yield (
             f"by its header {roles.columns['u'].shown} is a controller's output: where the drive"
