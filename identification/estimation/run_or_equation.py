@@ -140,9 +140,9 @@ def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         return fit
     five = {name: getattr(other.friction, name) for name in FIVE}
     told = {name: other.estimates[name] for name in FIVE}
-    for level, slope in WAYS_OF_SLIDING:  # neither knows the one apart from the other
+    for level, slope in WAYS_OF_SLIDING:  # known only without its partner
         one = fit.estimates[level]
-        if one.value is None and not told[slope].known:
+        if one.value is None and slope not in other.free:
             told[level] = told[level].withheld(one.reason or "", five[level])
     stops = [name for name in fit.free if name not in FIVE]
     at = [fit.free.index(name) for name in stops]

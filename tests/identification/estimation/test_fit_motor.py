@@ -105,8 +105,10 @@ def test_a_coulomb_force_of_an_equation_without_its_viscous_term_is_none_of_a_ru
 ) -> None:
     logs, rig = steps((1.0, -1.0, 0.6, -0.6)), Rig("motor", force_per_command=1.0, motion="rotary")
     fit = fit_plant(logs, np.random.default_rng(0), rig=rig)
-    without = {**fit.estimates} | {"F_vp": fit.estimates["F_vp"].withheld("dropped", 0.0)}
-    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: replace(fit, estimates=without))
+    at = [i for i, name in enumerate(fit.free) if name != "F_vp"]
+    without = replace(fit, free=tuple(fit.free[i] for i in at),
+                      covariance=fit.covariance[np.ix_(at, at)])  # fmt: skip
+    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: without)
     shown = run_or_equation._with_stops(fit, recorded_logs(logs, rig))
     assert shown.estimates["F_cp"].value == fit.estimates["F_cp"].value
     hidden = {**fit.estimates} | {
