@@ -16,13 +16,14 @@ from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.run_or_equation import STEPS_WHY
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
-from identification.signals.check import check_driven
+from identification.signals.check import are_steps, check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
@@ -69,6 +70,8 @@ def trace(
     """
     check_driven(train)
     check_driven((*train, *test))
+    if are_steps(train):  # the equations in which effects are sought hold nothing of them
+        raise NotIdentifiable(f"{train[0].name}: {STEPS_WHY}")
     report = on_progress or quiet
     halt = Halt(keep_going)
     beside = what_acts_beside(train, rig, halt)

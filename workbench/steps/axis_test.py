@@ -218,7 +218,7 @@ def _why_not(name: str, found: AxisEquation) -> str:
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]
-    return f"{many} breakaways, too few; add starts from rest"
+    return f"{many} breakaway{'' if many == 1 else 's'}, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:

@@ -193,3 +193,11 @@ def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
     assert any("does not slide in the test logs" in remark for remark in found.remarks)
     dead = still.with_signals(F=np.zeros(n))
     assert any("does not slide in the test logs" in r for r in traced(train, [dead]).remarks)
+
+
+def test_runs_by_steps_of_force_are_not_traced() -> None:
+    t = H * np.arange(400, dtype=np.float64)
+    runs = [Log(f"by {F:g}", {"t": t, "y": np.sign(F) * t * (1.0 + 0.1 * F**2), "F": 0.0 * t + F})
+            for F in (3.0, -3.0, 5.0, -5.0)]  # fmt: skip
+    with pytest.raises(NotIdentifiable, match="by 3: nothing is identifiable from the equation"):
+        traced(runs, [])
