@@ -39,8 +39,7 @@ def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> Fir
 
     Raises as it does: BadLog where a signal is missing, NotIdentifiable where nothing moves.
     """
-    for log in logs:
-        check_driven(log)
+    check_driven(logs)
     rows = float(np.mean([len(log) for log in logs]))
     runs = SAMPLES_RUN / rows
     beside = what_acts_beside(logs, rig, each=lambda: _ending(RUNS_OF_LAG * len(logs)))

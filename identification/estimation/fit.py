@@ -55,7 +55,7 @@ from identification.model.plant import Actuator, Plant
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
-from identification.signals.check import check_driven
+from identification.signals.check import are_steps, check_driven
 from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
     AS_GOOD_AS_NONE,
@@ -94,8 +94,7 @@ def fit_plant(
     halt = Halt(keep_going)
     if prior is not None:
         return _fit(logs, rng, rig, drive, prior, on_progress, halt)
-    for log in logs:
-        check_driven(log)
+    check_driven(logs)
     beside = what_acts_beside(logs, rig, halt)
     return fit_beside(logs, beside, rng, rig, drive, on_progress, halt)
 
@@ -113,6 +112,8 @@ def fit_beside(
     try:
         fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick)
     except NotIdentifiable as refused:
+        if are_steps(alone):
+            raise
         try:
             fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
         except UserError:
@@ -229,7 +230,7 @@ def finished(
     actuator spoils is driven by the measured force instead.
     """
     search, other, forced_rng = rng.spawn(3)
-    if found.imposed and led_by_rig(recorded):
+    if found.imposed and led_by_rig(recorded) and not recorded.steps:
         return as_sliding_shows(fit_imposed(recorded, PRESCRIBED_WHY), recorded)
     # A motor's stops are searched already.
     hopeless = loose(found.plant, recorded.drive) and rough(found.outcomes)

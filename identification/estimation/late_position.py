@@ -25,6 +25,7 @@ from identification.log import Log, Rig
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
+from identification.signals.check import are_steps
 from identification.thresholds import ADEQUATE, ASTRAY
 
 SLOW_LOG = (
@@ -48,6 +49,8 @@ def what_acts_beside(
     found, motor = surroundings(logs, rig), rig.kind == "motor"
     if motor and not rig.force_per_command:
         return found
+    if are_steps(logs):  # the same however late
+        return replace(found, lag=NOT_SHOWN, sampled=False)
     h, halt = logs[0].h, halt or Halt()
     found = replace(found, gives=rig.force_per_command if motor else None)
     tried: dict[float, float] = {}

@@ -28,7 +28,7 @@ from identification.model.estimates import Drive
 from identification.model.size import NOT_SHOWN, Size
 from identification.progress import Halt
 from identification.remarks import MinorRemark
-from identification.signals.check import check_driven
+from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
 from identification.thresholds import FAR_LESS, WORSE
 
@@ -67,6 +67,11 @@ class RecordedLogs:
     def by_command(self) -> bool:
         """Whether an actuator's equation is fitted beside the mechanical one."""
         return self.drive == "command" and not self.held
+
+    @property
+    def steps(self) -> bool:
+        """Whether the force is constant in every log, and differs from one to the next at most."""
+        return are_steps(self.plain)
 
     @property
     def command_period(self) -> float | None:
@@ -194,8 +199,7 @@ def recorded_logs(
     A command is its mean until the next sample, where they show it. Raises BadLog where a signal is
     missing, or the asked drive is not to be had, NotIdentifiable where nothing moves.
     """
-    for log in logs:
-        check_driven(log)
+    check_driven(logs)
     slower = needed(logs, rig)
     chosen = chosen_drive(slower, rig, drive)
     found = RecordedLogs((), rig, chosen, halt=halt or Halt()).of(slower)

@@ -34,7 +34,12 @@ from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
 
+WAYS_OF_SLIDING = (("F_cp", "F_vp"), ("F_cn", "F_vn"))
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+STEPS_WHY = (
+    "nothing is identifiable from the equation of motion of steps of force; log a force that"
+    " changes in a run"
+)
 FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
@@ -83,6 +88,8 @@ def answered(
     """
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else "no free run follows these logs"
+        if recorded.steps:
+            raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
         return fit_imposed(recorded, why)
     if quick and not is_adequate(found.misfit):
         fit = by_equation_if_surer(found.plant.friction, recorded)
@@ -132,12 +139,17 @@ def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if other is None or _identified(other) < _identified(fit):
         return fit
     five = {name: getattr(other.friction, name) for name in FIVE}
+    told = {name: other.estimates[name] for name in FIVE}
+    for level, slope in WAYS_OF_SLIDING:  # known only without its partner
+        one = fit.estimates[level]
+        if one.value is None and slope not in other.free:
+            told[level] = told[level].withheld(one.reason or "", five[level])
     stops = [name for name in fit.free if name not in FIVE]
     at = [fit.free.index(name) for name in stops]
     return replace(
         fit,
         friction=replace(fit.friction, **five),
-        estimates={**fit.estimates, **{name: other.estimates[name] for name in FIVE}},
+        estimates={**fit.estimates, **told},
         free=(*other.free, *stops),
         covariance=block_diag(other.covariance, fit.covariance[np.ix_(at, at)]),
         left=other.left,
@@ -188,7 +200,12 @@ def _identified(fit: KarnoppFit) -> int:
 
 
 def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
-    """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
+    """The fit by the equation of motion, of both ways or of the one that there is, if it can be:
+    not of steps, whose force has no errors, but velocity and acceleration have, so that least
+    squares would draw mass and viscous friction to nothing (errors in variables: Söderström, Stoica
+    (1989), 8.6)."""
+    if recorded.steps:
+        return None
     for by in (fit_imposed, fit_one_way):
         with suppress(NotIdentifiable):
             return by(recorded, why)

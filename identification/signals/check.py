@@ -3,10 +3,12 @@
 Rows in the messages count as in the file: the caller says which row the first sample has.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.arrays import Array
-from identification.errors import BadLog
+from identification.errors import BadLog, NotIdentifiable
 from identification.log import Log, Rig
 from identification.signals.frozen import noise_shows, within
 from identification.signals.jumps import Jumps, jumps
@@ -72,20 +74,43 @@ def _check_moved(log: Log, rig: Rig, first_row: int) -> None:
         raise BadLog(_jumping(log, rig, found, first_row))
 
 
-def check_driven(log: Log) -> None:
-    """Raises BadLog, one line, where no force is logged or none that changes."""
-    if "F" not in log:
-        raise BadLog(
-            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
-            " with u"
-        )
-    if np.ptp(log["F"]) == 0.0:
-        raise BadLog(
-            f"{log.name}: the applied force is constant ({log['F'][0]:g}), so nothing drives"
-            " the body; check the force's columns in the card"
-        )
-    if "y" in log:
-        _check_moving_force(log)
+def check_driven(logs: Sequence[Log]) -> None:
+    """Pass logs of one machine of which the applied force is known and changes, in a log or from
+    one to the next.
+
+    Raises BadLog, one line, where no force is logged, NotIdentifiable where there is only one of it
+    in each direction of motion: friction is then whatever that force is, and the mass nothing.
+    """
+    for log in logs:
+        if "F" not in log:
+            raise BadLog(
+                f"{log.name}: no applied force; give the card F, both pressures, or"
+                " force_per_command with u"
+            )
+    if are_steps(logs):
+        _check_steps(logs)
+    for log in logs:
+        if "y" in log and np.ptp(log["F"]) > 0.0:
+            _check_moving_force(log)
+
+
+def are_steps(logs: Sequence[Log]) -> bool:
+    """Whether the applied force is constant in each log."""
+    return all(np.ptp(log["F"]) == 0.0 for log in logs)
+
+
+def _check_steps(logs: Sequence[Log]) -> None:
+    """Refuse constant forces (steps) of which there is no second one in any direction."""
+    ways = [float(np.sign(log["y"][-1] - log["y"][0])) if "y" in log else 0.0 for log in logs]
+    levels = [float(log["F"][0]) for log in logs]
+    if len(set(zip(ways, levels, strict=True))) > len(set(ways)):
+        return
+    said = " and ".join(f"{level:g}" for level in dict.fromkeys(levels))
+    raise NotIdentifiable(
+        f"{logs[0].name}: the applied force is constant ({said}), so friction and mass are not"
+        " distinguishable from it; log a force that changes, or steps of several sizes in each"
+        " direction, and check the force's columns in the card"
+    )
 
 
 def _check_moving_force(log: Log) -> None:

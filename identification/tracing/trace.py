@@ -16,13 +16,14 @@ from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.run_or_equation import STEPS_WHY
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
-from identification.signals.check import check_driven
+from identification.signals.check import are_steps, check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
@@ -40,7 +41,10 @@ from identification.tracing.structure_search import (
 from identification.tracing.surroundings_told import orders_alone, with_surroundings
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
-MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing can be tested"
+MOVE_IT = (
+    "a held-out run in which the body slides for longer: in this one too little, so nothing can be"
+    " tested"
+)
 ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
@@ -62,8 +66,10 @@ def trace(
     it says no, the best so far is the result, and `not_tried` says what is not in it. Raises BadLog
     where a signal is missing, NotIdentifiable where too little of the motion slides.
     """
-    for log in (*train, *test):
-        check_driven(log)
+    check_driven(train)
+    check_driven((*train, *test))
+    if are_steps(train):  # the equations in which effects are sought hold nothing of them
+        raise NotIdentifiable(f"{train[0].name}: {STEPS_WHY}")
     report = on_progress or quiet
     halt = Halt(keep_going)
     beside = what_acts_beside(train, rig, halt)

@@ -139,7 +139,7 @@ def axis_test(
     earlier: what the registry has of the machine. Raises NotIdentifiable where too little slides.
     """
     source = max(sources.runs, key=lambda one: one.log.duration)
-    check_driven(source.log)
+    check_driven([source.log])
     around = surroundings([source.log], sources.rig)
     found = axis_equation(around.taken_out(source.log), sources.rig)
     units = limit_units(sources.rig)
@@ -218,7 +218,7 @@ def _why_not(name: str, found: AxisEquation) -> str:
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]
-    return f"{many} breakaways, too few; add starts from rest"
+    return f"{many} breakaway{'' if many == 1 else 's'}, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:

@@ -44,10 +44,12 @@ def hardly_identifiable(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
         f"sampled at {rate:.3g} Hz, slower than {INFORMATIVE_RATE:g} Hz: starts and stops lie"
         " between two samples, so bands and breakaway forces are hardly identifiable; log faster",
     )
-    return (*(slow if rate < 0.999 * INFORMATIVE_RATE else ()), *_of_motion(log, rig))
+    others = [one for one in runs if one is not log]
+    return (*(slow if rate < 0.999 * INFORMATIVE_RATE else ()), *_of_motion(log, rig, others))
 
 
-def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
+def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
+    """Of a log's motion, and the ways of other runs."""
     try:
         motion = differentiate(log["y"], log.h)
     except BadLog:
@@ -63,13 +65,13 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
         return
     up = float(np.mean(v > 0.0))
     one_way = min(up, 1.0 - up) < NEARLY_ONE_WAY
-    if one_way:
+    if one_way and not any(_goes_back(one["y"], up) for one in others):
         yield _said_of_one_way(up)
     of_command = rig.kind in ("motor", "velocity") and "u" in log
     name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
     if logged is None:
         return
-    whole = low_pass(logged, log.h, motion.cutoff)
+    whole = low_pass(logged, log.h, motion.cutoff) if np.ptp(logged) > 0.0 else logged
     drive = whole[sure]
     yield from _against_stops(log["y"], whole, sure, name, rotary=rig.motion == "rotary")
     if one_way and _is_idle(drive, v, a):
@@ -159,10 +161,17 @@ def _said_of_coasting(name: str, speed: Array) -> str:
     )
 
 
+def _goes_back(y: Array, up: float) -> bool:
+    """Whether a run's positions (n,) end up against the way that goes up by this share."""
+    return bool((y[-1] - y[0]) * (0.5 - up) > 0.0)
+
+
 def _is_idle(drive: Array, v: Array, a: Array) -> bool:
-    """Whether the drive goes with neither the body's speed nor its change."""
+    """Whether the drive goes with neither the body's speed nor its change: a constant one is a step
+    where the speed comes up to it."""
     if np.ptp(drive) == 0.0:
-        return True
+        few = max(2, int(ENDS * len(v)))
+        return not np.min(np.abs(v)) < SPEED_LEFT * abs(v[-few:].mean())
     return all(abs(float(np.corrcoef(drive, x)[0, 1])) < GOES_WITH_NEITHER for x in (v, a))
 
 

@@ -60,6 +60,9 @@ REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
 FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
+OF_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
+AT_BOUND = 2e-9  # of such a term, that is none
+OFF_BOUND = 1e-3  # of the most that it could be, at which what a run shows of it is taken
 TRUST = 3.0  # times its standard deviation that the regression is trusted as a prior
 
 
@@ -152,6 +155,30 @@ class _Unknowns:
         """The plant of the unknowns (d,)."""
         return plant_with(self.plant, self.names, self.full(x))
 
+    def off_bounds(self, found: Minimum) -> tuple[Minimum, Array]:
+        """A minimum with each term of sliding friction that lies at its bound 0 moved off it, by
+        less than a run shows, and the units (d,) of its unknowns.
+
+        At a bound a run changes to one side alone, or not at all, and least squares would take for
+        exact what is only bounded, and what goes with it for better known than it is. Ours.
+        """
+        least = values_of(self.plant_at(found.x), self.names)[self.at]
+        size, x = self.unit[self.at].copy(), found.x.copy()
+        for i, k in enumerate(self.at):
+            if self.names[k] in OF_SLIDING and least[i] <= AT_BOUND:
+                size[i] = self.largest(self.names[k])
+                x[i] = OFF_BOUND
+        ratio = size / self.unit[self.at]
+        x = np.where(x == found.x, found.x / ratio, x)
+        return Minimum(lambda at: found.fun(at * ratio), x, found.mean), size
+
+    def largest(self, name: str) -> float:
+        """Size that a term of sliding friction would have, as all of the friction that there is."""
+        p = self.plant.friction
+        force = max(p.F_cp, p.F_cn, p.F_sp, -p.F_sn)
+        speed = max(float(np.max(np.abs(one.signals["v"]))) for one in self.logs)
+        return force / speed if name.startswith("F_v") else force
+
     def misfit(self, x: Array) -> float:
         """What the free run of the unknowns (d,) leaves."""
         return misfit(self.plant_at(x), self.logs, self.drive)
@@ -211,18 +238,18 @@ def refit(
         if not unknowns.reached:
             raise
         raise HaltedRefit(unknowns.plant_at(unknowns.reached[0])) from None
-    free, unit = unknowns.at, unknowns.unit
 
     def spread() -> Array:
+        inside, size = unknowns.off_bounds(at)
         # Where what is left is no noise, a window counts as one sample.
         factor = RUN_WINDOW / logs[0].log.h if found > ADEQUATE else 1.0
         drifts, noise = any(one.walks(drive) for one in logs), None
         if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
         cluster = _windows(logs, drive) if drifts else None
-        return factor * at.covariance(cluster, noise) * np.outer(unit[free], unit[free])
+        return factor * inside.covariance(cluster, noise) * np.outer(size, size)
 
-    names = tuple(unknowns.names[i] for i in free)
+    names = tuple(unknowns.names[i] for i in unknowns.at)
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)
 
 

@@ -1,9 +1,15 @@
-"""A motor's fit from a log that begins in full motion, where no rest is to begin from."""
+"""A motor's fit from a log that begins in full motion, where no rest is to begin from, and from
+steps."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from identification.errors import NotIdentifiable
+from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
+from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
@@ -12,6 +18,7 @@ from tests.identification.motor_logs import K_A as STROKES_K_A
 from tests.identification.motor_logs import NINE, made
 
 SERVO = Karnopp(0.62, 4.1, 5.2, 22.0, 17.0, 0.02, -0.015, 6.3, -7.9)
+SMALL = Karnopp(4e-3, 0.08, 0.08, 0.045, 0.045, 0.01, -0.01, 0.12, -0.12)
 K_A, H = 6.4, 2e-3
 RIG = Rig("motor", force_per_command=K_A)
 
@@ -58,3 +65,55 @@ def test_a_noisy_command_neither_bends_sliding_friction_nor_narrows_the_stick_li
         one = fit.estimates[name]
         if one.low is not None and one.high is not None:
             assert one.low < getattr(NINE, name) < one.high
+
+
+def steps(levels: tuple[float, ...], follows: bool = True) -> list[Log]:
+    """A motor's runs of 0.6 s from rest, each by a constant command, noise 0.003 rad; follows: by
+    it, else at a speed that is none of its."""
+    rng, out, t = np.random.default_rng(1), [], np.arange(110, dtype=np.float64) * 6e-3
+    for u in levels:
+        log = Log(f"by {u:g}", {"t": t, "y": np.zeros(len(t)), "u": np.full(len(t), u)})
+        run = free_run(Plant(SMALL, Motor(1.0)), log, (0.0, 0.0, u), "command")
+        y = run.y if follows else np.sign(u) * (0.2 + 9.0 * t + np.sin(40.0 * t) / 8.0)
+        out.append(log.with_signals(y=y + 3e-3 * rng.standard_normal(len(t)), F=log["u"]))
+    return out
+
+
+def test_runs_by_steps_are_fitted_by_their_runs_alone() -> None:
+    """The equation of motion, of a force without errors, would draw mass and viscous friction to
+    nothing, and a lag, which a constant force does not show, would be the start's."""
+    rig = Rig("motor", force_per_command=1.0, motion="rotary")
+    fit = fit_plant(steps((1.0, -1.0, 0.6, -0.6)), np.random.default_rng(0), rig=rig)
+    assert fit.adequate and not fit.imposed and not fit.surroundings.lag.value
+    for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn"):
+        one = fit.estimates[name]
+        assert one.low is not None and one.high is not None
+        assert one.low < getattr(SMALL, name) < one.high < 1.1 * getattr(SMALL, name)
+
+
+def test_steps_that_no_run_follows_identify_nothing() -> None:
+    logs = [replace(log, signals={k: log[k] for k in "tyF"})
+            for log in steps((1.0, -1.0, 0.6, -0.6), follows=False)]  # fmt: skip
+    with pytest.raises(
+        NotIdentifiable, match="nothing is identifiable from the equation of motion of steps"
+    ):
+        fit_plant(logs, np.random.default_rng(0), rig=Rig("force", motion="rotary"))
+
+
+def test_a_coulomb_force_of_an_equation_without_its_viscous_term_is_none_of_a_run_that_shows_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    logs, rig = steps((1.0, -1.0, 0.6, -0.6)), Rig("motor", force_per_command=1.0, motion="rotary")
+    fit = fit_plant(logs, np.random.default_rng(0), rig=rig)
+    at = [i for i, name in enumerate(fit.free) if name != "F_vp"]
+    without = replace(fit, free=tuple(fit.free[i] for i in at),
+                      covariance=fit.covariance[np.ix_(at, at)])  # fmt: skip
+    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: without)
+    shown = run_or_equation._with_stops(fit, recorded_logs(logs, rig))
+    assert shown.estimates["F_cp"].value == fit.estimates["F_cp"].value
+    hidden = {**fit.estimates} | {
+        name: fit.estimates[name].withheld("too wide", 0.1) for name in ("F_cp", "F_cn", "F_vp")
+    }
+    shown = run_or_equation._with_stops(replace(fit, estimates=hidden), recorded_logs(logs, rig))
+    assert shown.estimates["F_cp"].value is None and shown.estimates["F_cp"].reason == "too wide"
+    assert shown.estimates["F_cn"].value == fit.estimates["F_cn"].value

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from identification.arrays import Array
 from identification.effects._library import built_in
-from identification.errors import BadLog, NotIdentifiable
+from identification.errors import NotIdentifiable
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL
@@ -192,5 +192,12 @@ def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
     assert found.before["test"].force_rms is None
     assert any("does not slide in the test logs" in remark for remark in found.remarks)
     dead = still.with_signals(F=np.zeros(n))
-    with pytest.raises(BadLog, match="still: the applied force is constant"):
-        traced(train, [dead])
+    assert any("does not slide in the test logs" in r for r in traced(train, [dead]).remarks)
+
+
+def test_runs_by_steps_of_force_are_not_traced() -> None:
+    t = H * np.arange(400, dtype=np.float64)
+    runs = [Log(f"by {F:g}", {"t": t, "y": np.sign(F) * t * (1.0 + 0.1 * F**2), "F": 0.0 * t + F})
+            for F in (3.0, -3.0, 5.0, -5.0)]  # fmt: skip
+    with pytest.raises(NotIdentifiable, match="by 3: nothing is identifiable from the equation"):
+        traced(runs, [])

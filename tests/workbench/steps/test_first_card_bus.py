@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from identification.errors import BadLog
+from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card.columns import columns_of
 from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.refusals import no_body
 from workbench.steps.first_card.registers import read_register
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
@@ -125,3 +128,52 @@ def test_a_signal_that_goes_through_a_power_of_two_has_no_sign_bit() -> None:
     swing = np.round(1024.0 + 900.0 * np.sin(0.05 * np.arange(4000)))
     steps = np.where(np.arange(4000) // 40 % 2, 1500.0, 0.0) + np.arange(4000.0) % 3.0
     assert read_register(swing) is None and read_register(steps) is None
+
+
+def steps(*lengths: int) -> tuple[Floats, Floats, Floats]:
+    """Clock, voltage, and angle in steps of a degree, of runs from rest by a constant voltage, the
+    clock of each from 0."""
+    t, u, y = [], [], []
+    for k, n in enumerate(lengths):
+        own = 6e-3 * np.arange(n)
+        level = (-1.0) ** k * (10.0 - k)
+        t.append(own + 1e-4)
+        u.append(np.full(n, level))
+        y.append(np.round(100.0 * level * (own - 0.1 * (1.0 - np.exp(-own / 0.1)))))
+    return np.concatenate(t), np.concatenate(u), np.concatenate(y)
+
+
+def test_a_clock_without_a_name_may_begin_again(tmp_path: Path) -> None:
+    t, u, y = steps(110, 120, 115)
+    path = tmp_path / "runs.csv"
+    rows = np.column_stack([u, t, y]).tolist()
+    path.write_text("\n".join(", ".join(f"{one:.9g}" for one in row) for row in rows), "utf-8")
+    found = proposed(path)
+    assert {one.name: one.column for one in found.signals}["t"] == 1
+    assert any("clock begins again: 3 runs" in remark for remark in found.remarks)
+
+
+def test_a_drive_that_is_constant_in_the_longest_run_is_said(tmp_path: Path) -> None:
+    found = propose(tmp_path, "time_s,voltage_V,angle_deg", *steps(110, 120, 115))
+    drive = next(one for one in found.signals if one.name == "u")
+    assert not drive.sure and drive.why.startswith("constant in the longest run")
+    assert not any("explain only" in remark for remark in found.remarks)
+
+
+def test_a_clock_that_begins_again_too_soon_is_said(tmp_path: Path) -> None:
+    with pytest.raises(BadLog, match="begins again in data row 71, as that of several runs in one"):
+        propose(tmp_path, "time_s,voltage_V,angle_deg", *steps(70, 120, 60))
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_command_without_its_sign_is_named(tmp_path: Path, signed: bool) -> None:
+    """A hoist by pulses of the motor, whose direction stands nowhere; rests between."""
+    u = np.tile(np.repeat([70.0, 0.0, -30.0, 0.0], [8, 20, 16, 20]), 4)
+    y = np.cumsum(np.where(u > 0.0, 1500.0, np.where(u < 0.0, -750.0, 0.0)))
+    y = np.round(y + 40.0 * np.random.default_rng(2).standard_normal(len(y)) * (u != 0.0))
+    u = u if signed else np.abs(u)
+    said = "'MotorPWM' is never negative, though 'Encoder' goes both ways"
+    found = propose(tmp_path, "time_ms,MotorPWM,Encoder", 100.0 * np.arange(len(u)), u, y)
+    assert any(said in remark for remark in found.remarks) is not signed
+    told = no_body(columns_of(read_unknown(tmp_path / "run.csv")))
+    assert (said in str(told)) is not signed

@@ -83,3 +83,19 @@ def test_a_motor_driven_by_its_voltage_is_braked_by_its_own() -> None:
         assert "k_t k_e" not in " ".join(hardly_identifiable([log.with_signals(F=voltage)], rig))
     by_force = Log("run", {"t": T, "y": SWING + noise(1e-6), "u": np.gradient(v, T)})
     assert braked_by_its_voltage([by_force], MOTOR) == ()
+
+
+def steps(*forces: float) -> list[Log]:
+    """Runs from rest by steps of a motor's command, to a speed that friction ends."""
+    t = T[:1000]
+    y = 4.0 * (t + 0.3 * (np.exp(-t / 0.3) - 1.0)) + 1e-5 * noise(1.0)[: len(t)]
+    return [Log(f"{F:g}", {"t": t, "y": F * y, "u": np.full(len(t), F)}) for F in forces]
+
+
+def test_a_body_that_a_step_brings_to_speed_is_driven() -> None:
+    assert "coasts" not in " ".join(hardly_identifiable(steps(1.0), MOTOR))
+
+
+def test_runs_that_go_one_way_each_go_both_ways_together() -> None:
+    assert "one direction" in " ".join(hardly_identifiable(steps(1.0, 0.8), MOTOR))
+    assert "one direction" not in " ".join(hardly_identifiable(steps(1.0, -0.8), MOTOR))

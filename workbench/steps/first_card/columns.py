@@ -21,6 +21,7 @@ from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, n
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header
 from workbench.logs.faulty_rows import (
+    MOST_STARTS,
     late_stamps,
     several_axes,
     sound_rows,
@@ -212,9 +213,8 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
     """The columns at the rows of one run, where a time among them goes up but for rows without a
     time, rows written twice, or a logger that was started anew; and what is said of it."""
     if not any(map(_ticks, columns)):
-        for one in columns:
-            if "time" not in one.header.means:
-                continue
+        named = [one for one in columns if "time" in one.header.means]
+        for one in named or [one for one in columns if not one.header.means]:
             beside = [other.values for other in columns if other is not one]
             rows, said = sound_rows(one.values, beside)
             runs = stretches(one.values[rows])
@@ -330,6 +330,13 @@ def _wrong_with_clock(t: Array) -> str:
     row = int(wrong[0]) + 2 if len(wrong) else 2
     if np.mean(step == 0.0) > OFTEN_REPEATED:
         return f"repeats its times (data row {row}): they are coarser than the rows"
+    if 0 < len(wrong) < MOST_STARTS and np.all(
+        t[wrong + 1] <= t[0] + LONGEST_GAP * np.median(step)
+    ):
+        return (
+            f"begins again in data row {row}, as that of several runs in one file, and not all are"
+            f" of {SHORTEST_LOG} rows; give longer runs"
+        )
     return f"does not go up evenly (see data row {row})"
 
 

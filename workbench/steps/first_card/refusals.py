@@ -7,6 +7,7 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.signals.relations import FEWEST_MOVING, lead, moving
+from identification.thresholds import TWICE
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import PHASE_CURRENT, Column, Columns
 from workbench.steps.first_card.motion_guess import is_current
@@ -47,6 +48,7 @@ def no_body(columns: Columns) -> BadLog:
             " no force and no command of the motor is logged; log its current, torque or force too:"
             " reference and position alone identify no friction"
         )
+    unsigned = f"; {told}" if (told := without_sign(columns.signals)) else ""
     there = ", ".join(one.shown for one in columns.signals) or "none"
     left_out = "; ".join(
         f"left out: column {one.shown}: {why}"
@@ -54,10 +56,22 @@ def no_body(columns: Columns) -> BadLog:
     )  # fmt: skip
     return BadLog(
         f"{columns.log.path}: no column moves as a body that another one drives (tried: {there}"
-        f"{'; ' if left_out else ''}{left_out}); a position is needed that goes both ways, and"
+        f"{'; ' if left_out else ''}{left_out}){unsigned}; a position is"
+        " needed that goes both ways, and"
         " beside it a force, two pressures or a motor's command; or write the card by hand"
         " (manual: The card, key by key)"
     )
+
+
+def without_sign(signals: Sequence[Column]) -> str:
+    """What is said of a command without a sign beside a column that goes back and forth."""
+    for one, y in permutations(signals, 2):
+        if said(one, "u") >= SAID_SO and np.min(one.x) >= 0.0 and y.way_gone > TWICE:
+            return (
+                f"{one.shown} is never negative, though {y.shown} goes both ways: where the motor"
+                " pushes both ways its direction is missing, so log the command with its sign"
+            )
+    return ""
 
 
 def _followed(signals: Sequence[Column]) -> tuple[Column, Column] | None:

@@ -11,11 +11,13 @@ from identification.signals.relations import lead
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.pairs import follows
-from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles
+from workbench.steps.first_card.refusals import without_sign
+from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, are_constant
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
 
 CONTROLLERS = {"controller", "pid", "pi", "pd", "regler", "regulator"}  # in a header
+DRIVING = ("F", "u", "p_p", "p_n")
 BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
 
 
@@ -41,11 +43,14 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
                 f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
                 f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
             )
-    if roles.law.share < MOSTLY_ITS_LAW:
+    drives = {name: roles.columns[name] for name in DRIVING if name in roles.columns}
+    if roles.law.share < MOSTLY_ITS_LAW and not are_constant(drives):
         yield (
             f"inertia and friction explain only {roles.law.share:.0%} of what drives: a weight or a"
             " spring is in it, or it is not what drives this position"
         )
+    if "u" in roles.columns and (unsigned := without_sign([roles.columns[k] for k in "uy"])):
+        yield unsigned
     if "u" in roles.columns and set(words_of(roles.columns["u"].raw.header)) & CONTROLLERS:
         yield (
             f"by its header {roles.columns['u'].shown} is a controller's output: where the drive"

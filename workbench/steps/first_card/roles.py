@@ -81,6 +81,9 @@ class Roles:
     other: "Roles | None" = None
 
 
+CONSTANT_WHY = "constant in the longest run, as a step, and different in others"
+
+
 @dataclass(frozen=True, eq=False)
 class _Choice:
     way: Way
@@ -247,6 +250,7 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
     out = {}
     law = best.way.law
     moves = law.share > HARDLY_ITS_LAW or abs(law.work) > WORK_GIVES_SIGN
+    moves = moves and not are_constant(best.way.columns)
     for role, column in best.columns.items():
         rivals = [one.score for one in choices if one.columns.get(role) is not column]
         ahead = best.score - max(rivals, default=-np.inf)
@@ -277,12 +281,18 @@ def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
     return out
 
 
+def are_constant(columns: Mapping[str, Column]) -> bool:
+    """Whether what drives is constant in the longest run, as in one of several steps."""
+    return all(np.ptp(one.x) == 0.0 for one in columns.values())
+
+
 def _reasons(best: _Choice) -> dict[str, str]:
     """In words why each column has its role."""
     law = best.way.law
     of = f"{law.share:.0%} of it is inertia and friction"
     work = f", and friction takes {abs(law.work):.0%} of its work" if abs(law.work) > 0.1 else ""
-    out = {name: f"{of} along the position{work}" for name in best.way.columns}
+    said = CONSTANT_WHY if are_constant(best.way.columns) else f"{of} along the position{work}"
+    out = dict.fromkeys(best.way.columns, said)
     two = best.way.kind == "electro-pneumatic"
     if two:
         out = dict.fromkeys(out, f"of the difference of the two {of}")

@@ -8,6 +8,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.estimation.gauss_newton import WIDE_STEP, Minimum, gauss_newton
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.windowed_run.parameters import (
     even,
     names_of,
@@ -17,11 +18,14 @@ from identification.estimation.windowed_run.parameters import (
 )
 from identification.estimation.windowed_run.refinement import HaltedRefit, descended, refit
 from identification.estimation.windowed_run.run_errors import mean_loss, misfit
+from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halt
+from identification.simulation.free_run import free_run
 from tests.identification.motor_logs import NINE, made, plant, seen
 
+SLIPPERY = Karnopp(0.045, 1.0, 1.0, 0.015, 0.015, 0.02, -0.02, 1.1, -1.1)
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
 
 
@@ -186,3 +190,23 @@ def test_a_search_that_only_leads_on_ends_early() -> None:
     first = np.array([-1.2, 1.0])
     whole, early = gauss_newton(valley, first, 60), gauss_newton(valley, first, 60, little=0.5)
     assert whole.mean < 1e-3 * early.mean < 1e-3 * float(np.mean(valley(first) ** 2))
+
+
+def swung(seed: int) -> Log:
+    """A body of little viscous friction, swung by the sines of a measured force, noise 0.3 N."""
+    rng, fine = np.random.default_rng(seed), 1e-3 * np.arange(3300, dtype=np.float64)
+    waves = zip((3.0, 3.0, 2.0), (0.9, 1.7, 2.9), rng.uniform(0.0, 6.28, 3), strict=True)
+    F = sum((a * np.sin(2 * np.pi * f * fine + p) for a, f, p in waves), np.zeros(len(fine)))
+    blank = Log("swung", {"t": fine, "y": np.zeros(len(fine)), "F": F})
+    y = free_run(Plant(SLIPPERY), blank, (0.0, 0.0, F[0]), "force").y[::10]
+    y = y + 1e-3 * rng.standard_normal(len(y))
+    F = F[::10] + 0.3 * rng.standard_normal(len(y))
+    return Log("swung", {"t": fine[::10], "y": y, "F": F})
+
+
+def test_beside_a_viscous_term_at_its_bound_the_coulomb_force_is_no_better_known() -> None:
+    one = motion_log(swung(26), held=False, by_command=False)
+    found = refit(Plant(SLIPPERY), [one], "force", prior={}, effort="near")
+    assert found.plant.friction.F_vp < 2e-9 < 1e-3 < found.plant.friction.F_vn
+    assert found.sd["F_cp"] > 0.7 * found.sd["F_cn"]
+    assert abs(found.plant.friction.F_cp - SLIPPERY.F_cp) < 2.0 * found.sd["F_cp"]
