@@ -100,6 +100,11 @@ def reported_estimate(
     return Estimate(value, unit, sd, max(low, bounds[0]), min(high, bounds[1]))
 
 
+def counted(many: int, what: str) -> str:
+    """So many of something, in words."""
+    return f"{many} {what}{'' if many == 1 else 's'}"
+
+
 def widened(one: Estimate, times: float) -> Estimate:
     """The same estimate with an interval so many times as wide, of its sign; ours."""
     if one.value is None or one.sd is None or one.low is None or one.high is None:
@@ -174,12 +179,12 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
     way = ("positive", "negative")[side]
     if name.startswith("F_s") and events.breakaways[side] < EVENTS_NEEDED:
         return (
-            f"{log}: {events.breakaways[side]} breakaways in the {way} direction, at least"
-            f" {EVENTS_NEEDED} needed; add slow reversals or longer rests"
+            f"{log}: {counted(events.breakaways[side], 'breakaway')} in the {way} direction, at"
+            f" least {EVENTS_NEEDED} needed; add slow reversals or longer rests"
         )
     if name.startswith("dv") and events.crossings[side] < EVENTS_NEEDED:
         return (
-            f"{log}: {events.crossings[side]} crossings of the band's limit in the {way}"
+            f"{log}: {counted(events.crossings[side], 'crossing')} of the band's limit in the {way}"
             f" direction, at least {EVENTS_NEEDED} needed; add starts and stops"
         )
     if events.sliding[side] < SLIDING_SAMPLES:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from identification.estimation.estimates import counted
 from workbench.cards.readable import in_digits, number, shown_unit, units_of
 from workbench.output import Row
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
@@ -72,7 +73,8 @@ def _sections(test: AxisTest) -> list[Section]:
     log = test.source.log
     facts = [
         f"log {test.source.file}, {number(log.duration, 4)} s at {number(1.0 / log.h, 4)} Hz",
-        f"{test.breakaways[0]} breakaways in positive, {test.breakaways[1]} in negative direction",
+        f"{counted(test.breakaways[0], 'breakaway')} in positive, {test.breakaways[1]} in negative"
+        " direction",
         "limits of the card alone; no registry was given",
     ]
     if test.earlier is not None:

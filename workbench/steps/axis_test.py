@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
-from identification.estimation.estimates import reported_estimate
+from identification.estimation.estimates import counted, reported_estimate
 from identification.estimation.imposed_motion import WHY_NOT
 from identification.estimation.surroundings import surroundings
 from identification.model.estimates import NORMAL_95, Estimate
@@ -218,7 +218,7 @@ def _why_not(name: str, found: AxisEquation) -> str:
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]
-    return f"{many} breakaway{'' if many == 1 else 's'}, too few; add starts from rest"
+    return f"{counted(many, 'breakaway')}, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:
