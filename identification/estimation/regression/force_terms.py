@@ -21,7 +21,7 @@ from identification.estimation.regression.weighted_rows import (
     stacked,
 )
 from identification.model.estimates import NORMAL_95
-from identification.thresholds import WORSE
+from identification.thresholds import HALF, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS = (1, 2)
@@ -74,8 +74,9 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     for fuller in (one for one in every if set(one.used) > set(best.used)):
         at = [fuller.used.index(column) for column in best.used]
         theta, square = fuller.theta[at], np.diag(fuller.covariance)[at]
+        separate = NORMAL_95 * np.sqrt(square) <= HALF * np.abs(theta)
         wider = (theta - best.theta) ** 2 + np.maximum(square - np.diag(best.covariance), 0.0)
-        beside = np.maximum(beside, wider)
+        beside = np.where(separate, np.maximum(beside, wider), beside)
     covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
     return replace(best, covariance=covariance, share=every[-1].share)
 
