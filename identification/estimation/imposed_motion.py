@@ -28,7 +28,7 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted, ways_of
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import settled_rows, slowest_sliding
+from identification.estimation.regression.motion_rows import settled_rows, usual_fastest
 from identification.estimation.regression.weighted_rows import (
     Rows,
     stacked,
@@ -44,6 +44,7 @@ from identification.thresholds import HALF
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_COMPARED = 48  # windows of sliding, by which a fit is compared with the equation
+WIDEST_ASSUMED = 0.06  # of fast sliding, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
@@ -204,14 +205,14 @@ def _slightest_mass(rows: Rows) -> float:
 
 
 def _assumed(center: Array, recorded: RecordedLogs, rows: Rows) -> Array:
-    """All nine for simulation: the five of sliding of their signs, a band no wider than sliding is
-    slow, stick just above slip."""
+    """All nine for simulation: the five of sliding of their signs, a band far below fast sliding,
+    stick just above slip."""
     first = first_plant(recorded).friction
     m = center[0] if center[0] > 0 else _slightest_mass(rows)
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
-    edge = np.minimum([first.dv_p, -first.dv_n], slowest_sliding(rows.speed))
+    edge = np.minimum([first.dv_p, -first.dv_n], WIDEST_ASSUMED * usual_fastest(rows.speed))
     stick = coulomb + viscous * edge
     return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 

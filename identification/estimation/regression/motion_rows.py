@@ -110,7 +110,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
     v = np.correlate(padded, fine, "valid")[:n]
     sure = SURE_OF_DIRECTION * one.noise.y * float(np.sqrt(noise_gain(first)))
-    sure = max(sure, slowest_sliding(np.abs(v)))
+    sure = max(sure, SLOWEST_SLIDING * usual_fastest(np.abs(v)))
     over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
     w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
     over, up, down = w.first @ y, v > 0.0, v < 0.0
@@ -127,9 +127,9 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), names), w, v)
 
 
-def slowest_sliding(speed: Array) -> float:
-    """The speed below which a body of these speeds (n,) may as well be at rest. Ours."""
-    return SLOWEST_SLIDING * float(np.quantile(speed, FAST_SPEEDS))
+def usual_fastest(speed: Array) -> float:
+    """The fast one of speeds (n,), of which the largest may be noise. Ours."""
+    return float(np.quantile(speed, FAST_SPEEDS))
 
 
 @dataclass(frozen=True, eq=False)
