@@ -28,8 +28,10 @@ from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.settling import is_adequate, settled
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
 from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
@@ -132,13 +134,17 @@ def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     not show: stick limits and bands.
 
     Of a noisy command the equation has white errors, the run their integral over a window: weighed
-    sample by sample it is the less exact and biased. Source: equation error against output error,
-    Ljung, System Identification (1999), 7.3.
+    sample by sample it is the less exact and biased. Where its values do not follow the log that
+    the run's follow, their errors are not of that noise, and the run's stand. Source: equation
+    error against output error, Ljung, System Identification (1999), 7.3.
     """
     other = _by_equation(recorded, LESS_ERROR_WHY)
     if other is None or _identified(other) < _identified(fit):
         return fit
     five = {name: getattr(other.friction, name) for name in FIVE}
+    mixed = Plant(replace(fit.friction, **five), fit.actuator)
+    if not is_adequate(misfit(mixed, recorded.logs, recorded.drive)):
+        return fit
     told = {name: other.estimates[name] for name in FIVE}
     for level, slope in WAYS_OF_SLIDING:  # known only without its partner
         one = fit.estimates[level]
@@ -148,7 +154,7 @@ def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     at = [fit.free.index(name) for name in stops]
     return replace(
         fit,
-        friction=replace(fit.friction, **five),
+        friction=mixed.friction,
         estimates={**fit.estimates, **told},
         free=(*other.free, *stops),
         covariance=block_diag(other.covariance, fit.covariance[np.ix_(at, at)]),

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.drives_rig import make
 from identification.errors import NotIdentifiable
 from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
@@ -117,3 +118,12 @@ def test_a_coulomb_force_of_an_equation_without_its_viscous_term_is_none_of_a_ru
     shown = run_or_equation._with_stops(replace(fit, estimates=hidden), recorded_logs(logs, rig))
     assert shown.estimates["F_cp"].value is None and shown.estimates["F_cp"].reason == "too wide"
     assert shown.estimates["F_cn"].value == fit.estimates["F_cn"].value
+
+
+@pytest.mark.slow
+def test_values_of_the_equation_that_do_not_follow_the_log_are_not_taken() -> None:
+    """Of a coarse command the equation errs by 6 % of F_vn, and with that no run follows."""
+    machine = make("motor", ("none",), 1404, 0.2)
+    found = fit_plant([machine.train], np.random.default_rng(0), rig=machine.machine.rig)
+    assert found.friction.F_vn == pytest.approx(machine.machine.nine.F_vn, rel=5e-3)
+    assert found.friction.m == pytest.approx(machine.machine.nine.m, rel=2e-3)
