@@ -12,6 +12,7 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.effects._base import AT_REST, Acting, Param
+from identification.estimation.windowed_run.parameters import AT_ZERO
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
@@ -21,7 +22,6 @@ from identification.thresholds import AS_GOOD_AS_NONE, EVENTS_NEEDED
 
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
-AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "fixed at its default: the logs do not support another value"
 NO_CHANGE_WHY = "no interval: nothing that these logs show changes with it"

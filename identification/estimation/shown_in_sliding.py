@@ -28,14 +28,7 @@ from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.signals.steps import MEDIAN_OF_NOISE
-from identification.thresholds import (
-    FOURFOLD,
-    HALF,
-    MATERIAL,
-    NEARLY_ALL,
-    OF_ACCOUNT,
-    TWICE,
-)
+from identification.thresholds import FOURFOLD, HALF, MATERIAL, NEARLY_ALL, OF_ACCOUNT, TWICE
 
 COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
 TURNING_WHY = (

@@ -10,7 +10,7 @@ from design.loop_frequencies import open_loop_response
 from design.margins import sensitivities
 from design.rst import RST, closed_loop
 from identification.arrays import Array
-from identification.estimation.estimates import AT_ZERO
+from identification.estimation.windowed_run.parameters import AT_ZERO
 from identification.simulation.free_run import FreeRun
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design

@@ -11,6 +11,7 @@ from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.karnopp_step import kernel_parameters
 
+AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 NARROW = 0.3  # of its value, that the mass keeps at least in a search
 SHAPE_REACH, PERIOD_REACH = 2.0, 1.2  # how far a search moves what an effect is not linear in
 

@@ -19,9 +19,10 @@ from identification.estimation.gauss_newton import (
     Minimum,
     gauss_newton,
 )
-from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.parameters import (
+    AT_ZERO,
     even,
     names_of,
     on_bristle,
@@ -60,9 +61,7 @@ REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 FARTHEST = 300.0  # the same, at most, while much is far off
 FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
-OF_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
-AT_BOUND = 2e-9  # of such a term, that is none
-OFF_BOUND = 1e-3  # of the most that it could be, at which what a run shows of it is taken
+OFF_BOUND = 1e-3  # of the most that a term of sliding could be, where its effect on a run is taken
 TRUST = 3.0  # times its standard deviation that the regression is trusted as a prior
 
 
@@ -165,7 +164,7 @@ class _Unknowns:
         least = values_of(self.plant_at(found.x), self.names)[self.at]
         size, x = self.unit[self.at].copy(), found.x.copy()
         for i, k in enumerate(self.at):
-            if self.names[k] in OF_SLIDING and least[i] <= AT_BOUND:
+            if self.names[k] in FIVE[1:] and least[i] <= AT_ZERO:
                 size[i] = self.largest(self.names[k])
                 x[i] = OFF_BOUND
         ratio = size / self.unit[self.at]
