@@ -2,9 +2,9 @@
 
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
-command acts as late as it does, and nowhere else. So a lag of a motor in a loop is believed where a
-run follows with it, and searched there where the log is slow; so is that of a measured force. A
-lag too short for a run to notice is believed where it explains most of what the equation leaves.
+command acts as late as it does, and nowhere else. So a lag is believed where a run follows with it,
+and a motor's searched there where the log is slow. One too short for a run to notice is believed
+where it explains most of what the equation leaves.
 """
 
 from collections.abc import Callable, Sequence
@@ -78,8 +78,7 @@ def what_acts_beside(
             return True
         return follows(samples)
 
-    in_loop = not motor or any("r" in log for log in logs)
-    if found.lag.value and in_loop and not believed(found.lag.value / h):
+    if found.lag.value and not believed(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
     if found.lag.value or not motor or h < SLOW_LOG:
         return found

@@ -9,11 +9,12 @@ Along the measured motion f is known, so y, v, d are a linear Gaussian chain of 
 Where the body rests, or its direction is not significant, friction takes whatever is applied: no
 force is seen there, and the band is as wide as d may be. Where a rig prescribes the motion the
 force is measured instead, and d is what it leaves of the equation. sigma and tau are those of
-largest likelihood, and so is the white noise of what is measured, where it is more than the log
-shows of it by itself: a clock that jitters, or a drive that filters what it reports, makes errors
-from sample to sample that are no force. Sources: latent force models, Alvarez, Luengo, Lawrence,
-IEEE TPAMI 35 (2013) 2693; Sarkka, Solin, Applied Stochastic Differential Equations (2019), ch. 10,
-12; of bodies with friction, Marino, Cicirello, arXiv 2303.03858.
+largest likelihood, and so is the white noise of what is measured and of the force over a sample,
+where it is more than the log shows of it by itself: a clock that jitters, or a drive that filters
+what it reports, makes errors from sample to sample that are no force, and a loop that is faster
+than the log a force between the samples that none of them has. Sources: latent force models,
+Alvarez, Luengo, Lawrence, IEEE TPAMI 35 (2013) 2693; Sarkka, Solin, Applied Stochastic Differential
+Equations (2019), ch. 10, 12; of bodies with friction, Marino, Cicirello, arXiv 2303.03858.
 """
 
 from collections.abc import Sequence
@@ -40,10 +41,18 @@ LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # of the largest force, that sigma may be
 LEAST_NOISE_F = 1e-6  # of the largest force, to which any force is uncertain
 SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
 CLOSE_ENOUGH = 0.02  # of log sigma
-WHITE_NOISES = (1.5, 3.0, 6.0, 15.0, 40.0, 120.0)  # times the noise, that R may be
+WHITE_NOISES = (1.5, 3.0, 6.0, 15.0, 40.0, 120.0)  # times the noise, that either may be
 WHITE_GAINS = 5.0  # nats, by which more noise has to be the likelier
 NATS_95 = 1.353  # nats below the largest likelihood: one-sided 95 % of chi-square over two
 FORCE, VELOCITY = 2, 1  # states beside the position
+
+
+class Rougher(NamedTuple):
+    """Times the noise that the logs show: the standard deviation of what is measured, and of the
+    force over a sample."""
+
+    measured: float = 1.0
+    force: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +75,13 @@ class LatentForce:
 class LatentForces:
     """The latent forces of several logs under one sigma [N] and one memory tau [s].
 
-    most [N]: the largest sigma that these logs do not rule out (95 %); rougher: times the noise
-    that the logs show, the standard deviation of what is measured.
+    most [N]: the largest sigma that these logs do not rule out (95 %); rougher: the white noise.
     """
 
     sigma: float
     tau: float
     most: float
-    rougher: float
+    rougher: Rougher
     logs: tuple[LatentForce, ...]
 
     @property
@@ -120,7 +128,7 @@ class _Least(NamedTuple):
     cost: float
     sigma: float
     tau: float
-    rougher: float
+    rougher: Rougher
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,31 +148,33 @@ class _Known:
     free: BoolArray
     known: Chain
 
-    def chain(self, sigma: float, tau: float) -> Chain:
-        """The chain under a latent force of rms sigma [N] and memory tau [s]."""
+    def chain(self, sigma: float, tau: float, noise_F: float) -> Chain:
+        """The chain under a latent force of rms sigma [N] and memory tau [s], and so many times the
+        force's noise."""
         kept, at, of = float(np.exp(-self.one.log.h / tau)), self.at, self.known
         A, Q, A_free, Q_free, P0 = (x.copy() for x in (of.A, of.Q, of.A_free, of.Q_free, of.P0))
         A[at, at] = A_free[at, at] = kept
+        Q *= noise_F**2
         Q[at, at] = Q_free[at, at] = sigma**2 * (1.0 - kept**2)
         P0[at] = sigma**2
         return Chain(A, Q, A_free, Q_free, of.c, of.x0, P0)
 
-    def log_density(self, sigma: float, tau: float, rougher: float = 1.0) -> Array:
+    def log_density(self, sigma: float, tau: float, rougher: Rougher) -> Array:
         """Of each sample measured while the body slides, given those before it, (n,)."""
-        R = self.R * rougher**2
-        found = log_densities(self.z, R, self.seen, self.free, self.chain(sigma, tau))
+        chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
+        found = log_densities(self.z, R, self.seen, self.free, chain)
         return np.where(self.slides, found, 0.0)
 
-    def latent(self, sigma: float, tau: float, rougher: float) -> LatentForce:
+    def latent(self, sigma: float, tau: float, rougher: Rougher) -> LatentForce:
         """d of this log."""
-        chain, R = self.chain(sigma, tau), self.R * rougher**2
+        chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
         force, sd = smoothed(self.z, R, self.seen, self.free, chain, self.at)
         t, y = (np.asarray(self.one.log[name]) for name in ("t", "y"))
         return LatentForce(t, y, force, sd, self.slides, self.log_density(sigma, tau, rougher))
 
 
 def latent_forces(
-    plant: Plant, logs: Sequence[MotionLog], slowest: float, rougher: float | None = None
+    plant: Plant, logs: Sequence[MotionLog], slowest: float, rougher: Rougher | None = None
 ) -> LatentForces:
     """What a plant lacks on each of the logs, sigma and tau those of largest likelihood on them.
 
@@ -178,10 +188,10 @@ def latent_forces(
     memories = [tau for tau in MEMORIES if tau > shortest] or [shortest]
     bounds = float(np.log(LEAST_SIGMA * scale)), float(np.log(MOST_SIGMA * scale))
 
-    def cost(sigma: float, tau: float, rougher: float) -> float:
+    def cost(sigma: float, tau: float, rougher: Rougher) -> float:
         return -float(sum(np.sum(one.log_density(sigma, tau, rougher)) for one in known))
 
-    def least(tau: float, rougher: float) -> _Least:
+    def least(tau: float, rougher: Rougher) -> _Least:
         """The sigma of largest likelihood at these."""
         found: Any = minimize_scalar(
             lambda x: cost(float(np.exp(x)), tau, rougher), bounds=bounds, method="bounded",
@@ -190,9 +200,10 @@ def latent_forces(
         return _Least(float(found.fun), float(np.exp(found.x)), tau, rougher)
 
     with ThreadPoolExecutor(2) as pool:
-        best = min(pool.map(lambda tau: least(tau, rougher or 1.0), memories))
+        best = min(pool.map(lambda tau: least(tau, rougher or Rougher()), memories))
         if rougher is None:
-            other = min(pool.map(lambda more: least(best.tau, more), WHITE_NOISES))
+            noises = [more for x in WHITE_NOISES for more in (Rougher(x), Rougher(force=x))]
+            other = min(pool.map(lambda more: least(best.tau, more), noises))
             if other.cost < best.cost - WHITE_GAINS:
                 best = min(pool.map(lambda tau: least(tau, other.rougher), memories))
 

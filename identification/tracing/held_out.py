@@ -16,6 +16,7 @@ from identification.tracing.model_errors import (
     follows,
     lacks,
     on_test,
+    rest_share_left,
     row_noise,
     share_left,
 )
@@ -23,7 +24,7 @@ from identification.tracing.parameter_drift import parameter_drift, with_changes
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.probability import Evidence, evidence
-from identification.tracing.regression.stepwise import Choice
+from identification.tracing.regression.stepwise import Choice, Step
 from identification.tracing.residuals import missing_force
 from identification.tracing.result import Change, Errors, MissingForce
 from identification.tracing.verdict import explains_most
@@ -102,11 +103,28 @@ class HeldOut:
 
     @cached_property
     def share(self) -> float:
-        """Share of what was missing on the test logs, that is left."""
+        """Share of what was missing on the test logs, that is left: of an error, or of the force or
+        the motion at rest, if that is less, since a run may lose its way at a stop by chance."""
         plain = self.plain.model
         runs = plain is not self.model and not plain.imposed and not self.model.imposed
         by_run = runs and plain.misfit > ADEQUATE
-        return share_left(self.was, self.now, self.noise, self.coulomb, by_run)
+        of_error = share_left(self.was, self.now, self.noise, self.coulomb, by_run)
+        lacked = self.missing
+        if plain is self.model or lacked is None:
+            return of_error
+        lacked_force = (lacked.before.share(self.coulomb) or 0.0) > MATERIAL
+        if lacked_force and not lacked.before.is_a_bound:
+            of_error = min(of_error, (lacked.share_left or 0.0) ** 2)
+        return min(of_error, self._of_rest)
+
+    @cached_property
+    def _of_rest(self) -> float:
+        """Share that effects of stops and reversals leave of the motion at rest, 1 of others."""
+        steps = self.choice.steps
+        if not any(_acts_at_rest(step) for step in steps):
+            return 1.0
+        left = rest_share_left(self.model.stage, steps, self.unseen)
+        return 1.0 if left is None else left
 
     @cached_property
     def changed(self) -> tuple[Change, ...]:
@@ -203,7 +221,7 @@ class HeldOut:
     def evidence(self) -> Evidence:
         """Of the effects found, by the share of the missing force that they leave: none where the
         run leaves nothing but noise; of those that act in stops alone, of which the force while
-        sliding says nothing, by the run's error if that is less. Of a machine that changed between
+        sliding says nothing, by the error if that is less. Of a machine that changed between
         the logs with what has changed in both models, since no effect is to explain that."""
         steps = self.choice.steps
         if follows(self.was, self.now):
@@ -213,6 +231,12 @@ class HeldOut:
         of_force = None if missing is None else missing.share_left
         if of_force is None:
             of_force = of_error
-        elif all(step.candidate.effect.place.in_stops for step in steps):
+        elif all(_acts_at_rest(step) for step in steps):
             of_force = min(of_force, of_error)
         return evidence(of_force, len(steps))
+
+
+def _acts_at_rest(step: Step) -> bool:
+    """Whether an effect acts in stops and reversals, more than while the body slides."""
+    place = step.candidate.effect.place
+    return place.in_stops or place.elastic

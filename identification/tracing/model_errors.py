@@ -7,7 +7,12 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    MECHANICAL,
+    REST,
+    MotionLog,
+)
 from identification.estimation.regression.row_fit import RowFit, rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.structure_fit import FittedStructure
@@ -93,6 +98,21 @@ def share_left(
         of_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
     known = (share for share in (by_equations[0], of_run, by_equations[1]) if share is not None)
     return next(known, 1.0 if by_run else 0.0)
+
+
+def rest_share_left(
+    stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]
+) -> float | None:
+    """Share of the motion seen at rest that effects leave, beyond the position's noise; None where
+    none is seen, as of a rigid contact. stage: that of the model with the effects."""
+    before, after = (
+        stacked(seen_by(replace(stage, chosen=chosen), steps, logs).parts[REST])
+        for chosen in ((), stage.chosen)
+    )
+    if not len(before.b):
+        return None
+    was, now = (float(np.mean((rows.b / rows.sd) ** 2)) for rows in (before, after))
+    return max(now - 1.0, 0.0) / (was - 1.0) if was > ASTRAY else None
 
 
 def follows(before: OnTest, after: OnTest) -> bool:

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from identification.estimation.latent_force import LatentForces, latent_forces
+from identification.estimation.latent_force import LatentForces, Rougher, latent_forces
 from identification.estimation.regression.motion_log import motion_log
 from identification.log import Log
 from identification.model.plant import Plant
@@ -110,9 +111,25 @@ def test_a_position_noisier_in_motion_is_no_missing_force() -> None:
     one = seen(log.with_signals(y=log["y"] + v * jitter))
     plain = replace(one, noise=replace(one.noise, y=1e-5, jitter=0.0))
     found = latent_forces(plant(), [plain], SLOWEST)
-    assert found.rougher > 1.0
+    assert found.rougher.measured > 1.0
     assert found.rms < 0.02 * LEVEL
-    assert latent_forces(plant(), [plain], SLOWEST, 1.0).rms > 2.0 * found.rms
+    assert latent_forces(plant(), [plain], SLOWEST, Rougher()).rms > 2.0 * found.rms
+
+
+def test_a_force_between_the_samples_is_none_that_a_model_lacks() -> None:
+    """What a loop faster than its log adds from period to period: white, and in no sample."""
+    rng, h, p = np.random.default_rng(7), 2e-3, NINE
+    t = h * np.arange(10000, dtype=np.float64)
+    v = 0.05 * (1.2 + np.sin(6.0 * t))
+    F = p.m * 0.3 * np.cos(6.0 * t) + p.F_cp + p.F_vp * v
+    kept = np.exp(-p.F_vp / p.m * h)
+    more = lfilter([h / p.m], [1.0, -kept], 1.5 * rng.standard_normal(len(t)))
+    y = h * np.cumsum(v + more) + 1e-6 * rng.standard_normal(len(t))
+    one = motion_log(Log("rig", {"t": t, "y": y, "F": F}), held=False, by_command=False)
+    one = replace(one, noise=replace(one.noise, F=0.5))
+    found = latent_forces(plant(), [one], SLOWEST)
+    assert found.rougher.force > 1.0
+    assert found.rms < 0.5 * latent_forces(plant(), [one], SLOWEST, Rougher()).rms
 
 
 def test_the_bound_of_a_force_that_does_not_show_is_one_that_would() -> None:

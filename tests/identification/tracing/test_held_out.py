@@ -121,3 +121,13 @@ def test_an_effect_is_not_named_with_which_a_plant_predicts_the_force_worse() ->
         other, plain=replace(held.plain, model=replace(held.plain.model, plant=strong))
     )
     assert "force of the test logs" not in immaterial.against
+
+
+def test_a_run_that_loses_its_way_does_not_outvote_the_force_that_an_effect_explains(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(held_out, "share_left", lambda *_: 0.9)
+    held = judged()
+    assert replace(held).share < 0.01
+    wrong = plant({"spring": {"k": 300.0}})
+    assert replace(held, model=replace(held.model, plant=wrong)).share == 0.9
