@@ -109,13 +109,10 @@ class HeldOut:
         runs = plain is not self.model and not plain.imposed and not self.model.imposed
         by_run = runs and plain.misfit > ADEQUATE
         of_error = share_left(self.was, self.now, self.noise, self.coulomb, by_run)
-        lacked = self.missing
-        if plain is self.model or lacked is None:
+        if plain is self.model:
             return of_error
-        lacked_force = (lacked.before.share(self.coulomb) or 0.0) > MATERIAL
-        if lacked_force and not lacked.before.is_a_bound:
-            of_error = min(of_error, (lacked.share_left or 0.0) ** 2)
-        return min(of_error, self._of_rest)
+        of_force = self._force_left(self.missing)
+        return min(of_error, self._of_rest, 1.0 if of_force is None else of_force**2)
 
     @cached_property
     def _of_rest(self) -> float:
@@ -221,19 +218,28 @@ class HeldOut:
     def evidence(self) -> Evidence:
         """Of the effects found, by the share of the missing force that they leave: none where the
         run leaves nothing but noise; of those that act in stops alone, of which the force while
-        sliding says nothing, by the error if that is less. Of a machine that changed between
-        the logs with what has changed in both models, since no effect is to explain that."""
+        sliding says nothing, by the error if that is less, and by it where hardly any force was
+        missing. Of a machine that changed between the logs with what has changed in both models,
+        since no effect is to explain that."""
         steps = self.choice.steps
         if follows(self.was, self.now):
             return evidence(0.0, len(steps))
         of_error = float(np.sqrt(self.share))
         missing = self._missing(self.changed) if self.changed and steps else self.missing
-        of_force = None if missing is None else missing.share_left
+        of_force = self._force_left(missing)
         if of_force is None:
             of_force = of_error
         elif all(_acts_at_rest(step) for step in steps):
             of_force = min(of_force, of_error)
         return evidence(of_force, len(steps))
+
+    def _force_left(self, missing: MissingForce | None) -> float | None:
+        """Share of the missing force that is left, None where it was not of account before, or the
+        logs only bound it."""
+        if missing is None or missing.before.is_a_bound:
+            return None
+        lacked = missing.before.share(self.coulomb) or 0.0
+        return missing.share_left if lacked > MATERIAL else None
 
 
 def _acts_at_rest(step: Step) -> bool:

@@ -89,8 +89,8 @@ def trace(
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
     by_command = rig.kind != "motor" and told.plant.actuator is not None
-    unexplained = told.verdict == "unknown" or not told.complete
-    if unexplained and by_command and not halt.reached():
+    nothing_found = not told.effects and not told.complete
+    if (told.verdict == "unknown" or nothing_found) and by_command and not halt.reached():
         told = _by_force(told, train, test, rig, library, rng, report, halt)
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)

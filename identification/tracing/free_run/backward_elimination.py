@@ -126,7 +126,7 @@ def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
     if whole:
         return min(enough(setting, choice.steps), HOPELESS)
     bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
-    return ADEQUATE if bristle or setting.drive == "force" else COMPLETE
+    return ADEQUATE if bristle else COMPLETE
 
 
 def equations_explained(base: Mapping[str, RowFit]) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
+from identification.estimation.latent_force import LatentForce, LatentForces, Rougher
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.structure_fit import FittedStructure, band
@@ -16,7 +17,7 @@ from identification.tracing import held_out
 from identification.tracing.held_out import HeldOut
 from identification.tracing.predictive_check import Worse
 from identification.tracing.regression.stepwise import choose
-from identification.tracing.result import Trace
+from identification.tracing.result import MissingForce, Residual, Trace
 from identification.tracing.trace import trace
 from identification.tracing.verdict import parameters_before
 from tests.identification.motor_logs import NINE, made, plant, seen
@@ -131,3 +132,29 @@ def test_a_run_that_loses_its_way_does_not_outvote_the_force_that_an_effect_expl
     assert replace(held).share < 0.01
     wrong = plant({"spring": {"k": 300.0}})
     assert replace(held, model=replace(held.model, plant=wrong)).share == 0.9
+
+
+def latent(force: float, sd: float) -> LatentForces:
+    """A latent force of this size and deviation [N] while a body slides."""
+    n = np.ones(8)
+    one = LatentForce(n, n, force * n, sd * n, n > 0.0, 0.0 * n)
+    return LatentForces(force, 1.0, force + sd, Rougher(), (one,))
+
+
+@pytest.mark.parametrize(
+    ("before", "expected"),
+    [
+        (latent(2.0, 0.1), 1.0 / 2.0),  # the share of the force, of which the model left half
+        (latent(0.01, 0.001), 0.2),  # nothing beside friction
+        (latent(1.0, 2.0), 0.2),  # only bounded
+    ],
+)
+def test_where_hardly_any_force_was_missing_the_error_says_how_probable_an_effect_is(
+    before: LatentForces, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(held_out, "follows", lambda *_: False)
+    held, n = replace(judged()), np.ones(8)
+    sliding = Residual("mechanical", n, n, n, n, n, {})
+    left = MissingForce(before, latent(0.5 * before.rms, 0.0), sliding)
+    vars(held).update(share=0.04, missing=left, changed=())
+    assert 10.0 ** held.evidence[1] == pytest.approx(expected, rel=0.01)
