@@ -103,25 +103,26 @@ class HeldOut:
 
     @cached_property
     def share(self) -> float:
-        """Share of what was missing on the test logs, that is left: of an error, or of the force or
-        the motion at rest, if that is less, since a run may lose its way at a stop by chance."""
+        """Share of what was missing on the test logs, that is left: of the force where it was of
+        account, since a run may lose its way at a stop by chance, else of an error; of effects of
+        stops and reversals of the motion at rest, if that is less."""
         plain = self.plain.model
+        of_force = None if plain is self.model else self._force_left(self.missing)
+        if of_force is not None:
+            return min(of_force**2, self._of_rest)
         runs = plain is not self.model and not plain.imposed and not self.model.imposed
         by_run = runs and plain.misfit > ADEQUATE
-        of_error = share_left(self.was, self.now, self.noise, self.coulomb, by_run)
-        if plain is self.model:
-            return of_error
-        of_force = self._force_left(self.missing)
-        return min(of_error, self._of_rest, 1.0 if of_force is None else of_force**2)
+        return min(share_left(self.was, self.now, self.noise, by_run), self._of_rest)
 
     @cached_property
     def _of_rest(self) -> float:
-        """Share that effects of stops and reversals leave of the motion at rest, 1 of others."""
+        """Share that effects of stops and reversals leave of the motion at rest, infinite of others
+        and where none is seen."""
         steps = self.choice.steps
         if not any(_acts_at_rest(step) for step in steps):
-            return 1.0
+            return np.inf
         left = rest_share_left(self.model.stage, steps, self.unseen)
-        return 1.0 if left is None else left
+        return np.inf if left is None else left
 
     @cached_property
     def changed(self) -> tuple[Change, ...]:

@@ -78,26 +78,31 @@ def on_test(
     return OnTest(errors, misfit(model.plant, logs, drive, weighed_by=weighed_by))
 
 
-def share_left(
-    before: OnTest, after: OnTest, noise: Errors, coulomb: float = 0.0, by_run: bool = False
-) -> float:
-    """Share of what was missing on the test logs that is left, of the first error that stood out.
+def share_left(before: OnTest, after: OnTest, noise: Errors, by_run: bool = False) -> float:
+    """Share of what was missing on the test logs that is left, of the actuator's equation or of the
+    run.
 
     Of squares, beyond what noise alone leaves; 0 where nothing stood out of that, but 1 where a run
     is what the effects were found by: one that drifts more hides what was missing. An equation that
     lacks much comes first: one stop that a run loses by chance is more than all the rest of it.
-    Then the run, by its misfit, which knows how far the noise of force and command drifts. Force
-    that is nothing beside the Coulomb level [N] does not count. Ours: `README.md`, (6).
+    Then the run, by its misfit, which knows how far the noise of force and command drifts. Ours:
+    `README.md`, (6).
     """
-    beside = MATERIAL * coulomb
-    by_equations = [
-        _equation_share(before, after, noise, least, beside) for least in (ASTRAY, ADEQUATE)
-    ]
+    by_equation = [_actuator_share(before, after, noise, least) for least in (ASTRAY, ADEQUATE)]
     of_run = None
     if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
         of_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
-    known = (share for share in (by_equations[0], of_run, by_equations[1]) if share is not None)
+    known = (share for share in (by_equation[0], of_run, by_equation[1]) if share is not None)
     return next(known, 1.0 if by_run else 0.0)
+
+
+def _actuator_share(before: OnTest, after: OnTest, noise: Errors, least: float) -> float | None:
+    """As `share_left`, of the actuator's equation where more than `least` times the noise's square
+    was missing; None without it."""
+    own, left, floor = (x.actuator_rms for x in (before.errors, after.errors, noise))
+    if own is None or left is None or not floor or own**2 <= least * floor**2:
+        return None
+    return float(max(left**2 - floor**2, 0.0) / (own**2 - floor**2))
 
 
 def rest_share_left(
@@ -120,20 +125,6 @@ def follows(before: OnTest, after: OnTest) -> bool:
     if before.misfit is None or after.misfit is None:
         return False
     return before.misfit > ADEQUATE and after.misfit <= COMPLETE
-
-
-def _equation_share(
-    before: OnTest, after: OnTest, noise: Errors, least: float, beside: float
-) -> float | None:
-    """As `share_left`, of the first equation of which more than `least` times the noise's square
-    was missing, and more force than `beside` [N]; None without one."""
-    for name, matters in (("force_rms", beside), ("actuator_rms", 0.0)):
-        own, left, floor = (getattr(x, name) for x in (before.errors, after.errors, noise))
-        if own is None or left is None or not floor:
-            continue
-        if own**2 > max(least * floor**2, floor**2 + matters**2):
-            return float(max(left**2 - floor**2, 0.0) / (own**2 - floor**2))
-    return None
 
 
 def predicted(left: OnTest, noise: Errors) -> bool:

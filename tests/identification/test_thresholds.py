@@ -182,6 +182,11 @@ def left_of(force: float) -> OnTest:
     return OnTest(Errors(force, None, None, None), None)
 
 
+def followed(misfit: float) -> OnTest:
+    """What a model's run leaves of the test logs."""
+    return OnTest(Errors(None, None, None, None), misfit)
+
+
 def test_complete() -> None:
     """A run that hardly leaves more than noise may do so with one effect alone; beside others it
     is not followed yet."""
@@ -196,9 +201,8 @@ def test_adequate() -> None:
     assert is_adequate(1.2) and not is_adequate(1.9)
     found = Minimum(lambda x: x, np.zeros(1), 1.2)
     assert found.followed and not replace(found, mean=1.9).followed
-    assert share_left(left_of(np.sqrt(1.2)), left_of(np.sqrt(1.1)), FLOOR) == 0.0
-    left = share_left(left_of(np.sqrt(1.9)), left_of(np.sqrt(1.45)), FLOOR)
-    assert left == pytest.approx(0.5)
+    assert share_left(followed(1.2), followed(1.1), FLOOR) == 0.0
+    assert share_left(followed(1.9), followed(1.45), FLOOR) == pytest.approx(0.5)
     # A prescribed motion lacks what its force says, a free one what its run says.
     prescribed = run(np.inf, imposed=True)
     assert not lacks(prescribed, left_of(1.09).errors, FLOOR)
