@@ -32,13 +32,14 @@ EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 class Events:
     """What happened in the fitted run, (positive, negative): rests that ended, crossings of the
     band's limit, samples of sliding, and the fastest sliding speed [m/s]; force: the applied one's
-    spread [N], 0 where it is not known."""
+    spread [N], 0 where it is not known; moved: samples in which the body itself surely moves."""
 
     breakaways: tuple[int, int]
     crossings: tuple[int, int]
     sliding: tuple[int, int]
     fastest: tuple[float, float]
     force: float = 0.0
+    moved: tuple[int, int] = (0, 0)
 
 
 def events_of(modes: Sequence[IntArray], speeds: Sequence[Array], force: float = 0.0) -> Events:
@@ -186,6 +187,12 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
         return (
             f"{log}: {counted(events.crossings[side], 'crossing')} of the band's limit in the {way}"
             f" direction, at least {EVENTS_NEEDED} needed; add starts and stops"
+        )
+    if events.sliding[side] < SLIDING_SAMPLES <= events.moved[side]:
+        return (
+            f"{log}: in the {way} direction the body moves in {events.moved[side]} samples, the"
+            f" fitted run slides in {events.sliding[side]}: it does not follow the log there; check"
+            " the card's signs and units"
         )
     if events.sliding[side] < SLIDING_SAMPLES:
         return (

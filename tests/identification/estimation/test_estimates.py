@@ -62,6 +62,14 @@ def test_missing_events_silence_their_parameters(events: Events, silent: set[str
         assert "needed" in reason
 
 
+def test_motion_that_only_the_fitted_run_lacks_is_not_said_to_be_missing_in_the_log() -> None:
+    events = Events((9, 9), (9, 9), (45, 999), (1, 1), moved=(87, 999))
+    found = estimates(VALUES, spread(0.01), events, Rig("force"), "run3.csv")["F_cp"]
+    assert found.value is None and "moves in 87 samples, the fitted run slides in 45" in str(
+        found.reason
+    )
+
+
 def test_a_wide_interval_silences_a_parameter() -> None:
     sd = spread(0.01) | {"dv_p": 0.58 * table(1).dv_p}
     found = estimates(VALUES, sd, PLENTY, Rig("force"), "log")
