@@ -147,6 +147,8 @@ def estimates(
                 value, units[name], sd[name], bounds=bounds, beside=_beside(name, values, events),
                 at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
             )  # fmt: skip
+        if found[name].value is None and (unmoved := _unmoved(name, events, log)):
+            found[name] = Estimate(None, units[name], reason=unmoved, assumed=value)
     return found
 
 
@@ -194,12 +196,25 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
             f" fitted run slides in {events.sliding[side]}: it does not follow the log there; check"
             " the card's signs and units"
         )
-    if events.sliding[side] < SLIDING_SAMPLES:
-        return (
-            f"{log}: {events.sliding[side]} samples of sliding in the {way} direction, at least"
-            f" {SLIDING_SAMPLES} needed; add motion that way"
-        )
-    return None
+    return _too_little(events.sliding[side], way, log)
+
+
+def _too_little(sliding: int, way: str, log: str) -> str | None:
+    """Reason why so many samples of sliding do not identify the friction of a direction, if so."""
+    if sliding >= SLIDING_SAMPLES:
+        return None
+    return (
+        f"{log}: {sliding} samples of sliding in the {way} direction, at least"
+        f" {SLIDING_SAMPLES} needed; add motion that way"
+    )
+
+
+def _unmoved(name: str, events: Events, log: str) -> str | None:
+    """Reason of a parameter without a value, of a direction in which the body never moved."""
+    side = 1 if name.endswith("n") else 0
+    if name == "m" or name not in NAMES or events.moved[side] or not any(events.moved):
+        return None
+    return _too_little(0, ("positive", "negative")[side], log)
 
 
 def _scale(name: str, events: Events) -> float:

@@ -70,6 +70,19 @@ def test_motion_that_only_the_fitted_run_lacks_is_not_said_to_be_missing_in_the_
     )
 
 
+def test_what_lies_at_its_bound_where_the_body_never_moved_is_said_to_lack_motion() -> None:
+    """A fitted run may slide to and fro where the log goes one way."""
+    sliding = ((9, 9), (9, 9), (999, 999), (1.0, 1.0))
+    for moved, said in (
+        ((0, 500), "0 samples of sliding in the positive"),
+        ((9, 500), "not significantly"),
+    ):
+        events = Events(*sliding, moved=moved)
+        found = estimates(VALUES | {"F_cp": 0.0}, spread(0.01) | {"F_cp": 0.3}, events,
+                          Rig("force"), "run3.csv")  # fmt: skip
+        assert found["F_cp"].value is None and said in str(found["F_cp"].reason)
+
+
 def test_a_wide_interval_silences_a_parameter() -> None:
     sd = spread(0.01) | {"dv_p": 0.58 * table(1).dv_p}
     found = estimates(VALUES, sd, PLENTY, Rig("force"), "log")
