@@ -175,9 +175,7 @@ def _of_log(
     jumped = _jumps(y / noisier, begun)
     for k in jumped.tolist():
         size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise.y
-        seen_size = [jump_size(log["y"], k, side) for side in LINE_SIDES]
-        apart = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise.y
-        if np.min(np.abs(seen_size - np.asarray(size))) > apart:
+        if not _shown(one, log["y"], k, size):
             continue
         seen = np.concatenate([seen[: k + 1], seen[k + 1 :] - size])
         t = float(log["t"][k + 1])
@@ -227,6 +225,19 @@ def _jumps(r: Array, begun: Starts) -> IntArray:
         steps[max(k - RUN_SIDES[0], 0) : k + RUN_SIDES[0]] = 0.0
     least = FAULT_FROM * _spread(r) * np.linalg.norm(line_weights(RUN_SIDES[-1])[0])
     return np.asarray(outstanding(steps, float(least)), dtype=np.int64)
+
+
+def _shown(one: MotionLog, y: Array, k: int, size: float) -> bool:
+    """Whether the position y (n,) itself jumps by about that size after sample k: by lines over so
+    few samples that these do not jump as much wherever the body moves, as where it turns back."""
+    apart = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise.y
+    for side in LINE_SIDES:
+        every = np.correlate(y, line_weights(side)[0], "valid")
+        moves = one.signals["d"][side - 1 : side - 1 + len(every)] != 0
+        usual = float(np.median(np.abs(every[moves]))) if np.any(moves) else 0.0
+        if abs(jump_size(y, k, side) - size) <= apart and abs(size) > BEYOND_CHANCE * usual:
+            return True
+    return False
 
 
 def _side(k: int, begun: Starts, n: int) -> int:

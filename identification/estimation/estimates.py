@@ -32,13 +32,14 @@ EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 class Events:
     """What happened in the fitted run, (positive, negative): rests that ended, crossings of the
     band's limit, samples of sliding, and the fastest sliding speed [m/s]; force: the applied one's
-    spread [N], 0 where it is not known."""
+    spread [N], 0 where it is not known; moved: samples in which the body itself surely moves."""
 
     breakaways: tuple[int, int]
     crossings: tuple[int, int]
     sliding: tuple[int, int]
     fastest: tuple[float, float]
     force: float = 0.0
+    moved: tuple[int, int] = (0, 0)
 
 
 def events_of(modes: Sequence[IntArray], speeds: Sequence[Array], force: float = 0.0) -> Events:
@@ -146,6 +147,8 @@ def estimates(
                 value, units[name], sd[name], bounds=bounds, beside=_beside(name, values, events),
                 at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
             )  # fmt: skip
+        if found[name].value is None and (unmoved := _unmoved(name, events, log)):
+            found[name] = Estimate(None, units[name], reason=unmoved, assumed=value)
     return found
 
 
@@ -187,12 +190,31 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
             f"{log}: {counted(events.crossings[side], 'crossing')} of the band's limit in the {way}"
             f" direction, at least {EVENTS_NEEDED} needed; add starts and stops"
         )
-    if events.sliding[side] < SLIDING_SAMPLES:
+    if events.sliding[side] < SLIDING_SAMPLES <= events.moved[side]:
         return (
-            f"{log}: {events.sliding[side]} samples of sliding in the {way} direction, at least"
-            f" {SLIDING_SAMPLES} needed; add motion that way"
+            f"{log}: in the {way} direction the body moves in {events.moved[side]} samples, the"
+            f" fitted run slides in {events.sliding[side]}: it does not follow the log there; check"
+            " the card's signs and units"
         )
-    return None
+    return _too_little(events.sliding[side], way, log)
+
+
+def _too_little(sliding: int, way: str, log: str) -> str | None:
+    """Reason why so many samples of sliding do not identify the friction of a direction, if so."""
+    if sliding >= SLIDING_SAMPLES:
+        return None
+    return (
+        f"{log}: {sliding} samples of sliding in the {way} direction, at least"
+        f" {SLIDING_SAMPLES} needed; add motion that way"
+    )
+
+
+def _unmoved(name: str, events: Events, log: str) -> str | None:
+    """Reason of a parameter without a value, of a direction in which the body never moved."""
+    side = 1 if name.endswith("n") else 0
+    if name == "m" or name not in NAMES or events.moved[side] or not any(events.moved):
+        return None
+    return _too_little(0, ("positive", "negative")[side], log)
 
 
 def _scale(name: str, events: Events) -> float:

@@ -60,6 +60,7 @@ from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
     AS_GOOD_AS_NONE,
     COMPLETE,
+    HALF,
     HOPELESS,
     MATERIAL,
     PLACES_EXCLUDED,
@@ -175,7 +176,7 @@ def _without_bad(
 
     Searched where the plant follows the logs but for a few places; again from the plant without
     what was found. A run that contradicts a log in more than a handful of places is a wrong model,
-    and nothing is excluded for it.
+    and so is one of which these are not most of what it left: nothing is excluded for it.
     """
     left, found = begun, plain_structure(begun.recorded, rng)
     first = found
@@ -194,7 +195,13 @@ def _without_bad(
         if again.misfit > max(found.misfit, COMPLETE):
             break
         left, found = made, again
-    return left, found
+    return (left, found) if _explained(first.misfit, found.misfit) else (begun, first)
+
+
+def _explained(before: float, after: float) -> bool:
+    """Whether the samples left out were most of what a run left beyond noise (misfits): of a model
+    that lacks an effect any sample put on the run makes that less, and the log is not at fault."""
+    return after <= COMPLETE or after - 1.0 <= HALF * (before - 1.0)
 
 
 def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStructure:

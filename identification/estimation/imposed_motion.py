@@ -16,6 +16,7 @@ from identification.estimation.estimates import (
     Events,
     estimates,
     reported_estimate,
+    silent_reason,
 )
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regressed_plant import first_plant, motor_of
@@ -247,10 +248,14 @@ def _of_sliding(
     values: Mapping[str, float], sd: Mapping[str, float], fastest: float, recorded: RecordedLogs
 ) -> Mapping[str, Estimate]:
     """Estimates of parameters that need no more than sliding, by the samples in which it shows."""
+    return estimates(values, sd, _sliding(fastest, recorded), recorded.rig, recorded.name)
+
+
+def _sliding(fastest: float, recorded: RecordedLogs) -> Events:
+    """The samples in which the body surely slides, by direction; fastest [m/s]."""
     d = np.concatenate([one.signals["d"] for one in recorded.logs])
     sliding = (int(np.count_nonzero(d > 0)), int(np.count_nonzero(d < 0)))
-    events = Events((0, 0), (0, 0), sliding, (fastest, fastest))
-    return estimates(values, sd, events, recorded.rig, recorded.name)
+    return Events((0, 0), (0, 0), sliding, (fastest, fastest))
 
 
 def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
@@ -283,6 +288,7 @@ def _reasoned(
             out[key] = one
             continue
         kind = key if key == "m" else "stick" if key.startswith(("dv", "F_s")) else key[:3]
-        reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
+        rests = silent_reason(key, _sliding(0.0, recorded), recorded.name) if key in FIVE else None
+        reason = rests or f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
     return out

@@ -7,6 +7,7 @@ much one window differs from the next.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -266,4 +267,6 @@ def _events(plant: Plant, recorded: RecordedLogs, seconds: float) -> Events:
             for one in recorded.logs]  # fmt: skip
     followed = [run for run in runs if run is not None]
     modes, speeds = [run.mode for run in followed], [run.v for run in followed]
-    return events_of(modes, speeds, force_of(recorded.plain))
+    way = np.concatenate([one.signals["d"] for one in recorded.logs])
+    moved = (int(np.count_nonzero(way > 0)), int(np.count_nonzero(way < 0)))
+    return replace(events_of(modes, speeds, force_of(recorded.plain)), moved=moved)

@@ -81,8 +81,10 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         share = float(np.mean(np.concatenate(filled)))
         said.append(f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated")
     elif not all(np.all(np.isin(run["t"], log["t"])) for run in runs):
-        said.append(f"{log.name}: uneven clock, resampled every {1e3 * log.h:.3g} ms")
-    if len(runs) > 1 or lost > LONGEST_GAP * log.h:
+        holes = 0 if np.isclose(runs[0].h, log.h) else len(gaps_in(log["t"], log.h))
+        clock = f"rows in bursts, {holes} holes between them" if holes else "uneven clock"
+        said.append(f"{log.name}: {clock}, resampled every {1e3 * runs[0].h:.3g} ms")
+    if len(runs) > 1 or lost > LONGEST_GAP * runs[0].h:
         hours = told_of_hours(gaps_in(log["t"], log.h), log.h)
         said.append(
             f"{log.name}: in {len(runs)} runs; {lost:.4g} s in gaps or short runs left out{hours}"

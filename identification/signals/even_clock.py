@@ -23,15 +23,37 @@ def even_clock(log: Log) -> tuple[Log, ...]:
 
     A run that is even to 1e-3 of its period is passed on as it is, bit for bit; one that is but for
     lost rows gets these between their neighbours, and any other is resampled at the log's median
-    period. Of such a one the command `u` and two-valued signals are held (the last value at the
-    middle of the new period); the rest follows a piecewise cubic that keeps monotone stretches
-    monotone, so that a step neither rings nor spreads over more than one sample. Runs under
-    `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
+    period; where gaps leave no run, as of a logger that writes bursts of rows, at its mean period,
+    by which such gaps may be none. Of such a one the command `u` and two-valued signals are held
+    (the last value at the middle of the new period); the rest follows a piecewise cubic that keeps
+    monotone stretches monotone, so that a step neither rings nor spreads over more than one sample.
+    Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
     """
-    t, h = log["t"], log.h
-    borders = _borders(t, h)
-    runs = []
-    for start, stop in pairwise(borders):
+    runs = _runs(log, log.h)
+    if not runs:  # rows in bursts, whose holes are none beside the mean period
+        runs = _runs(log, _mean_period(log["t"]))
+    if not runs:
+        raise BadLog(
+            f"{log.name}: {len(gaps_in(log['t'], log.h))} gaps leave no run of {SHORTEST_LOG}"
+            f" samples at {log.h:.4g} s; log without gaps"
+        )
+    return runs
+
+
+def _mean_period(t: Array) -> float:
+    """Mean of the steps of a clock t (n,) [s] that are no gaps beside that mean itself."""
+    step = np.diff(t)
+    h = float(step.mean())
+    while np.any(gaps := step > LONGEST_GAP * h):
+        step = step[~gaps]
+        h = float(step.mean())
+    return h
+
+
+def _runs(log: Log, h: float) -> tuple[Log, ...]:
+    """The log's runs between gaps, of a clock of period h [s]."""
+    t, runs = log["t"], []
+    for start, stop in pairwise(_borders(t, h)):
         if t[stop - 1] - t[start] < (SHORTEST_LOG - 2) * h:
             continue
         run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
@@ -40,11 +62,6 @@ def even_clock(log: Log) -> tuple[Log, ...]:
             run = _resample(run, h) if rows is None else _with_lost_rows(run, rows)
         if len(run) >= SHORTEST_LOG:
             runs.append(run)
-    if not runs:
-        raise BadLog(
-            f"{log.name}: {len(borders) - 2} gaps leave no run of {SHORTEST_LOG} samples at"
-            f" {h:.4g} s; log without gaps"
-        )
     return tuple(runs)
 
 

@@ -44,7 +44,9 @@ class ForceLaw(NamedTuple):
     motion that goes one way only; way: 1
     where friction takes energy up, -1 where the signal has the other sign; work: share of the
     exchanged work, 0 where the motion does not come back; balance: F_0, in the signal's unit;
-    coulomb: F_c, the same; m: in the signal's unit over the position's a sample squared.
+    coulomb: F_c, the same; m: in the signal's unit over the position's a sample squared; inertia:
+    share that the acceleration alone explains, beside place too (a weight's, a spring's force),
+    with the sign of the mass.
     """
 
     share: float
@@ -54,6 +56,7 @@ class ForceLaw(NamedTuple):
     balance: float
     coulomb: float
     m: float
+    inertia: float
 
 
 class Lead(NamedTuple):
@@ -121,16 +124,25 @@ def force_laws(motion: Motion, y: Array, f: Array, smooth: Array) -> list[ForceL
     b = smooth[sure]
     share, theta = _explained(X, b)
     without, _ = _explained(X[:, [0, 1, 3]], b)
+    inertia = _by_inertia(np.column_stack([X, y[sure]]), b)
     work = [work_share(y, one) or 0.0 for one in f.T]
     onwards = np.zeros(f.shape[1]) if both else float(np.sign(motion.v[sure].mean())) * b.mean(0)
     return [
-        _law(share[k], share[k] - without[k] if both else None, theta[:, k], work[k], onwards[k])
+        _law(share[k], share[k] - without[k] if both else None, theta[:, k], work[k], onwards[k],
+             inertia[k])
         for k in range(f.shape[1])
-    ]
+    ]  # fmt: skip
+
+
+def _by_inertia(X: Array, b: Array) -> Array:
+    """Share of the signals b (r, k) that the acceleration, the first of the columns (r, 6), alone
+    explains, with the sign of its factor, (k,)."""
+    share, theta = _explained(X, b)
+    return np.asarray(np.sign(theta[0]) * (share - _explained(X[:, 1:], b)[0]))
 
 
 def _law(
-    share: float, friction: float | None, theta: Array, work: float, onwards: float
+    share: float, friction: float | None, theta: Array, work: float, onwards: float, inertia: float
 ) -> ForceLaw:
     """onwards: the mean of a signal along a motion that goes one way only, else 0."""
     if abs(work) > GIVES_SIGN or onwards != 0.0:
@@ -139,7 +151,16 @@ def _law(
         way = float(np.sign(theta[2])) or float(np.sign(theta[1])) or 1.0
     balance, coulomb, m = float(theta[3]), float(theta[2]), float(theta[0])
     step = None if friction is None else float(friction)
-    return ForceLaw(float(share), step, way, work, balance, coulomb, m)
+    law = ForceLaw(float(share), step, way, work, balance, coulomb, m, float(inertia))
+    turns_back = step is not None and abs(work) <= GIVES_SIGN
+    return law._replace(way=float(np.sign(inertia))) if turns_back and by_inertia(law) else law
+
+
+def by_inertia(law: ForceLaw) -> bool:
+    """Whether the sign of a force is that with which its mass is positive: what the acceleration
+    alone explains is more than the step of friction does, and than all that the law leaves, as of
+    a pendulum that turns far, whose weight is no force linear in place."""
+    return abs(law.inertia) > max(law.friction or 0.0, 1.0 - law.share)
 
 
 def lead(first: Array, second: Array) -> Lead:

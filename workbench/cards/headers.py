@@ -111,16 +111,16 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     "time": "timestamp time zeit clock elapsed uhr 時間 時刻 时间 时刻 temps tempo tiempo",
     "position": "position posizione posicion posn pos displacement displ disp deplacement weg lage"
     " auslenkung hub stroke travel laser encoder lvdt schlitten spostamento abstand distance 位置"
-    " 変位 ストローク 位移 行程 转角 angle winkel theta phi 角度 回転角 joint gelenk",
+    " 変位 ストローク 位移 行程 转角 angle winkel angulo theta phi 角度 回転角 joint gelenk",
     "velocity": "velocity velocita velocidad vel speed geschw drehzahl vitesse 速度 回転数 转速"
     " omega",
     "acceleration": "acceler accel acc beschl 加速度",
     "force": "loadcell force kraft thrust fuerza forza effort torque moment couple coppia トルク 力"
     " 荷重 推力 扭矩 转矩 力矩 拉力",
     "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧 压力 气压",
-    "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
-    " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
-    " courant corrente 電流 电流 电压 控制量 motor",
+    "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung voltaje"
+    " tensao dac output ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
+    " courant corrente corriente 電流 电流 电压 控制量 motor",
     "temperature": "temperatur temper temp thermo 温度",
     "count": "index idx sample counter scan zaehler lfd row 番号 連番 序号 编号",
     "other": "status enable flag state mode alarm freigabe error err abweichung differenz"

@@ -1,12 +1,14 @@
 """Text in which tables stand one below the other: a block for each variable of a PLC's trace.
 
 Above each block a tool writes its variable: as "key;value", "key=value", in a row of names, or as a
-line by itself. What differs from block to block is the name.
+line by itself. What differs from block to block is the name. A CODESYS trace numbers its keys
+("1.Variable; speed") and begins its rows with the mark.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -22,10 +24,12 @@ PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
-_TEXT_LINE = re.compile(r"\n[ \t]*[\[\"]?[^\W\d_]")
+_TEXT_LINE = re.compile(r"\n[ \t]*[\[\"]?(?:\d+\.)?[^\W\d_]")
+_ROW = r"[;,|\s]*[+-]?[\d.]+[^\n]*\n"
+_NUMBERS_BEGIN = re.compile(f"^{_ROW}{_ROW}", re.M)
 _NO_TEXT = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
 _MARKS = (";", "\t", ",", " ", "|")
-_KEY = re.compile(r"^\s*([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
+_KEY = re.compile(r"^\s*(?:\d+\.(?=[^\W\d]))?([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
 _COUNTED = re.compile(r"\d+([.,]\d+)?")  # values that differ by chance: numbers of samples
 
 
@@ -40,7 +44,16 @@ class Block:
 
     @property
     def width(self) -> int:
-        return len(_fields(self.rows[0], self.mark))
+        return len(self.fields(self.rows[0]))
+
+    @cached_property
+    def begins(self) -> int:
+        """Fields without a value before the first of every row: 1 where all begin with the mark."""
+        return int(all(row.lstrip(" ").startswith(self.mark) for row in self.rows))
+
+    def fields(self, row: str) -> list[str]:
+        """The fields of one of its rows."""
+        return _fields(row, self.mark)[self.begins :]
 
 
 def blocks_of(text: str) -> list[Block]:
@@ -75,7 +88,7 @@ def _goes_on(blocks: Sequence[Block]) -> bool:
     of their own, by a clock that goes on."""
     if any(_heads(one) or one.width != blocks[0].width for one in blocks[1:]):
         return False
-    ends = [[_fields(row, one.mark)[0] for row in (one.rows[0], one.rows[-1])] for one in blocks]
+    ends = [[one.fields(row)[0] for row in (one.rows[0], one.rows[-1])] for one in blocks]
     if not all(cell for pair in ends for cell in pair):
         return False
     times = [[float(cell.replace(",", ".")) for cell in pair] for pair in ends]
@@ -116,7 +129,7 @@ def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
 
     def fetch(number: int) -> RawColumn:
         *_, one, column = columns[number]
-        cells = (_fields(row, one.mark)[column] for row in one.rows)
+        cells = (one.fields(row)[column] for row in one.rows)
         return np.array([float(cell.replace(decimal, ".")) if cell else np.nan for cell in cells])
 
     return Table(names, fetch, blocks[0].first + 1, True, groups, clocks)
@@ -130,7 +143,7 @@ def decimal_of(blocks: Sequence[Block]) -> str:
 
 def _may_have_blocks(text: str) -> bool:
     """Whether a line that is no row stands below rows of numbers; at little cost for long files."""
-    begin = re.search(r"^\s*[+-]?[\d.]+[^\n]*\n\s*[+-]?[\d.]+[^\n]*\n", text, re.M)
+    begin = _NUMBERS_BEGIN.search(text)
     if begin is None:
         return False
     lines = islice(_TEXT_LINE.finditer(text, begin.end() - 1), MOST_WORDS)

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks.bad_samples import fitted, motor, moved
-from identification.estimation.contradicted import DRIFTS_OVER, _Driven
+from identification.estimation.contradicted import DRIFTS_OVER, _Driven, _shown
+from identification.estimation.fit import _explained
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.windows import freed, starts
+from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.signals.steps import LINE_SIDES, jump_size
 from identification.thresholds import FAULT_FROM
 
 
@@ -51,3 +54,28 @@ def test_what_an_actuators_noisy_command_adds_up_to_is_no_bad_sample() -> None:
     expected = FAULT_FROM * noise * np.sqrt(DRIFTS_OVER / one.log.h)
     assert usual(Actuator(2000.0, 100.0)) == pytest.approx(expected)
     assert usual(Motor(30.0)) == 0.0
+
+
+def test_a_position_that_turns_within_a_few_samples_shows_no_jump() -> None:
+    """Strokes of 25 samples: lines through eight of them jump by a third of the stroke all over."""
+    t = np.arange(400, dtype=np.float64) * 0.01
+    y = 5e-3 * np.sin(2 * np.pi * 4.0 * t)
+    rig = Rig("motor", force_per_command=1.0)
+    still = Log("run", {"t": t, "y": y, "u": np.cos(25.0 * t), "F": np.cos(25.0 * t)})
+    one = recorded_logs([still], rig).logs[0]
+    sizes = {k: jump_size(y, k, LINE_SIDES[-1]) for k in range(100, 300)}
+    k = max(sizes, key=lambda at: abs(sizes[at]))
+    assert abs(sizes[k]) > 1e-3 and not _shown(one, y, k, sizes[k])
+    slipped = y + np.where(np.arange(len(y)) > k, 5e-3, 0.0)
+    assert _shown(one, slipped, k, 5e-3)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "most"),
+    [(20.9, 11.9, False), (20.9, 1.05, True), (9.0, 4.0, True), (0.117, 0.102, True)],
+)
+def test_samples_are_left_out_where_they_are_most_of_what_a_run_left(
+    before: float, after: float, most: bool
+) -> None:
+    """A model that lacks an effect gains by any samples that are put on its run."""
+    assert _explained(before, after) is most

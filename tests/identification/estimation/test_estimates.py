@@ -62,6 +62,27 @@ def test_missing_events_silence_their_parameters(events: Events, silent: set[str
         assert "needed" in reason
 
 
+def test_motion_that_only_the_fitted_run_lacks_is_not_said_to_be_missing_in_the_log() -> None:
+    events = Events((9, 9), (9, 9), (45, 999), (1, 1), moved=(87, 999))
+    found = estimates(VALUES, spread(0.01), events, Rig("force"), "run3.csv")["F_cp"]
+    assert found.value is None and "moves in 87 samples, the fitted run slides in 45" in str(
+        found.reason
+    )
+
+
+def test_what_lies_at_its_bound_where_the_body_never_moved_is_said_to_lack_motion() -> None:
+    """A fitted run may slide to and fro where the log goes one way."""
+    sliding = ((9, 9), (9, 9), (999, 999), (1.0, 1.0))
+    for moved, said in (
+        ((0, 500), "0 samples of sliding in the positive"),
+        ((9, 500), "not significantly"),
+    ):
+        events = Events(*sliding, moved=moved)
+        found = estimates(VALUES | {"F_cp": 0.0}, spread(0.01) | {"F_cp": 0.3}, events,
+                          Rig("force"), "run3.csv")  # fmt: skip
+        assert found["F_cp"].value is None and said in str(found["F_cp"].reason)
+
+
 def test_a_wide_interval_silences_a_parameter() -> None:
     sd = spread(0.01) | {"dv_p": 0.58 * table(1).dv_p}
     found = estimates(VALUES, sd, PLENTY, Rig("force"), "log")

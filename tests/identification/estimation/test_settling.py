@@ -6,10 +6,13 @@ from typing import Any
 import pytest
 
 from identification.estimation import settling
+from identification.estimation.recorded_logs import recorded_logs
+from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
-from identification.model.plant import Plant
+from identification.model.plant import Motor, Plant
 from identification.model.size import Size
+from tests.identification.motor_logs import K_A, made
 
 PLANT = Plant(Karnopp(1.0, 8.0, 8.0, 1.0, 1.0, 1e-3, -1e-3, 10.0, -10.0))
 NOISY: Any = SimpleNamespace(by_noisy_command=True, logs=(), name="log")
@@ -58,3 +61,11 @@ def test_without_a_rest_that_ends_there_is_none(monkeypatch: pytest.MonkeyPatch)
     run = {"F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2)}
     found = limits(monkeypatch, run, {})
     assert found["F_sp"].value is None and "starts from rest" in (found["F_sp"].reason or "")
+
+
+def test_the_motion_of_the_log_is_counted_beside_that_of_the_fitted_run() -> None:
+    """Of a plant that sticks where the body moves: the log needs no more motion."""
+    recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
+    stuck = Karnopp(1.0, 900.0, 900.0, 1.0, 1.0, 1e-3, -1e-3, 1000.0, -1000.0)
+    events = settling._events(Plant(stuck, Motor(K_A)), recorded, 0.5)
+    assert max(events.sliding) < 50 <= min(events.moved)

@@ -68,3 +68,24 @@ def test_blocks_are_as_long_as_they_are(tmp_path: Path) -> None:
     found = blocks_of("\n".join(lines))
     assert [len(one.rows) for one in found] == [400, 200]
     assert np.all([one.width == 2 for one in found])
+
+
+def test_a_codesys_trace_numbers_its_keys_and_begins_its_rows_with_the_mark(
+    tmp_path: Path,
+) -> None:
+    """Layout of the trace editor of CODESYS and ctrlX: public file of AragakiCH/ctrlx_sysid."""
+    lines = ["[key]; [value]", "Version; 0x03050000", "Name; Application.Trace", "Comment; "]
+    for k, (name, slope) in enumerate((("Axis.Pos", 0.5), ("Axis.Cur", -1.25))):
+        keys = (f"Variable; {name}", "Class; 14", f"GraphColor; 428281106{k}", "YAxis; 0", "Data; ")
+        lines += [f"{k}.{key}" for key in keys]
+        lines += [f"; {2 + 20 * i}; {slope * i:g}" for i in range(ROWS)]
+    path = tmp_path / "sinto.trace.csv"
+    path.write_text("\n".join(lines), "utf-8")
+    found = {one.header: one.values for one in read_unknown(path).columns}
+    assert (found["Axis.Pos"][10], found["Axis.Cur"][10], found["time"][1]) == (5.0, -12.5, 22.0)
+
+
+def test_a_missing_first_cell_is_no_mark_that_rows_begin_with() -> None:
+    table = ["t;y;u", *(f"{'' if k % 3 else k};{k % 5};{k % 7}" for k in range(ROWS))]
+    (first, _) = blocks_of("\n".join([*table, "Axis 2", *table]))
+    assert (first.width, first.fields(";1;2")) == (3, ["", "1", "2"])

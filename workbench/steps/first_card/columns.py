@@ -423,9 +423,11 @@ def _coarseness(one: Column) -> int:
 
 
 def _said(one: Column) -> float:
-    """How much a header says: a sensor's own volts and counts less than the signal's unit."""
+    """How much a header says: a sensor's own volts and counts less than the signal's unit, a
+    command's own unit as much."""
     unit = one.header.unit
     raw = unit is not None and unit.quantity in ("command", "count")
+    raw = raw and not one.header.means.get("command")
     known = 0.0 if unit is None or raw else 4.0
     known -= 3.0 if one.header.purpose == "error" else 0.0
     means = (weight for what, weight in one.header.means.items() if what != "other")

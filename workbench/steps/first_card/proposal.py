@@ -24,7 +24,7 @@ from workbench.steps.first_card.refusals import (
     refuse_undriven,
 )
 from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
-from workbench.steps.first_card.roles import Roles, known_roles
+from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
@@ -346,7 +346,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         odds = SURE if name == "t" else roles.odds[name]
         why = "it goes up evenly" if name == "t" else roles.why.get(name, "the header says so")
         if sign < 0.0:
-            why += "; with this sign friction takes energy" if name != "r" else ""
+            why += "" if name == "r" else f"; with this sign {sign_shown_by(roles.law)}"
         why += f"; unit {unit.why}"
         sure = bool(odds >= SURE and unit.sure) and name not in exchanged
         rival = "" if sure else _rival(name, odds, unit, roles)

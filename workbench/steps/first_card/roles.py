@@ -18,6 +18,7 @@ from identification.signals.relations import (
     ForceLaw,
     Lead,
     actuator_share,
+    by_inertia,
     force_law,
 )
 from workbench.steps.first_card.columns import Column
@@ -214,12 +215,19 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
 
 
 def _gives_sign(law: ForceLaw) -> bool:
-    """Whether a law gives the sign of a force or command: by its work, or by friction in it."""
+    """Whether a law gives the sign of a force or command: by its work, by friction in it, or by
+    its inertia."""
     if abs(law.work) > GIVES_SIGN:
         return law.share > COMMAND_GIVES_SIGN or abs(law.work) > WORK_GIVES_SIGN
     onwards = law.friction is None  # one way: along it
     in_it = law.friction is not None and law.friction > FRICTION_GIVES_SIGN
-    return (onwards or in_it) and law.share > MOSTLY_ITS_LAW
+    return (onwards or in_it or by_inertia(law)) and law.share > MOSTLY_ITS_LAW
+
+
+def sign_shown_by(law: ForceLaw) -> str:
+    """In words what a body does with the sign that its law gives."""
+    both = law.friction is not None and abs(law.work) <= GIVES_SIGN
+    return "the mass is positive" if both and by_inertia(law) else "friction takes energy"
 
 
 def _signs(best: _Choice) -> dict[str, Sign]:

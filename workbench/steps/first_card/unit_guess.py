@@ -31,6 +31,7 @@ EPOCHS = {"s": (1e9, 3e9), "ms": (1e12, 3e12), "us": (1e15, 3e15), "ns": (1e18, 
 AGREES = 0.1  # relative error up to which a logged velocity is the position's derivative in SI
 SAME_RATE = 0.03  # the same, within which it makes sure of a unit
 SHORTEST_PERIOD = 1e-12  # s; what a clock ticks faster is none
+FASTEST_LOGGER = 1e-7  # s between rows; a header that says less names another unit than the clock's
 GIVES_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
 MOST_LOST = 8.0  # log-probability that one disagreement costs
 OFF_RATE = 0.05  # relative error from which clock and velocity contradict each other
@@ -42,7 +43,7 @@ SHORTEST_TICK, LONGEST_DAY = 1.0, 1e-3  # steps of a clock of ticks, and of one 
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
-SHARES = ("pwm", "duty", "tastgrad")
+SHARES, ALL_OF_IT = ("pwm", "duty", "tastgrad"), 100.0  # words of a share; the whole, in %
 USUAL_COMMANDS = {"V": "A", "A": "V", "1": "%", "%": "1"}  # and what it is otherwise
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
@@ -61,6 +62,9 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     """The unit of the clock ("t") and of every signal."""
     found = {"t": columns.clock, **roles.columns}
     given = {name: one for name, column in found.items() if (one := _of_header(name, column))}
+    no_clock = _unreadable(columns, given)
+    if no_clock:
+        del given["t"]
     out = dict(given)
     if "y" not in out and (turn := unit_by_turn(roles.columns["y"])) and motion.motion == "rotary":
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
@@ -71,6 +75,8 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     if "t" not in out and counts_samples(columns.clock):
         out["t"] = by_sample_number(columns, roles, out)
     out |= _jointly(columns, roles, motion, out)
+    if no_clock:
+        out["t"] = replace(out["t"], why=f"by its size: {no_clock}")
     if "r" not in out:
         out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
     for name, column in found.items():
@@ -88,6 +94,15 @@ def _of_header(name: str, column: Column) -> UnitGuess | None:
     if unit is None or FITS.get(name) != unit.quantity:
         return None
     return UnitGuess(unit.card, None, not column.header.doubtful, "as the header says")
+
+
+def _unreadable(columns: Columns, given: Units) -> str:
+    """Why the clock's unit is not the one that its header names; empty where it may be."""
+    if "t" not in given:
+        return ""
+    unit = given["t"].unit
+    h = columns.step * factor(unit)
+    return f"the header's {unit} makes rows {h:.3g} s apart" if h < FASTEST_LOGGER else ""
 
 
 def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) -> Units:
@@ -245,9 +260,12 @@ def _of_command(column: Column) -> UnitGuess:
         return UnitGuess("1", None, False, "a register: its full scale is in no log")
     if is_current(column):
         return _command("A", "the header speaks of a current")
-    if any(one in text for one in SHARES) or 0.9 <= peak <= 1.0:
+    share = any(one in text for one in SHARES)
+    if share and peak > ALL_OF_IT:
+        return UnitGuess("1", None, False, "none: above 100, so no %; the PWM's own counts", "V")
+    if share or 0.9 <= peak <= 1.0:
         return _command("1" if peak <= 1.0 else "%", "by its size: a share of all")
-    if 95.0 <= peak <= 100.0:
+    if 95.0 <= peak <= ALL_OF_IT:
         return _command("%", "it stops at 100")
     return _command("V", "the usual one, the header says none")
 

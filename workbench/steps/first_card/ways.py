@@ -13,9 +13,11 @@ from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
 from workbench.steps.first_card.weights import (
     AREA_RATIOS,
+    EXACT_VELOCITY,
     FORCE_LIKENESS,
     MIRRORED,
     OF_A_CONTROLLER,
+    RULED_OUT,
     ahead_of,
     among_derivatives,
     driving,
@@ -100,6 +102,8 @@ def ways_of(
             continue
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
+            continue
+        if one is not alone and pairs.rate[seen.at, k] > EXACT_VELOCITY:
             continue
         v_share = 0.0 if one is alone else float(seen.v_share[k])
         physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
@@ -186,6 +190,8 @@ def gain_of_reference(seen: Seen, k: int) -> float:
     if k not in seen.as_reference:
         one = seen.pairs.signals[k]
         head = max(0.0, said(one, "r")) if k in seen.controlled else said(one, "r")
+        if together(seen.y, one) < 0.0 and one.header.purpose != "reference":
+            head = RULED_OUT  # another axis's position, which goes with this one
         more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
         seen.as_reference[k] = head + more
     return seen.as_reference[k]

@@ -38,6 +38,7 @@ LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explai
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
+EXACT_VELOCITY = 0.9995  # the same, from which it was made of the position, whatever its name
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
 MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
@@ -196,7 +197,12 @@ def turned(law: ForceLaw) -> ForceLaw:
     if law.way > 0.0:
         return law
     return law._replace(
-        way=1.0, work=-law.work, balance=-law.balance, coulomb=-law.coulomb, m=-law.m
+        way=1.0,
+        work=-law.work,
+        balance=-law.balance,
+        coulomb=-law.coulomb,
+        m=-law.m,
+        inertia=-law.inertia,
     )
 
 

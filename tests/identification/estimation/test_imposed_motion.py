@@ -1,0 +1,20 @@
+"""Reasons of a fit by the equation of motion alone."""
+
+import numpy as np
+
+from identification.estimation.imposed_motion import fit_one_way
+from identification.estimation.recorded_logs import recorded_logs
+from identification.log import Log, Rig
+
+
+def test_a_direction_in_which_nothing_moved_is_not_said_to_need_no_friction() -> None:
+    """A wheel whose speed is controlled, and never turns back."""
+    t = np.arange(2000, dtype=np.float64) * 2e-3
+    v = 20.0 * (1.0 - np.exp(-t / 0.1)) + 4.0 * np.sin(9.0 * t) * (t > 0.3)
+    y = np.cumsum(v) * 2e-3 + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    F = 0.14 * np.gradient(v, 2e-3) + 30.0 + 1.1 * v
+    fit = fit_one_way(
+        recorded_logs([Log("wheel", {"t": t, "y": y, "F": F})], Rig("force"), "force"), "why"
+    )
+    for name in ("F_cn", "F_vn"):
+        assert "0 samples of sliding in the negative direction" in str(fit.estimates[name].reason)

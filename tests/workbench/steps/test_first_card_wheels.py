@@ -1,0 +1,111 @@
+"""A first card for logs of students' rigs: signs without a return, speeds of many names, PWMs."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.errors import BadLog
+from workbench.steps.first_card.proposal import Proposal, proposed
+
+Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
+H = 0.005
+
+
+def propose(folder: Path, headers: str, *columns: Floats) -> Proposal:
+    path = folder / "run.csv"
+    rows = (",".join(f"{one:.9g}" for one in row) for row in np.column_stack(columns).tolist())
+    path.write_text("\n".join([headers, *rows]), "utf-8")
+    return proposed(path)
+
+
+def driven(u: Floats, m: float, F_c: float, F_v: float) -> tuple[Floats, Floats]:
+    """Position and speed of a body from rest, by the force u (n,)."""
+    y, v = np.zeros(len(u)), np.zeros(len(u))
+    for k in range(1, len(u)):
+        pushed = u[k] - F_v * v[k - 1]
+        rests = v[k - 1] == 0.0 and abs(u[k]) <= F_c
+        friction = pushed if rests else F_c * np.sign(v[k - 1] or u[k])
+        v[k] = v[k - 1] + H / m * (pushed - friction)
+        v[k] = 0.0 if v[k] * v[k - 1] < 0.0 else v[k]
+        y[k] = y[k - 1] + H * v[k]
+    return y, v
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_inertia_gives_the_sign_where_the_motion_does_not_come_back(
+    tmp_path: Path, sign: float
+) -> None:
+    """A cart that is pushed hard there and back, and stops before the middle of its stroke."""
+    t = H * np.arange(240)
+    pushed = np.select([t < 0.3, t < 0.6], [-4.0 + 3.0 * t, 4.7 - t], 0.5)
+    u = np.where(t < 0.1, 0.6, pushed) + 0.3 * np.sin(40.0 * t)
+    y, _ = driven(u, m=0.19, F_c=0.1, F_v=1.0)
+    found = propose(tmp_path, "ms,X,U", 1e3 * t, 0.2 + y, sign * u)
+    one = found.signal("u")
+    assert one is not None and (one.gain == -1.0) == (sign < 0.0)
+    assert ("with this sign the mass is positive" in one.why) == (sign < 0.0)
+
+
+def test_a_pendulum_that_turns_far_does_not_turn_its_torque(tmp_path: Path) -> None:
+    """Its weight is no force linear in place: what the acceleration explains has the wrong sign."""
+    t = H * np.arange(2400)
+    y, v, torque = np.zeros(len(t)), 0.0, np.zeros(len(t))
+    for k in range(1, len(t)):
+        torque[k] = np.clip(3.0 * (2.2 * np.sin(1.9 * t[k]) - y[k - 1]), -1.0, 1.0)
+        v += H / 0.06 * (torque[k] - 2.6 * np.sin(y[k - 1]) - 0.02 * v)
+        y[k] = y[k - 1] + H * v
+    one = propose(tmp_path, "time,position,torque", t, y, torque).signal("F")
+    assert one is not None and one.gain is None
+
+
+def wheels() -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Clock, and command and angle of two wheels that turn together."""
+    t = H * np.arange(500)
+    left = 60.0 * np.sign(np.sin(2.1 * t)) + 20.0 * np.sin(9.0 * t)
+    right = 1.05 * left + 2.0
+    return t, left, driven(left, 0.2, 8.0, 3.0)[0], right, driven(right, 0.2, 8.5, 3.1)[0]
+
+
+def test_the_angle_of_another_axis_is_no_reference(tmp_path: Path) -> None:
+    t, left, angle, right, other = wheels()
+    speeds = np.gradient(angle, H), np.gradient(other, H)
+    headers = "time,leftSpeed,leftCommand,leftAngle,rightSpeed,rightCommand,rightAngle"
+    found = propose(tmp_path, headers, t, speeds[0], left, angle, speeds[1], right, other)
+    assert found.signal("r") is None
+    assert [found.signal(name) is not None for name in "yu"] == [True, True]
+
+
+def test_what_was_made_of_the_position_drives_nothing_whatever_its_name(tmp_path: Path) -> None:
+    """CURRENT as the present one: a speed, beside the PWM that drives."""
+    t, pwm, angle, *_ = wheels()
+    speed = np.gradient(angle, H)
+    found = propose(tmp_path, "TIMESTAMP,PWM_M1,CURRENT_M1,POS_M1", 1e3 * t, pwm, speed, angle)
+    one = found.signal("u")
+    assert found.kind == "motor" and one is not None and one.column == "PWM_M1"
+    assert "derivative" in found.unused["'CURRENT_M1'"]
+    with pytest.raises(BadLog, match="no column moves as a body that another one drives"):
+        propose(tmp_path, "TIMESTAMP,w,theta", 1e3 * t, speed, angle)
+
+
+def test_a_command_in_volts_stands_before_the_counts_of_its_pwm(tmp_path: Path) -> None:
+    t, pwm, angle, *_ = wheels()
+    counts = np.round(2.5 * pwm)
+    found = propose(tmp_path, "Tiempo (s),PWM,Voltaje (V),Angulo (rad)", t, counts, 9.0 / 255.0
+                    * counts, angle)  # fmt: skip
+    one = found.signal("u")
+    assert one is not None and (one.column, one.unit) == ("Voltaje (V)", "V")
+
+
+def test_a_pwm_above_100_is_no_share_in_percent(tmp_path: Path) -> None:
+    t, pwm, angle, *_ = wheels()
+    one = propose(tmp_path, "time,pwm,theta", t, np.round(2.5 * pwm), angle).signal("u")
+    assert one is not None and (one.unit, one.sure) == ("1", False)
+
+
+def test_a_header_names_no_clock_that_nothing_logs_as_fast(tmp_path: Path) -> None:
+    t, pwm, angle, *_ = wheels()
+    one = propose(tmp_path, "time_us,pwm,theta", 0.1 * t, pwm, angle).signal("t")
+    assert one is not None and (one.unit, one.sure) == ("s", False)
+    assert "the header's us makes rows 5e-10 s apart" in one.why
