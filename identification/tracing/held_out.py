@@ -9,7 +9,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT, WORSE
+from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT
 from identification.tracing.model_errors import (
     OnTest,
     errors_of,
@@ -159,7 +159,7 @@ class HeldOut:
     @property
     def against(self) -> str:
         """What the test logs hold against the effects found, "" where these explain most of what
-        was missing there and predict neither force nor position worse.
+        was missing there and do not predict the position worse.
 
         Of a machine that changed beside more is left, but no more than before.
         """
@@ -168,12 +168,6 @@ class HeldOut:
             return "more than half of what was missing on the test logs is left"
         if self.hides_friction:
             return AS_LARGE_AS_FRICTION
-        lacked = self.missing
-        if lacked is not None and lacked.after.rms > self._worse_from(lacked.before.rms):
-            return (
-                "the force of the test logs is predicted worse"
-                f" ({lacked.before.rms:.3g} -> {lacked.after.rms:.3g})"
-            )
         plain = self.plain.model
         if (
             not self.seen
@@ -189,11 +183,6 @@ class HeldOut:
             f"the position of the test logs is predicted worse over {worse.seconds:g} s"
             f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)"
         )
-
-    def _worse_from(self, lacked: float) -> float:
-        """The missing force [N] from which a model predicts worse than one that lacks so much: what
-        is immaterial beside friction is no worse."""
-        return max(WORSE * lacked, MATERIAL * self.coulomb)
 
     @property
     def _measured_force_is_explained(self) -> bool:
@@ -235,12 +224,16 @@ class HeldOut:
         return evidence(of_force, len(steps))
 
     def _force_left(self, missing: MissingForce | None) -> float | None:
-        """Share of the missing force that is left, None where it was not of account before, or the
-        logs only bound it."""
-        if missing is None or missing.before.is_a_bound:
+        """Share of the missing force that is left, None where neither model lacks one of account,
+        or the logs only bound it."""
+        if missing is None:
             return None
-        lacked = missing.before.share(self.coulomb) or 0.0
-        return missing.share_left if lacked > MATERIAL else None
+        lacked = [
+            one.share(self.coulomb) or 0.0
+            for one in (missing.before, missing.after)
+            if not one.is_a_bound
+        ]
+        return missing.share_left if max(lacked, default=0.0) > MATERIAL else None
 
 
 def _acts_at_rest(step: Step) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.estimates import of_effect
-from identification.estimation.latent_force import LatentForce, LatentForces
+from identification.estimation.latent_force import LatentForce, LatentForces, Rougher
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
@@ -88,7 +88,7 @@ def missing_force(keys: Sequence[str]) -> MissingForce:
             t, y, force = sliding.t[own] % 20.0, sliding.signals["y"][own], -left[own]
             slides = np.ones(len(t), dtype=np.bool_)
             parts.append(LatentForce(t, y, force, np.full(len(t), 0.01), slides, 0.0 * t))
-        return LatentForces(sigma, 0.06, sigma, 1.0, tuple(parts))
+        return LatentForces(sigma, 0.06, sigma, Rougher(), tuple(parts))
 
     before, after = of(sliding.before, 1.5), of(0.01 * sliding.after, 1e-3)
     return MissingForce(before, after, replace(sliding, after=0.01 * sliding.after))
