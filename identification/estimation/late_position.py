@@ -3,8 +3,8 @@
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
 command acts as late as it does, and nowhere else. So a lag is believed where a run follows with it,
-and a motor's searched there where the log is slow. One too short for a run to notice is believed
-where it explains most of what the equation leaves.
+and a motor's searched there where the log is slow. One that explains most of what the equation
+leaves is believed without, where no loop is known, or where it is too short for a run to notice.
 """
 
 from collections.abc import Callable, Sequence
@@ -71,13 +71,15 @@ def what_acts_beside(
         return explains(without - 1.0, with_it - 1.0)
 
     def believed(samples: float) -> bool:
-        """Whether a run bears the equation's lag out, or does well with one that explains most of
-        what the equation leaves."""
+        """Whether a run bears the equation's lag out, or the lag explains most of what the equation
+        leaves, in a loop if a run does well with it."""
         without, with_it = lag_explains(logs, rig, found)
-        if explains_most(without**2, with_it**2) and left(samples) <= ADEQUATE:
+        most = explains_most(without**2, with_it**2)
+        if most and (not in_loop or left(samples) <= ADEQUATE):
             return True
         return follows(samples)
 
+    in_loop = not motor or any("r" in log for log in logs)
     if found.lag.value and not believed(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
     if found.lag.value or not motor or h < SLOW_LOG:

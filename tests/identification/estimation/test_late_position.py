@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from identification.estimation import late_position
 from identification.estimation.late_position import what_acts_beside
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from identification.simulation.free_run import free_run
 
 H = 2e-3
@@ -34,3 +37,19 @@ def test_a_current_that_is_logged_late_is_found() -> None:
     motor = log.with_signals(u=log["F"])
     found = what_acts_beside([motor], Rig("motor", motion="rotary", force_per_command=1.0))
     assert abs(found.lag.value / H + 8.0) < 0.6  # half a sample: a command is held until the next
+
+
+@pytest.mark.parametrize(("left", "believed"), [(0.8, False), (0.6, True)])
+@pytest.mark.parametrize("in_loop", [False, True])
+def test_a_lag_that_no_run_bears_out_is_believed_where_it_explains_most_and_no_loop_is_known(
+    left: float, believed: bool, in_loop: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is missing beside, as cogging, may pass for a lag in the equation."""
+    lag = Surroundings(lag=Size(3.0 * H, 0.1 * H))
+    monkeypatch.setattr(late_position, "surroundings", lambda *_: lag)
+    monkeypatch.setattr(late_position, "lag_explains", lambda *_: (1.0, left))
+    monkeypatch.setattr(late_position, "_misfit", lambda *_: 20.0)
+    log = late_log(0.0)
+    motor = log.with_signals(u=log["F"], **({"r": log["y"]} if in_loop else {}))
+    rig = Rig("motor", motion="rotary", force_per_command=1.0)
+    assert bool(what_acts_beside([motor], rig).lag.value) == (believed and not in_loop)
