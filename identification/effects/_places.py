@@ -54,6 +54,11 @@ class Place:
         return self.holds and not self.rubs
 
     @property
+    def at_rest(self) -> bool:
+        """Whether it shows in stops and reversals, more than while the body slides."""
+        return self.elastic or self.in_stops
+
+    @property
     def any_speed(self) -> bool:
         """Whether it acts alike in slow and in quick motion."""
         return (self.rubs and self.holds) or self.drives or self.on_command

@@ -45,7 +45,11 @@ from identification.estimation.structure_fit import (
     plain_structure,
     searched,
 )
-from identification.estimation.surroundings import surrounding_estimates, widened_friction
+from identification.estimation.surroundings import (
+    explains_most,
+    surrounding_estimates,
+    widened_friction,
+)
 from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.estimation.windowed_run.parameters import even, loose
 from identification.estimation.windowed_run.refinement import Refit, refit
@@ -60,7 +64,6 @@ from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
     AS_GOOD_AS_NONE,
     COMPLETE,
-    HALF,
     HOPELESS,
     MATERIAL,
     PLACES_EXCLUDED,
@@ -201,7 +204,7 @@ def _without_bad(
 def _explained(before: float, after: float) -> bool:
     """Whether the samples left out were most of what a run left beyond noise (misfits): of a model
     that lacks an effect any sample put on the run makes that less, and the log is not at fault."""
-    return after <= COMPLETE or after - 1.0 <= HALF * (before - 1.0)
+    return after <= COMPLETE or explains_most(before - 1.0, after - 1.0)
 
 
 def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStructure:

@@ -253,9 +253,7 @@ def _of_sliding(
 
 def _sliding(fastest: float, recorded: RecordedLogs) -> Events:
     """The samples in which the body surely slides, by direction; fastest [m/s]."""
-    d = np.concatenate([one.signals["d"] for one in recorded.logs])
-    sliding = (int(np.count_nonzero(d > 0)), int(np.count_nonzero(d < 0)))
-    return Events((0, 0), (0, 0), sliding, (fastest, fastest))
+    return Events((0, 0), (0, 0), recorded.moved, (fastest, fastest))
 
 
 def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
@@ -278,6 +276,7 @@ def _reasoned(
     explained = "next to nothing" if share is None else f"{share:.1%}"
     units = ROTARY_UNITS if recorded.rig.motion == "rotary" else UNITS
     out: dict[str, Estimate] = {}
+    sliding = _sliding(0.0, recorded)
     for key, value in zip(NAMES, nine, strict=True):
         if key in known:
             one = known[key]  # without a value: what is assumed has the sign of friction
@@ -288,7 +287,7 @@ def _reasoned(
             out[key] = one
             continue
         kind = key if key == "m" else "stick" if key.startswith(("dv", "F_s")) else key[:3]
-        rests = silent_reason(key, _sliding(0.0, recorded), recorded.name) if key in FIVE else None
+        rests = silent_reason(key, sliding, recorded.name) if key in FIVE else None
         reason = rests or f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
     return out

@@ -202,7 +202,9 @@ def latent_forces(
     with ThreadPoolExecutor(2) as pool:
         best = min(pool.map(lambda tau: least(tau, rougher or Rougher()), memories))
         if rougher is None:
-            noises = [more for x in WHITE_NOISES for more in (Rougher(x), Rougher(force=x))]
+            noises = [Rougher(x) for x in WHITE_NOISES]
+            if not all(one.imposed for one in logs):  # then the force is what is measured
+                noises += [Rougher(force=x) for x in WHITE_NOISES]
             other = min(pool.map(lambda more: least(best.tau, more), noises))
             if other.cost < best.cost - WHITE_GAINS:
                 best = min(pool.map(lambda tau: least(tau, other.rougher), memories))

@@ -86,6 +86,12 @@ class RecordedLogs:
         return samples * self.logs[0].log.h
 
     @property
+    def moved(self) -> tuple[int, int]:
+        """Samples in which the body surely moves, in positive and negative direction."""
+        d = np.concatenate([one.signals["d"] for one in self.logs])
+        return int(np.count_nonzero(d > 0)), int(np.count_nonzero(d < 0))
+
+    @property
     def name(self) -> str:
         """The log's name, or how many there are."""
         return self.logs[0].log.name if len(self.logs) == 1 else f"{len(self.logs)} logs"

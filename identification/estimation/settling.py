@@ -267,6 +267,4 @@ def _events(plant: Plant, recorded: RecordedLogs, seconds: float) -> Events:
             for one in recorded.logs]  # fmt: skip
     followed = [run for run in runs if run is not None]
     modes, speeds = [run.mode for run in followed], [run.v for run in followed]
-    way = np.concatenate([one.signals["d"] for one in recorded.logs])
-    moved = (int(np.count_nonzero(way > 0)), int(np.count_nonzero(way < 0)))
-    return replace(events_of(modes, speeds, force_of(recorded.plain)), moved=moved)
+    return replace(events_of(modes, speeds, force_of(recorded.plain)), moved=recorded.moved)

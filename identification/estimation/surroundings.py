@@ -266,8 +266,8 @@ def explains(without: float, left: float) -> bool:
 
 
 def explains_most(without: float, left: float) -> bool:
-    """Whether a lag that leaves this of a square, in place of that without it, is no noise of a
-    loop, which explains less."""
+    """Whether what leaves this of a square, in place of that without it, explains most of it, as a
+    loop's noise explains of no lag and a wrong model of no sample."""
     return left <= HALF * without
 
 

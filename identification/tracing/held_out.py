@@ -24,7 +24,7 @@ from identification.tracing.parameter_drift import parameter_drift, with_changes
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.probability import Evidence, evidence
-from identification.tracing.regression.stepwise import Choice, Step
+from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import missing_force
 from identification.tracing.result import Change, Errors, MissingForce
 from identification.tracing.verdict import explains_most
@@ -119,7 +119,7 @@ class HeldOut:
         """Share that effects of stops and reversals leave of the motion at rest, infinite of others
         and where none is seen."""
         steps = self.choice.steps
-        if not any(_acts_at_rest(step) for step in steps):
+        if not any(step.candidate.effect.place.at_rest for step in steps):
             return np.inf
         left = rest_share_left(self.model.stage, steps, self.unseen)
         return np.inf if left is None else left
@@ -219,7 +219,7 @@ class HeldOut:
         of_force = self._force_left(missing)
         if of_force is None:
             of_force = of_error
-        elif all(_acts_at_rest(step) for step in steps):
+        elif all(step.candidate.effect.place.at_rest for step in steps):
             of_force = min(of_force, of_error)
         return evidence(of_force, len(steps))
 
@@ -234,9 +234,3 @@ class HeldOut:
             if not one.is_a_bound
         ]
         return missing.share_left if max(lacked, default=0.0) > MATERIAL else None
-
-
-def _acts_at_rest(step: Step) -> bool:
-    """Whether an effect acts in stops and reversals, more than while the body slides."""
-    place = step.candidate.effect.place
-    return place.in_stops or place.elastic

@@ -88,21 +88,19 @@ def share_left(before: OnTest, after: OnTest, noise: Errors, by_run: bool = Fals
     Then the run, by its misfit, which knows how far the noise of force and command drifts. Ours:
     `README.md`, (6).
     """
-    by_equation = [_actuator_share(before, after, noise, least) for least in (ASTRAY, ADEQUATE)]
-    of_run = None
-    if before.misfit is not None and after.misfit is not None and before.misfit > ADEQUATE:
-        of_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
-    known = (share for share in (by_equation[0], of_run, by_equation[1]) if share is not None)
-    return next(known, 1.0 if by_run else 0.0)
-
-
-def _actuator_share(before: OnTest, after: OnTest, noise: Errors, least: float) -> float | None:
-    """As `share_left`, of the actuator's equation where more than `least` times the noise's square
-    was missing; None without it."""
+    known: list[float | None] = [None, None, None]
+    if before.misfit is not None and after.misfit is not None:
+        known[1] = _beyond_noise(before.misfit, after.misfit, ADEQUATE)
     own, left, floor = (x.actuator_rms for x in (before.errors, after.errors, noise))
-    if own is None or left is None or not floor or own**2 <= least * floor**2:
-        return None
-    return float(max(left**2 - floor**2, 0.0) / (own**2 - floor**2))
+    if own is not None and left is not None and floor:
+        was, now = (own / floor) ** 2, (left / floor) ** 2
+        known[0], known[2] = (_beyond_noise(was, now, least) for least in (ASTRAY, ADEQUATE))
+    return next((share for share in known if share is not None), 1.0 if by_run else 0.0)
+
+
+def _beyond_noise(before: float, after: float, least: float) -> float | None:
+    """Share of a mean square beyond noise (1) that is left; None where no more than `least` was."""
+    return max(after - 1.0, 0.0) / (before - 1.0) if before > least else None
 
 
 def rest_share_left(
@@ -117,7 +115,7 @@ def rest_share_left(
     if not len(before.b):
         return None
     was, now = (float(np.mean((rows.b / rows.sd) ** 2)) for rows in (before, after))
-    return max(now - 1.0, 0.0) / (was - 1.0) if was > ASTRAY else None
+    return _beyond_noise(was, now, ASTRAY)
 
 
 def follows(before: OnTest, after: OnTest) -> bool:

@@ -96,7 +96,7 @@ def seen_in_run(effect: Effect) -> bool:
     wider band stands for it there.
     """
     place = effect.place  # on signals, in place of sticking, at breakaway: in the run above all
-    in_run = place.on_signals or place.elastic or place.in_stops
+    in_run = place.on_signals or place.at_rest
     return in_run or by_load(effect) or slow_motion(effect)
 
 

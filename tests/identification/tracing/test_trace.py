@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from identification.errors import NotIdentifiable
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Plant
+from identification.model.surroundings import NO_SURROUNDINGS
 from identification.simulation.free_run import free_run
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
@@ -152,6 +154,36 @@ def test_what_an_actuator_lacks_is_not_laid_to_friction() -> None:
         one = found.parameters_after[name]
         assert one.low is not None and one.high is not None
         assert one.low < getattr(PLAIN, name) < one.high
+
+
+@pytest.mark.parametrize(
+    ("verdict", "complete", "effects", "asked"),
+    [
+        ("none", False, (), True),
+        ("drift", False, (), True),
+        ("unknown", False, ("spring",), True),
+        ("none", True, (), False),
+        ("effect", False, ("spring",), False),  # which the force alone might not have
+    ],
+)
+def test_the_measured_force_is_asked_where_the_command_leaves_something_and_nothing_is_found(
+    verdict: str, complete: bool, effects: tuple[str, ...], asked: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    by_command = SimpleNamespace(
+        verdict=verdict,
+        complete=complete,
+        effects=effects,
+        plant=SimpleNamespace(actuator=ACTUATOR),
+    )
+    by_force = SimpleNamespace(verdict="none", complete=True, effects=())
+    module = "identification.tracing.trace"
+    monkeypatch.setattr(f"{module}.what_acts_beside", lambda *_: NO_SURROUNDINGS)
+    monkeypatch.setattr(f"{module}._traced", lambda *_: by_command)
+    monkeypatch.setattr(f"{module}._by_force", lambda *_: by_force)
+    log = made(31, n=2000)
+    found: object = trace([log], [log], RIG, {}, np.random.default_rng(0))
+    assert (found is by_force) == asked
 
 
 @pytest.mark.slow
