@@ -23,6 +23,7 @@ from workbench.documents.design import (
     margin_values,
 )
 from workbench.documents.model import Model
+from workbench.steps.asked import Limits as Limits
 from workbench.steps.closed_loop import DrivenLoop, driven_loop, limit_on, present_loop, run_driven
 from workbench.steps.linear_loop import plants_of
 from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
@@ -40,22 +41,6 @@ COMPENSATED = " + compensator"  # behind a controller's name
 SCHEDULED = " + schedule"  # the same
 PRESENT = "present"  # the controller that the machine has now
 ALMOST = 0.9  # of a limit, from which a loop is reported to come near it
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a loop must keep to pass.
-
-    Margins; error at standstill and overshoot relative to the step; error along the smooth
-    reference relative to its amplitude; largest force relative to that in the machine's logs.
-    """
-
-    modulus: float = 0.5
-    delay: float = 2.0
-    standstill: float = 0.05
-    tracking: float = 0.2
-    overshoot: float = 0.1
-    force: float = 1.2
 
 
 @dataclass(frozen=True)
