@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from workbench.interface.models import identify as identify
     from workbench.interface.models import load_model as load_model
     from workbench.interface.models import trace as trace
-    from workbench.steps.experiment.planned import Wanted as Wanted
-    from workbench.steps.identify import Options as Options
-    from workbench.steps.loop_figures import Limits as Limits
-    from workbench.steps.robust.robust import RobustAsked as RobustAsked
+    from workbench.steps.asked import Limits as Limits
+    from workbench.steps.asked import Options as Options
+    from workbench.steps.asked import RobustAsked as RobustAsked
+    from workbench.steps.asked import Wanted as Wanted
 
 _HOMES = {
     "design.tune": "Goals",
@@ -42,10 +42,7 @@ _HOMES = {
     "workbench.interface.logs": "axis_test drift predict read_logs response simulate",
     "workbench.interface.loops": "design experiment robust_design validate",
     "workbench.interface.models": "identify load_model trace",
-    "workbench.steps.experiment.planned": "Wanted",
-    "workbench.steps.identify": "Options",
-    "workbench.steps.loop_figures": "Limits",
-    "workbench.steps.robust.robust": "RobustAsked",
+    "workbench.steps.asked": "Limits Options RobustAsked Wanted",
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
 

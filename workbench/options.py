@@ -46,6 +46,18 @@ class Finite(click.FloatRange):
         return found
 
 
+class Parsed(click.ParamType[Any]):
+    """A text that a function reads, which raises a usage error where it is none of its kind."""
+
+    def __init__(self, read: Callable[[str], Any]) -> None:
+        self.name = "text"
+        self.read = read
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """What the text says; a default as it is."""
+        return self.read(value) if isinstance(value, str) else value
+
+
 POSITIVE = Finite(min=0, min_open=True)
 SECONDS = Finite(min=0, max=1e9)
 SECONDS_ABOVE_0 = Finite(min=0, max=1e9, min_open=True)
@@ -91,7 +103,8 @@ EFFECTS_OPTION = option(  # folders of the user's own effects: `workbench.cards.
     " only folders that you trust.",
     metavar="FOLDER",
 )
-SEED_OPTION = option("", type=click.IntRange(min=0), default=0)
+SEEDS = click.IntRange(min=0)
+SEED_OPTION = option("", type=SEEDS, default=0)
 REGISTRY_OPTION = option(
     "SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
     "--registry", metavar="FILE|URL",
@@ -106,21 +119,11 @@ OUT_OPTION = option(
 MODEL_ARGUMENT = argument("MODEL")
 LOG_ARGUMENT = argument("LOG", shell_complete=complete_file)
 LOGS_ARGUMENT = argument("LOG...", required=True, shell_complete=complete_file)
-# What a loop must keep.
-MODULUS_OPTION = option("Least modulus margin.", type=POSITIVE, default=0.5)
-DELAY_OPTION = option("Least delay margin, in samples.", type=POSITIVE, default=2.0)
-STANDSTILL_OPTION = option(
-    "Largest error at standstill, relative to the step.", type=POSITIVE, default=0.05
-)
-TRACKING_OPTION = option(
-    "Largest rms error along the smooth reference, relative to its amplitude.",
-    type=POSITIVE, default=0.2,
-)  # fmt: skip
-OVERSHOOT_OPTION = option("Largest overshoot, relative to the step.", type=POSITIVE, default=0.1)
-FORCE_OPTION = option(
-    "Largest force, relative to the largest in the logs of the machine's model.",
-    type=POSITIVE, default=1.2,
-)  # fmt: skip
+
+
+def listed_names(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def refuse_given(why: str, *options: str) -> None:
@@ -139,10 +142,8 @@ def refuse_for_velocity(*options: str) -> None:
     refuse_given('{} has no meaning for a rig of kind = "velocity"; leave it out.', *options)
 
 
-def parse_orders(text: str | None) -> tuple[int, int, int] | None:
-    """`na,nb,nk` as three counts; None for None."""
-    if text is None:
-        return None
+def parse_orders(text: str) -> tuple[int, int, int]:
+    """`na,nb,nk` as three counts."""
     parts = text.split(",")
     if len(parts) != 3 or not all(part.strip().isdigit() for part in parts):
         raise click.UsageError(f"--orders {text!r}: three counts na,nb,nk needed, as in 3,2,1.")
@@ -150,10 +151,8 @@ def parse_orders(text: str | None) -> tuple[int, int, int] | None:
     return na, nb, nk
 
 
-def parse_poles(text: str | None) -> tuple[float, float] | None:
-    """`w_n,zeta` as numbers; None for None."""
-    if text is None:
-        return None
+def parse_poles(text: str) -> tuple[float, float]:
+    """`w_n,zeta` as numbers."""
     try:
         w_n, zeta = (float(part) for part in text.split(","))
     except ValueError:
@@ -163,10 +162,8 @@ def parse_poles(text: str | None) -> tuple[float, float] | None:
     return w_n, zeta
 
 
-def parse_auxiliary(text: str | None) -> tuple[complex, ...] | None:
-    """Values of z, `0.5,0.3+0.2j,0.3-0.2j`; None for None, none for an empty text."""
-    if text is None:
-        return None
+def parse_auxiliary(text: str) -> tuple[complex, ...]:
+    """Values of z, `0.5,0.3+0.2j,0.3-0.2j`; none for an empty text."""
     try:
         poles = tuple(complex(part.replace(" ", "")) for part in text.split(",") if part.strip())
     except ValueError:

@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
+from functools import cache
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 import click
 
@@ -30,6 +31,9 @@ from workbench.screen import (
     screen,
 )  # fmt: skip
 from workbench.screen import Row as Row
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
 
@@ -254,6 +258,21 @@ def progress(label: str, total: float | None = None) -> Iterator[Bar]:
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         yield Shown(bar, bar.add_task(label, total=total))
+
+
+@cache
+def templates(package: str, *, escaped: bool = True, **how: Any) -> "Environment":
+    """The templates of a package, strict about names; escaped: values are, for HTML and XML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader(package),
+        autoescape=escaped,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        **how,
+    )
 
 
 def next_step(text: str) -> str:

@@ -6,14 +6,15 @@
     ) -> None: ...
 
 What an annotation says is not said again: a `Path` is one, a tuple may be given several times, a
-`bool` is a flag, a `Literal` a choice; a dataclass stands for the options that its fields say. Name
-and order of the options are those of the parameters.
+`bool` is a flag, a `Literal` a choice; a dataclass stands for the options that its fields say, with
+`option` or, where it is also made elsewhere, with `asked`. Name and order of the options are those
+of the parameters.
 """
 
 import inspect
 import types
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
@@ -47,8 +48,14 @@ class _Said:
 def option(said: str, *names: str, last: bool = False, **how: Any) -> Any:
     """An option with this help; names: where it is not called as its parameter; last: it stands
     behind the options of every command; how: as click has it. A default is shown."""
-    shown = {"show_default": True} if "default" in how else {}
+    shown = {"show_default": True} if how.get("default", ()) != () else {}
     return _Said(names, {"help": said or None, **shown, **how}, is_argument=False, last=last)
+
+
+def asked(default: object, said: str, *names: str, **how: Any) -> Any:
+    """A field of a dataclass with its default, and the option that says it, as `option` has it."""
+    how |= {} if default is None else {"default": default}
+    return field(default=default, metadata={"said": option(said, *names, **how)})
 
 
 def argument(metavar: str | None = None, **how: Any) -> Any:
@@ -59,32 +66,41 @@ def argument(metavar: str | None = None, **how: Any) -> Any:
 def by_signature(function: Callable[..., Any], shared: Decorator) -> Callable[..., Any]:
     """The function with the options and arguments that its parameters' defaults say, and the
     options that every command shares."""
-    parameters = inspect.signature(function).parameters
-    grouped: dict[str, Any] = {
-        name: one.annotation for name, one in parameters.items() if is_dataclass(one.annotation)
-    }
+    parameters = inspect.signature(function).parameters.values()
+    groups = {one.name: one.annotation for one in parameters if is_dataclass(one.annotation)}
 
     @wraps(function)
     def command(**given: Any) -> Any:
-        own = {
-            name: group(**{key: given.pop(key) for key in group.__annotations__})
-            for name, group in grouped.items()
-        }
+        own = {name: _made(group, given) for name, group in groups.items()}
         return function(**own, **given)
 
-    said = list[tuple[str, _Said, object]]()
-    for name, one in parameters.items():
-        if name in grouped:
-            fields = grouped[name].__annotations__.items()
-            said += [(key, getattr(grouped[name], key), kind) for key, kind in fields]
-        else:
-            said.append((name, one.default, one.annotation))
+    said = [each for p in parameters for each in _options(p.name, p.annotation, p.default)]
     said.sort(key=lambda one: one[1].last)
     decorators = [one.decorator(name, kind) for name, one, kind in said]
     decorators.insert(len(said) - sum(one.last for _, one, _ in said), shared)
     for decorator in reversed(decorators):
         command = decorator(command)
     return command
+
+
+def _options(name: str, kind: Any, default: object) -> Iterator[tuple[str, _Said, object]]:
+    """Name, option and annotation of a parameter, or of each field of its dataclass."""
+    if is_dataclass(kind):
+        for one in fields(kind):
+            yield from _options(one.name, one.type, one.metadata.get("said", one.default))
+    elif isinstance(default, _Said):
+        yield name, default, kind
+
+
+def _made(group: Any, given: dict[str, Any]) -> Any:
+    """A dataclass of what is given, which its fields then have; others have their defaults."""
+    own = dict[str, Any]()
+    for one in fields(group):
+        if is_dataclass(one.type):
+            own[one.name] = _made(one.type, given)
+        elif one.name in given:
+            own[one.name] = given.pop(one.name)
+    return group(**own)
 
 
 def _by_annotation(annotation: object, is_argument: bool) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """`workbench design`: a model -> design.json and report.html."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,11 +10,11 @@ from workbench import options
 from workbench.ending import step
 from workbench.output import results
 from workbench.signature import option
+from workbench.steps.asked import RobustAsked
 
 if TYPE_CHECKING:
     from workbench.documents.design import Structure
     from workbench.documents.model import Model
-    from workbench.steps.loop_figures import Limits
 
 # Options, by the names of their values, that only --robust has.
 ROBUST_ONLY = (
@@ -33,12 +33,14 @@ class DesignOptions:
     """What the command line says of a design."""
 
     model_file: Path = options.MODEL_ARGUMENT
-    poles: str | None = option(
-        "Dominant poles [rad/s, -].  [default: searched]", metavar="W_N,ZETA"
-    )
-    auxiliary: str | None = option(
-        "Other poles of the RST loop, values of z.  [default: searched]", metavar="Z,..."
-    )
+    poles: tuple[float, float] | None = option(
+        "Dominant poles [rad/s, -].  [default: searched]",
+        type=options.Parsed(options.parse_poles), metavar="W_N,ZETA",
+    )  # fmt: skip
+    auxiliary: tuple[complex, ...] | None = option(
+        "Other poles of the RST loop, values of z.  [default: searched]",
+        type=options.Parsed(options.parse_auxiliary), metavar="Z,...",
+    )  # fmt: skip
     integrator: bool = option("", "--integrator/--no-integrator", default=True)
     structures: "tuple[Structure, ...]" = option(
         "Controllers to design; may be given several times.  [default: rst and pid; p-pi too where"
@@ -60,32 +62,13 @@ class DesignOptions:
     design_period: float | None = option(
         "Period of the position loop [s].", type=options.POSITIVE, metavar="S"
     )
-    modulus: float = options.MODULUS_OPTION
-    delay: float = options.DELAY_OPTION
     robust: bool = option("Choose by the loops of machines drawn from the model's uncertainty.")
-    draws: int = option(
-        "Machines drawn, with --robust.", type=click.IntRange(20, 10_000), default=200
-    )
-    probability: float = option(
-        "Share of the machines on which each limit has to hold, with --robust.",
-        type=options.Finite(0.5, 1.0, max_open=True), default=0.95,
-    )  # fmt: skip
-    staircase: float | None = option(
-        "Largest staircase on a slow ramp [m, rad], with --robust.  [default: any]",
-        type=options.POSITIVE, metavar="M",
-    )  # fmt: skip
-    standstill: float = options.STANDSTILL_OPTION
-    tracking: float = options.TRACKING_OPTION
-    overshoot: float = options.OVERSHOOT_OPTION
-    force: float = options.FORCE_OPTION
+    wanted: RobustAsked = field(default_factory=RobustAsked)
     machine: str | None = option(
         "Machine in the registry by whose drift so far the machines differ, with --robust.",
         metavar="NAME",
     )
     where: str | None = options.REGISTRY_OPTION
-    seed: int = option(
-        "Of the machines drawn, with --robust.", type=click.IntRange(min=0), default=0
-    )
     card: str | None = options.PRESENT_CARD_OPTION
     effects: tuple[Path, ...] = options.EFFECTS_OPTION
     out: Path | None = options.OUT_OPTION
@@ -128,7 +111,8 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
     from workbench.steps.design import effort_limit
     from workbench.steps.elastic import beyond_response
 
-    asked, goals = _asked(given), Goals(given.modulus, given.delay, effort_limit(model))
+    limits, asked = given.wanted.limits, _asked(given)
+    goals = Goals(limits.modulus, limits.delay, effort_limit(model))
     with results("design", given.out, without_design(model, given.card)) as folder:
         found = design(model, goals=goals, structures=given.structures or None, **asked)
         found = replace(found, design=beyond_response(found.design, given.response_file))
@@ -145,8 +129,8 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
 def _asked(given: DesignOptions) -> dict[str, Any]:
     """What a nominal and a robust design are asked alike."""
     return {
-        "poles": options.parse_poles(given.poles),
-        "auxiliary": options.parse_auxiliary(given.auxiliary),
+        "poles": given.poles,
+        "auxiliary": given.auxiliary,
         "integrator": given.integrator,
         "source": given.source,
         "period": given.design_period,
@@ -164,7 +148,7 @@ def _velocity(given: DesignOptions) -> int:
     model = read_velocity_model(given.model_file)
     with results("design", given.out, without_design(model, None)) as folder:
         found = design_velocity(
-            model, _limits(given), integrator=given.integrator, period=given.design_period
+            model, given.wanted.limits, integrator=given.integrator, period=given.design_period
         )
         view = velocity_view(found)
         view.write(folder)
@@ -186,25 +170,14 @@ def _refuse_beside(given: DesignOptions) -> None:
         )
 
 
-def _limits(given: DesignOptions) -> "Limits":
-    from workbench.steps.loop_figures import Limits
-
-    return Limits(
-        given.modulus, given.delay, given.standstill, given.tracking, given.overshoot, given.force
-    )
-
-
 def _robust(given: DesignOptions, model: "Model") -> int:
     from workbench.documents.design_file import design_document
     from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
     from workbench.report.view import show
-    from workbench.steps.robust.robust import RobustAsked
 
     drift = _drift(given.where, given.machine) if given.machine else None
-    wanted = RobustAsked(
-        given.draws, given.probability, _limits(given), given.staircase, drift, given.seed
-    )
+    wanted = replace(given.wanted, drift=drift)
     with results("design", given.out, without_design(model, None)) as folder:
         found = robust_design(model, wanted, **_asked(given))
         found.view.write(folder)

@@ -1,7 +1,6 @@
 """`workbench identify`: logs -> model.json and report.html."""
 
 from pathlib import Path
-from typing import Literal
 
 import click
 
@@ -9,6 +8,7 @@ from workbench import options
 from workbench.course import running
 from workbench.output import results
 from workbench.signature import option
+from workbench.steps.asked import Options
 from workbench.steps.stages import IDENTIFY_STAGES
 
 
@@ -17,18 +17,9 @@ from workbench.steps.stages import IDENTIFY_STAGES
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
 def command(
+    wanted: Options,
     logs: tuple[str, ...] = options.LOGS_ARGUMENT,
     card: str = options.CARD_OPTION,
-    drive: Literal["force", "command"] | None = option(
-        "What drives the fitted run.  [default: the command where it explains the force]"
-    ),
-    orders: str | None = option(
-        "Orders of the ARX plant.  [default: chosen]", metavar="NA,NB,NK"
-    ),
-    design_period: float | None = option(
-        "Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
-        type=options.POSITIVE, metavar="S",
-    ),
     budget: float = options.BUDGET_OPTION,
     posterior: bool = option("Sample the posterior of the parameters too."),
     seed: int = options.SEED_OPTION,
@@ -43,15 +34,13 @@ def command(
     from workbench.logs.sources import card_of_velocity
     from workbench.report.next_steps import after_identify, check_of_refused
     from workbench.report.view import show
-    from workbench.steps.identify import Options
 
     if card_of_velocity(card):
         options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
         _velocity(logs, card, budget, out)
         return
-    if drive == "force":
+    if wanted.drive == "force":
         _refuse_force_of_motor(card)
-    wanted = Options(drive=drive, orders=options.parse_orders(orders), design_period=design_period)
     with results("identify", out, check_of_refused(logs, card)) as folder:
         found = identify(logs, card, options=wanted, posterior=posterior, budget=budget, seed=seed)
         found.view.write(folder)

@@ -44,7 +44,7 @@ def list_machines(where: str | None = options.REGISTRY_OPTION) -> None:
     """List the machines, the active version of each, and how many logs wait."""
     from workbench.registry.views import list_view
 
-    with _open(where) as found:
+    with opened(where) as found:
         machines = found.machines()
     emit({"machines": machines}, lambda: list_view(machines))
 
@@ -63,7 +63,7 @@ def show(
     from workbench.registry.queue import Queue
     from workbench.registry.views import machine_view
 
-    with _open(where) as found:
+    with opened(where) as found:
         state, decisions = found.machine(machine), found.decisions(machine)
         outcomes = Queue(found.database).outcomes(machine)
         accepted = found.accepted_version(machine)
@@ -93,7 +93,7 @@ def diff(
     from workbench.registry.errors import BadRegistry
     from workbench.registry.views import difference_view
 
-    with _open(where) as found:
+    with opened(where) as found:
         after = _version(found, machine, second)
         if first is None and after.number == 1:
             raise BadRegistry(
@@ -142,7 +142,7 @@ def add(
         None if validation is None else read_raw(validation, "validation/1"),
     )
     who, now = by or getpass.getuser(), datetime.now(UTC)
-    with _open(where, create=True) as found:
+    with opened(where, create=True) as found:
         version = found.add(machine, candidate, reason=reason, by=who, now=now)
         current = found.active_version(machine)
         if promote and (current is None or current.number != version.number):
@@ -167,7 +167,7 @@ def promote(
     The limits of `axis-test` by the machine's own logs begin anew with its model.
     """
     who, now = by or getpass.getuser(), datetime.now(UTC)
-    with _open(where) as found:
+    with opened(where) as found:
         decision = found.promote(machine, number, reason=reason, by=who, now=now)
     emit(decision, lambda: _said(decision))
 
@@ -181,7 +181,7 @@ def rollback(
 ) -> None:
     """Activate the version before the present one; again goes one further back."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
-    with _open(where) as found:
+    with opened(where) as found:
         decision = found.rollback(machine, reason=reason, by=who, now=now)
     emit(decision, lambda: _said(decision))
 
@@ -203,13 +203,14 @@ def retry(
     from workbench.registry.queue import Queue
 
     who, now = by or getpass.getuser(), datetime.now(UTC)
-    with _open(where) as found:
+    with opened(where) as found:
         files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
     said = f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none excluded"
     emit({"machine": machine, "logs": files}, lambda: said)
 
 
-def _open(where: str | None, *, create: bool = False) -> "Registry":
+def opened(where: str | None, *, create: bool = False) -> "Registry":
+    """The registry that --registry names; create: make it where it is not there."""
     from workbench.registry.database import location
     from workbench.registry.store import Registry
 

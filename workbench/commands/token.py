@@ -2,17 +2,15 @@
 
 import getpass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
 from workbench import options
+from workbench.commands.registry import opened
 from workbench.ending import StatusGroup
 from workbench.output import emit
 from workbench.signature import argument, option
-
-if TYPE_CHECKING:
-    from workbench.registry.store import Registry
 
 
 @click.group(cls=StatusGroup, epilog="Example: workbench token add anna --role change")
@@ -34,7 +32,7 @@ def add_token(
     """Make a token and show it, this once."""
     from workbench.registry.access import Access
 
-    with _open(where) as found:
+    with opened(where, create=True) as found:
         secret = Access(found.database).add(
             name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
         )
@@ -49,7 +47,7 @@ def list_tokens(where: str | None = options.REGISTRY_OPTION) -> None:
     from workbench.registry.views import moment
     from workbench.screen import screen, tabled
 
-    with _open(where) as found:
+    with opened(where, create=True) as found:
         tokens = Access(found.database).tokens()
     rows = [
         (one.name, one.role, one.made_by, moment(one.at),
@@ -70,13 +68,6 @@ def revoke_token(
     """Take a token no more; its name stays taken."""
     from workbench.registry.access import Access
 
-    with _open(where) as found:
+    with opened(where, create=True) as found:
         Access(found.database).revoke(name, by=by or getpass.getuser(), now=datetime.now(UTC))
     emit({"name": name, "revoked": True}, lambda: f"{name}: revoked")
-
-
-def _open(where: str | None) -> "Registry":
-    from workbench.registry.database import location
-    from workbench.registry.store import Registry
-
-    return Registry(location(where))

@@ -1,14 +1,11 @@
 """`workbench validate`: a design on its model in simulation -> validation.json and report.html."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from workbench import options
 from workbench.output import results
 from workbench.signature import argument, option
-
-if TYPE_CHECKING:
-    from workbench.steps.loop_figures import Limits
+from workbench.steps.asked import Limits
 
 
 @options.command(
@@ -16,17 +13,12 @@ if TYPE_CHECKING:
     epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
 )
 def command(
+    limits: Limits,
     model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path = argument("DESIGN"),
     plant_file: Path | None = option(
         "Another machine on which the design has to work too.", "--plant", metavar="MODEL"
     ),
-    modulus: float = options.MODULUS_OPTION,
-    delay: float = options.DELAY_OPTION,
-    standstill: float = options.STANDSTILL_OPTION,
-    tracking: float = options.TRACKING_OPTION,
-    overshoot: float = options.OVERSHOOT_OPTION,
-    force: float = options.FORCE_OPTION,
     seed: int = options.SEED_OPTION,
     card: str | None = options.PRESENT_CARD_OPTION,
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
@@ -44,10 +36,8 @@ def command(
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate
     from workbench.report.view import show
-    from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
 
-    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")
         return _velocity((model_file, design_file, plant_file), limits, seed, out)
@@ -65,7 +55,7 @@ def command(
 
 
 def _velocity(
-    files: tuple[Path, Path, Path | None], limits: "Limits", seed: int, out: Path | None
+    files: tuple[Path, Path, Path | None], limits: Limits, seed: int, out: Path | None
 ) -> int:
     """The same of a rig whose velocity follows the command; files: model, design, plant."""
     import numpy as np

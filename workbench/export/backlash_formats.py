@@ -1,5 +1,7 @@
 """The play of an axis in the formats of controls, each by a template of its own."""
 
+from functools import partial
+
 import numpy as np
 
 from identification.errors import BadModel
@@ -9,7 +11,8 @@ from workbench.export.compensation import Compensation, Content, Format
 
 CNC_UNITS = {False: (1e7, "0.0001 mm"), True: (1.8e6 / np.pi, "0.0001 deg")}  # P-AXIS-00103
 CNC_LARGEST = 32767  # SGN16
-AXIS_UNITS = "(the axis's units are to be these)"
+AXIS_UNITS = "{unit} (the axis's units are to be these)"
+JOINT_UNITS = "{unit} (LINEAR_UNITS or ANGULAR_UNITS are to be these)"
 QUADRANTS_LEFT_OUT = (
     "sinumerik: quadrant error compensation (MD32520) is left out: it is a speed impulse, and how"
     " large depends on the speed controller, which no model has; the circularity test finds it"
@@ -39,35 +42,22 @@ def backlash_csv(what: Compensation) -> Content:
     return Content(f"{unit} of the axis", values={"unit": unit, **shown})
 
 
-def sinumerik(what: Compensation) -> Content:
-    """MD32450 of the axis."""
+def of_axis(
+    what: Compensation, units: str, said: tuple[str, ...] = (), only_before: str = ""
+) -> Content:
+    """The play in a control that takes it in the axis's units, which are called so.
+
+    only_before: the control's name where it knows play before its encoder alone.
+    """
     width, unit, factor = _signed(what)
-    values = _values(what, unit, factor * width)
-    return Content(unit, values=values, said=(QUADRANTS_LEFT_OUT,))
-
-
-def codesys(what: Compensation) -> Content:
-    """The input fBacklash of SMC_BacklashCompensation: half of the play, as it covers it twice."""
-    width, unit, factor = _before(what, "SMC_BacklashCompensation of CODESYS")
+    if only_before and width < 0:
+        raise BadModel(f"{only_before} {ONLY_BEFORE}")
     values = {
         **_values(what, unit, factor * width),
         "half": f"{factor * width / 2:.9g}",
-        "width": f"{number(factor * width, 6)} {unit}",
+        "shown": f"{number(factor * width, 6)} {unit}",
     }
-    return Content(f"{unit} {AXIS_UNITS}", values=values, said=(HALF_OF_THE_PLAY,))
-
-
-def linuxcnc_ini(what: Compensation) -> Content:
-    """BACKLASH of a joint in LinuxCNC's INI file."""
-    width, unit, factor = _before(what, "BACKLASH of LinuxCNC")
-    units = f"{unit} (LINEAR_UNITS or ANGULAR_UNITS are to be these)"
-    return Content(units, values=_values(what, unit, factor * width))
-
-
-def twincat_nc(what: Compensation) -> Content:
-    """The input Backlash of MC_BacklashCompensation."""
-    width, unit, factor = _signed(what)
-    return Content(f"{unit} {AXIS_UNITS}", values=_values(what, unit, factor * width))
+    return Content(units.format(unit=unit), values=values, said=said)
 
 
 def twincat_cnc_play(what: Compensation) -> Content:
@@ -87,15 +77,19 @@ def twincat_cnc_play(what: Compensation) -> Content:
 BACKLASH = (
     Format("backlash.csv", "backlash", "", "any program that reads CSV", backlash_csv),
     Format("twincat_nc_backlash.st", "backlash", "twincat",
-           "TwinCAT NC: a program of the axis, Tc2_MC2", twincat_nc),
+           "TwinCAT NC: a program of the axis, Tc2_MC2", partial(of_axis, units=AXIS_UNITS)),
     Format("twincat_cnc_backlash.lis", "backlash", "twincat",
            "TwinCAT CNC: the axis's parameter list, P-AXIS-00103", twincat_cnc_play),
     Format("codesys_backlash.st", "backlash", "codesys",
-           "CODESYS SoftMotion: a program of the axis's task", codesys),
+           "CODESYS SoftMotion: a program of the axis's task",
+           partial(of_axis, units=AXIS_UNITS, said=(HALF_OF_THE_PLAY,),
+                   only_before="SMC_BacklashCompensation of CODESYS")),
     Format("linuxcnc_backlash.ini", "backlash", "linuxcnc",
-           "LinuxCNC: the INI file, section of the joint", linuxcnc_ini),
+           "LinuxCNC: the INI file, section of the joint",
+           partial(of_axis, units=JOINT_UNITS, only_before="BACKLASH of LinuxCNC")),
     Format("sinumerik_backlash.mpf", "backlash", "sinumerik",
-           "SINUMERIK: machine data of the axis, MD32450 (AX1 is to be your axis)", sinumerik),
+           "SINUMERIK: machine data of the axis, MD32450 (AX1 is to be your axis)",
+           partial(of_axis, units="{unit}", said=(QUADRANTS_LEFT_OUT,))),
 )  # fmt: skip
 
 
@@ -121,14 +115,6 @@ def _signed(what: Compensation) -> tuple[float, str, float]:
         raise BadModel(f"backlash in a control's format: {WHICH_SIDE}")
     unit, factor = _length(what)
     return (width if what.asked.encoder == "motor" else -width), unit, factor
-
-
-def _before(what: Compensation, who: str) -> tuple[float, str, float]:
-    """As `_signed`, of a control that knows play behind its encoder alone."""
-    width, unit, factor = _signed(what)
-    if width < 0:
-        raise BadModel(f"{who} {ONLY_BEFORE}")
-    return width, unit, factor
 
 
 def _values(what: Compensation, unit: str, width: float) -> dict[str, str]:

@@ -2,15 +2,12 @@
 
 import textwrap
 from collections.abc import Iterable, Sequence
-from functools import cache
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from design.feed_forward import FeedForward
 from workbench.export.exported import Exported
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from workbench.output import templates
 
 WIDEST = 96  # characters of a line of numbers
 KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
@@ -18,21 +15,8 @@ KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
 
 def filled(template: str, *, markup: bool = False, **values: Any) -> str:
     """The template `<template>.j2` filled in; with `markup`, values are escaped for XML."""
-    return _environment(markup).get_template(f"{template}.j2").render(**values)
-
-
-@cache
-def _environment(markup: bool) -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("workbench.export"),
-        autoescape=markup,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    found = templates("workbench.export", escaped=markup, keep_trailing_newline=True)
+    return found.get_template(f"{template}.j2").render(**values)
 
 
 def rows(values: Iterable[str]) -> list[str]:

@@ -5,10 +5,11 @@ from datetime import UTC, datetime
 from functools import cache
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup, escape
 
 from workbench.cards.readable import number as written
+from workbench.output import templates
 from workbench.steps.axis_limits import LEAST_ROOM
 from workbench.verdicts import in_words
 
@@ -32,13 +33,7 @@ def part(name: str) -> str:
 @cache
 def environment() -> Environment:
     """The templates, with the filters that they use."""
-    out = Environment(
-        loader=PackageLoader("workbench.page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    out = templates("workbench.page")
     out.filters.update(
         ago=ago, moment=moment, number=number, percent=percent, part=part, spark=spark,
         words=lambda state: STATE_WORDS.get(state) or in_words(state), megabytes=megabytes,

@@ -205,12 +205,9 @@ def history(logs: Sequence[TestedLog]) -> dict[str, list[tuple[float, float]]]:
     """Values of the logs by quantity, each with the moment at which its log was recorded."""
     out: dict[str, list[tuple[float, float]]] = {}
     for one in logs:
-        found = {str(each["name"]): float(each["after"]) for each in one.parameters}
-        if "F_cp" in found and "F_cn" in found and "constant_force.F_0" not in found:
-            found["constant_force.F_0"] = 0.5 * (found["F_cn"] - found["F_cp"])
+        found = {name: value for name, (_, value, *_) in by_quantity(one.parameters).items()}
+        if "F_cp" in found and "F_cn" in found:
+            found.setdefault("constant_force", 0.5 * (found["F_cn"] - found["F_cp"]))
         for name, value in found.items():
-            name = NAMED.get(name, name)
-            if name in MEANING_OF:
-                size = abs(value) if name == "F_sn" else value
-                out.setdefault(name, []).append((one.recorded_at, size))
+            out.setdefault(name, []).append((one.recorded_at, value))
     return out

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from workbench.report.chart import Chart, Colour, Line, Panel
+from workbench.report.chart import Chart, Colour, Line, Panel, thinned_together
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,16 +74,8 @@ def line(axes: "Axes", x: Array, y: Array, **style: Any) -> None:
 
 def thinned(x: Array, y: Array, points: int = LINE_POINTS) -> tuple[Array, Array]:
     """Lowest and highest sample of equal blocks, in the order of time."""
-    n = len(x)
-    if n <= points:
-        return x, y
-    size = int(np.ceil(2 * n / points))
-    count = n // size
-    blocks = y[: count * size].reshape(count, size)
-    first = np.arange(count) * size
-    ends = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)]), axis=0) + first
-    index = np.unique(np.concatenate([[0], ends.T.ravel(), [n - 1]]))
-    return x[index], y[index]
+    places, (found,) = thinned_together(x, [y], points)
+    return places, found
 
 
 def evenly_spread(count: int, most: int = SCATTER) -> IntArray:

@@ -4,6 +4,8 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from workbench.output import templates
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -86,14 +88,6 @@ def with_symbols(text: str) -> Any:
 
 @cache
 def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("workbench.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("workbench.report")
     environment.filters["symbols"] = with_symbols
     return environment

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import isnan
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from identification.velocity.record import RUN_IN
 from identification.velocity.rivals import STRUCTURES, is_noise
@@ -168,12 +169,13 @@ def _rivals(found: VelocityTraced) -> Part:
 
 def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
     """prediction.csv: time [s], measured and simulated position [m (rad)]; empty: no value."""
-    lines = ["t,position_measured,position_simulated"]
-    for one in runs:
-        columns = (one.t, one.measured, one.simulated)
-        rows = zip(*(x.tolist() for x in columns), strict=True)
-        lines += [",".join("" if isnan(x) else f"{x:.9g}" for x in row) for row in rows]
-    return "\n".join(lines) + "\n"
+    import pandas as pd
+
+    names = {"t": "t", "position_measured": "measured", "position_simulated": "simulated"}
+    columns = {
+        name: np.concatenate([getattr(one, key) for one in runs]) for name, key in names.items()
+    }
+    return str(pd.DataFrame(columns).to_csv(index=False, float_format="%.9g", lineterminator="\n"))
 
 
 def velocity_prediction_view(

@@ -7,7 +7,7 @@ between, since that is what moves the body. A log from a closed loop is fitted d
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +22,7 @@ from identification.estimation.fit import fit_plant
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
-from identification.model.estimates import Drive, Estimate, KarnoppFit
+from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.inverse_model import ForceError, Smoothing, force_error
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, actuator_units
@@ -42,9 +42,10 @@ from workbench.documents.model import (
 )
 from workbench.documents.reading import versions
 from workbench.logs.sources import Source
+from workbench.steps.asked import Options as Options
+from workbench.steps.asked import Orders
 from workbench.steps.drift import active_model
 
-Orders = tuple[int, int, int]
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
 FAST = 0.99
@@ -53,15 +54,6 @@ FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to identify; orders (na, nb, nk) and period [s] of the ARX plant, None: chosen."""
-
-    drive: Drive | None = None
-    orders: Orders | None = None
-    design_period: float | None = None
 
 
 def identify(

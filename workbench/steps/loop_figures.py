@@ -23,9 +23,10 @@ from workbench.documents.design import (
     margin_values,
 )
 from workbench.documents.model import Model
+from workbench.steps.asked import Limits as Limits
 from workbench.steps.closed_loop import DrivenLoop, driven_loop, limit_on, present_loop, run_driven
 from workbench.steps.linear_loop import plants_of
-from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
+from workbench.steps.loop_motion import JUDGED_SHARE, LoopMotion, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -42,54 +43,22 @@ PRESENT = "present"  # the controller that the machine has now
 ALMOST = 0.9  # of a limit, from which a loop is reported to come near it
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a loop must keep to pass.
+@dataclass(frozen=True, kw_only=True)
+class LoopFigures(LoopMotion):
+    """A controller on a plant: its motion, and what there is beside; force in N.
 
-    Margins; error at standstill and overshoot relative to the step; error along the smooth
-    reference relative to its amplitude; largest force relative to that in the machine's logs.
+    force_seen: the largest in the machine's logs; force_limit: what a motor gives at the limit of
+    its command. command_noise: standard deviation of the command at rest, None where the machine
+    takes a force. margins is None where the linear loop is unstable.
     """
 
-    modulus: float = 0.5
-    delay: float = 2.0
-    standstill: float = 0.05
-    tracking: float = 0.2
-    overshoot: float = 0.1
-    force: float = 1.2
-
-
-@dataclass(frozen=True)
-class LoopFigures:
-    """A controller on a plant: errors in m, relative ones to step and amplitude; force in N.
-
-    standstill: largest error in the last half of a dwell. overshoot: relative to the step.
-    settling: longest time [s] until a step stays within 5 %. force_seen: the largest in the
-    machine's logs; force_limit: what a motor gives at the limit of its command. command_peak,
-    command_noise: largest command and its standard deviation at rest, None where the machine takes
-    a force; limited: share of the time at its limit, along steps and smooth reference. margins is
-    None where the linear loop is unstable.
-    """
-
-    stable: bool
     margins: MarginValues | None
-    step: float
-    standstill: float
-    standstill_relative: float
-    overshoot: float
-    settling: float
-    step_rms: float
-    smooth_rms: float
-    smooth_relative: float
     force_rms: float
-    force_peak: float
     force_seen: float
-    command_peak: float | None
     command_limit: float | None
     command_noise: float | None
-    limit_cycle: LimitCycle | None
     missed: tuple[str, ...]
     command_unit: str = "V"
-    limited: float = 0.0
     force_limit: float | None = None
 
     @property
@@ -236,27 +205,17 @@ def _figures(
     driven = drive is not None
     limit = limit_on(machine, loop) if driven else None
     motion = loop_motion(run.step, run.smooth, machine.fit.noise_y, limit)
+    if not driven:
+        motion = replace(motion, command_peak=None)
     found = LoopFigures(
-        stable=motion.stable,
+        **vars(motion),
         margins=_linear_margins(machine, loop, arx),
-        step=motion.step,
-        standstill=motion.standstill,
-        standstill_relative=motion.standstill / motion.step,
-        overshoot=motion.overshoot,
-        settling=motion.settling,
-        step_rms=motion.step_rms,
-        smooth_rms=motion.smooth_rms,
-        smooth_relative=motion.smooth_rms / motion.amplitude,
         force_rms=float(np.sqrt(np.mean(run.step.F**2))),
-        force_peak=motion.force_peak,
         force_seen=machine.force_peak,
-        command_peak=motion.command_peak if driven else None,
         command_limit=limit,
         command_noise=float(np.std(run.rest.u[len(run.rest.u) // 2 :])) if driven else None,
-        limit_cycle=motion.limit_cycle,
         missed=(),
         command_unit=machine.rig.command_unit,
-        limited=motion.limited,
         force_limit=abs(drive.k_a) * limit if isinstance(drive, Motor) and limit else None,
     )
     return replace(found, missed=tuple(_missed(found, limits, machine)))

@@ -61,26 +61,29 @@ SETTLING_BAND = 0.05  # of a step, in which a settled position stays
 ESCAPED = 10.0  # times the step
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LoopMotion:
-    """Of a run along steps of height `step` [m] and a smooth reference of `amplitude` [m].
+    """Of a run along steps of height `step` [m] and a smooth reference; relative errors are to the
+    step and to the reference's amplitude.
 
     standstill: largest error [m] in the last half of a dwell, infinite where the loop runs away
     (not `stable`). overshoot: relative to the step. settling: longest time [s] until a step stays
     within 5 %. step_rms, smooth_rms: errors [m]. force_peak [N], command_peak: the largest of both
-    runs; limited: share of their samples with the command at its limit.
+    runs, this None where the machine takes a force; limited: share of their samples with the
+    command at its limit.
     """
 
     stable: bool
     step: float
-    amplitude: float
     standstill: float
+    standstill_relative: float
     overshoot: float
     settling: float
     step_rms: float
     smooth_rms: float
+    smooth_relative: float
     force_peak: float
-    command_peak: float
+    command_peak: float | None
     limited: float
     limit_cycle: LimitCycle | None
 
@@ -117,15 +120,18 @@ def loop_motion(
     ]
     late = [np.flatnonzero(np.abs(error) > SETTLING_BAND * abs(height)) for height, error in after]
     u = np.concatenate([np.abs(run.u) for run in runs])
+    standstill = float(np.max(np.abs(off[worst]))) if stable else np.inf
+    smooth_rms = float(np.sqrt(np.mean((smooth.r - smooth.y) ** 2)))
     return LoopMotion(
         stable=stable,
         step=step,
-        amplitude=amplitude,
-        standstill=float(np.max(np.abs(off[worst]))) if stable else np.inf,
+        standstill=standstill,
+        standstill_relative=standstill / step,
         overshoot=max(float(np.max(error / height)) for height, error in after),
         settling=h * max(float(one[-1] + 1) if one.size else 0.0 for one in late),
         step_rms=float(np.sqrt(np.mean(off**2))),
-        smooth_rms=float(np.sqrt(np.mean((smooth.r - smooth.y) ** 2))),
+        smooth_rms=smooth_rms,
+        smooth_relative=smooth_rms / amplitude,
         force_peak=max(float(np.max(np.abs(each.F))) for each in runs),
         command_peak=max(float(np.max(np.abs(each.u))) for each in runs),
         limited=0.0 if command_limit is None else float(np.mean(u >= command_limit)),

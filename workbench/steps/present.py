@@ -1,6 +1,8 @@
 """The controller of a card as the law that its drive runs."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +13,17 @@ from design.rst import RST
 from identification.errors import BadCard, BadSpecification
 from identification.log import Rig
 from workbench.cards.card import Card, load_card
-from workbench.cards.controller import CardController
+from workbench.cards.controller import CardController, Kind
 from workbench.cards.parameter_units import shown
 from workbench.documents.drive import ForceLoop, Present, PresentFile, present_file
 from workbench.documents.model import Model
 from workbench.logs.sources import card_path
+
+LAWS: Mapping[Kind, Callable[..., RST]] = {
+    "PD": pd_to_rst,
+    "PID": pid_to_rst,
+    "P-PI": cascade_to_rst,
+}
 
 
 def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
@@ -64,7 +72,8 @@ def present(given: CardController, rig: Rig, h: float) -> Present:
         if not rig.force_per_command:
             raise BadCard('output = "force" needs the force_per_command of the motor')
         output, per = "command", rig.force_per_command
-    law = drive_law(_polynomials(given, h), given.forget, per)
+    gains = {name: one.value or 0.0 for name, one in given.gains.items()}
+    law = drive_law(rst_of(given.kind, {**gains, **given.polynomials}, h), given.forget, per)
     force = None
     if given.force is not None:
         fast = given.force.period or h
@@ -74,14 +83,9 @@ def present(given: CardController, rig: Rig, h: float) -> Present:
     return Present(given.kind, given.gains, output, law, force, given.rate)
 
 
-def _polynomials(given: CardController, h: float) -> RST:
-    g = {name: one.value or 0.0 for name, one in given.gains.items()}
-    match given.kind:
-        case "PD":
-            return pd_to_rst(g["k_d"], g["T_d"], g["eps"], h)
-        case "PID":
-            return pid_to_rst(g["k_R"], g["T_i"], g["T_d"], g["eps"], h, b=g["b"], c=g["c"])
-        case "P-PI":
-            return cascade_to_rst(g["k_v"], g["k_p"], g["T_i"], h, eps=g["eps"], v_ff=g["v_ff"])
-    R, S, T = (np.array(given.polynomials[key]) for key in "RST")
-    return RST(R, S, T, h)
+def rst_of(kind: Kind, numbers: Mapping[str, Any], h: float) -> RST:
+    """The law of a kind every h [s], by its gains in SI, or by an RST's coefficients."""
+    if kind == "RST":
+        R, S, T = (np.array(numbers[key]) for key in "RST")
+        return RST(R, S, T, h)
+    return LAWS[kind](**numbers, h=h)

@@ -10,7 +10,6 @@ from design.effect_loop import simulate_effect_loop
 from design.filters import filters_at
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
-from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from design.servo import Compensation, simulate_servo
 from identification.arrays import Array
@@ -21,7 +20,6 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, actuator_units
 from identification.signals.excitation import reference_signal
 from identification.simulation.free_run import FreeRun, free_run
-from workbench.cards import recipe as recipes
 from workbench.cards.card import Card
 from workbench.cards.controller import CardController
 from workbench.cards.effect_values import exact
@@ -33,7 +31,7 @@ from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop
-from workbench.steps.present import present
+from workbench.steps.present import present, rst_of
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 CONVERGED_CHANGE = 1e-9  # relative change of the force from which it has settled
@@ -252,13 +250,8 @@ def _exact(value: float, unit: str) -> dict[str, Any]:
 def _position(recipe: Recipe) -> RST:
     """The recipe's position controller as RST at the recipe's period; volts for a motor."""
     assert recipe.loop is not None and recipe.loop.position is not None
-    match recipe.loop.position:
-        case recipes.RecipePD() as pd:
-            found = pd_to_rst(pd.k_d, pd.T_d, pd.eps, recipe.h)
-        case recipes.RecipePID() as pid:
-            found = pid_to_rst(pid.k_R, pid.T_i, pid.T_d, pid.eps, recipe.h)
-        case recipes.RecipeRST() as rst:
-            found = RST(np.array(rst.R), np.array(rst.S), np.array(rst.T), recipe.h)
+    position = recipe.loop.position
+    found = rst_of(position.kind, position.model_dump(exclude={"kind"}), recipe.h)
     actuator = recipe.plant.actuator
     if isinstance(actuator, Motor):
         return RST(found.R / actuator.k_a, found.S, found.T / actuator.k_a, recipe.h)

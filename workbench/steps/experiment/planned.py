@@ -19,30 +19,14 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
 from workbench.documents.reading import plain, read_raw
+from workbench.steps.asked import Wanted as Wanted
 
 Criterion = Literal["D", "T"]
 FASTER_THAN_LOGS = (
     1.5  # times the speed of the logs, that an experiment goes where no limit is given
 )
 STRONGER_THAN_LOGS = 1.2  # the same of the force
-USUAL_SECONDS = 20.0
 SAID_EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked: parameters to be identified (none: all), limits where they are not those of
-    card and logs, seed. rivals: keys of effects of which one is at work, which the run is to
-    discriminate."""
-
-    parameters: tuple[str, ...] = ()
-    stroke: tuple[float, float] | None = None
-    speed: float | None = None
-    force: float | None = None
-    command: float | None = None
-    seconds: float = USUAL_SECONDS
-    seed: int = 0
-    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

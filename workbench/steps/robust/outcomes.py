@@ -239,11 +239,11 @@ def _on_one(
         return (np.inf,) * 8
     off = (slow.y - slow.r)[len(slow.r) // 2 :]
     return (
-        found.standstill / found.step,
-        found.smooth_rms / found.amplitude,
+        found.standstill_relative,
+        found.smooth_relative,
         found.overshoot,
         found.force_peak / model.force_peak if model.force_peak > 0.0 else 0.0,
-        0.0 if limit is None else found.command_peak / limit,
+        0.0 if limit is None else (found.command_peak or 0.0) / limit,
         0.0 if found.limit_cycle is None else found.limit_cycle.amplitude,
         float(np.ptp(off)),
         found.settling,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,11 @@ from identification.progress import Progress, quiet
 from workbench.documents.design import Design, From, Recommendation, Recommended
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
+from workbench.steps.asked import RobustAsked as RobustAsked
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
 from workbench.steps.lacking import lacking
-from workbench.steps.loop_figures import PRESENT, Limits, references
+from workbench.steps.loop_figures import PRESENT, references
 from workbench.steps.robust.outcomes import (
     MEASURES,
     DrawnMachines,
@@ -39,23 +40,6 @@ ROBUST_STAGES = {
 MOST_BESIDE = 100  # machines on which the nominal and the present loop are shown
 ROBUST = "robust"
 NOMINAL = "nominal"  # the design that knows of no spread
-USUAL_DRAWS = 200
-USUAL_PROBABILITY = 0.95
-
-
-@dataclass(frozen=True)
-class RobustAsked:
-    """What is asked over the machines: so many drawn, on what share of them each limit has to hold.
-
-    staircase: largest on a slow ramp [m], None for any. drift: see `drift_found`.
-    """
-
-    draws: int = USUAL_DRAWS
-    probability: float = USUAL_PROBABILITY
-    limits: Limits = field(default_factory=Limits)
-    staircase: float | None = None
-    drift: Mapping[str, float] | None = None
-    seed: int = 0
 
 
 @dataclass(frozen=True)
