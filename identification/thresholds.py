@@ -47,5 +47,4 @@ COHERENCE_SURE = FOURFOLD / (1.0 + FOURFOLD)  # coherence of that
 # How many, how much a log has to show (nine_parameters.py, chapters.py, drives.py, drift.py).
 EVENTS_NEEDED = 3  # of a kind: breakaways, crossings, averages of a spectrum, points at a peak
 MANY_OF_A_KIND = 8  # windows of sliding in each direction; samples of one value, that are frozen
-PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
 SEEN = 0.08  # of a Coulomb level, beyond the margin that does not matter: the change that is seen

@@ -19,7 +19,6 @@ from dataclasses import replace
 import numpy as np
 
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.contradicted import CORRECTION_ROUNDS, Corrected
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
@@ -35,7 +34,6 @@ from identification.estimation.recorded_logs import (
     recorded_logs,
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
-from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.row_fit import rough
 from identification.estimation.run_or_equation import answered
 from identification.estimation.settling import settled
@@ -46,7 +44,6 @@ from identification.estimation.structure_fit import (
     searched,
 )
 from identification.estimation.surroundings import (
-    explains_most,
     surrounding_estimates,
     widened_friction,
 )
@@ -57,16 +54,13 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant
 from identification.model.surroundings import Surroundings
-from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, without_end
-from identification.signals.bad_samples import BadSamples
+from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.signals.check import are_steps, check_driven
 from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
-    AS_GOOD_AS_NONE,
     COMPLETE,
     HOPELESS,
     MATERIAL,
-    PLACES_EXCLUDED,
 )
 
 PRESCRIBED_WHY = "prescribed motion: inertia is negligible in the force"
@@ -156,77 +150,18 @@ def _fit(
     if prior is not None and prior.effects:
         fit = _with_effects(prior, recorded, report)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
-    near, left = None, Corrected.of_nothing(recorded)
+    near = None
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
-        left = left.by(near.plant, near.misfit)
-        if left.bad:
-            near = refit(near.plant, left.recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            fit = settled(near.plant, left.recorded, near.misfit, report)
-            return left.reported(fit, recorded)
-    left, found = _without_bad(left, begin, recorded)
+            fit = settled(near.plant, recorded, near.misfit, report)
+            return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
+    found = plain_structure(recorded, begin)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
-    fit = finished(found, left.recorded, settle, report, by=drive, quick=quick)
-    return left.reported(_with_actuator(fit, left.recorded), recorded)
-
-
-def _without_bad(
-    begun: Corrected, rng: np.random.Generator, given: RecordedLogs
-) -> tuple[Corrected, FittedStructure]:
-    """The logs without the samples that the plain plant contradicts, and that plant.
-
-    Searched where the plant follows the logs but for a few places; again from the plant without
-    what was found. A run that contradicts a log in more than a handful of places is a wrong model,
-    and so is one of which these are not most of what it left: nothing is excluded for it.
-    """
-    left, found = begun, plain_structure(begun.recorded, rng)
-    first = found
-    for seed in rng.spawn(CORRECTION_ROUNDS):
-        if found.imposed or given.halt.reached():
-            break
-        made = left.by(found.plant, found.misfit)
-        if made is not left:  # or the run is not at its minimum yet
-            found = over_long_runs(found, left.recorded)
-            made = left.by(found.plant, found.misfit)
-        if made is left:
-            break
-        if not are_few(made.bad, given.logs):
-            return begun, first
-        again = plain_structure(made.recorded, seed)
-        if again.misfit > max(found.misfit, COMPLETE):
-            break
-        left, found = made, again
-    return (left, found) if _explained(first.misfit, found.misfit) else (begun, first)
-
-
-def _explained(before: float, after: float) -> bool:
-    """Whether the samples left out were most of what a run left beyond noise (misfits): of a model
-    that lacks an effect any sample put on the run makes that less, and the log is not at fault."""
-    return after <= COMPLETE or explains_most(before - 1.0, after - 1.0)
-
-
-def over_long_runs(found: FittedStructure, recorded: RecordedLogs) -> FittedStructure:
-    """The plant at its minimum over runs as long as can be followed, where that leaves less."""
-    try:
-        near = refit(found.plant, recorded.logs, recorded.drive, prior={}, effort="long")
-    except Halted:
-        return found
-    return found if near.misfit > found.misfit else found.refined(near)
-
-
-def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
-    """Whether what runs contradict is so little of every log that it may be the log's fault."""
-    by_log: dict[str, list[int]] = {}
-    for one in bad:
-        by_log.setdefault(one.log, []).append(one.samples)
-    lengths = {one.log.name: len(one.log) for one in logs}
-    return all(
-        len(found) <= PLACES_EXCLUDED
-        and sum(found) <= max(PLACES_EXCLUDED, AS_GOOD_AS_NONE * lengths.get(name, 0))
-        for name, found in by_log.items()
-    )
+    fit = finished(found, recorded, settle, report, by=drive, quick=quick)
+    fit = _with_actuator(fit, recorded)
+    return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
 
 
 def finished(

@@ -21,7 +21,6 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadModel
-from identification.estimation.contradicted import CORRECTION_ROUNDS, Corrected
 from identification.estimation.gauss_newton import smooth_jacobian
 from identification.estimation.imposed_motion import force_fit
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
@@ -34,7 +33,7 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.run_errors import NOISE_LOSS, misfit
+from identification.estimation.windowed_run.run_errors import NOISE_LOSS
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     Freed,
@@ -88,10 +87,8 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
     recorded = recorded_logs(logs, rig, fit.drive)
     if fit.imposed:
         return _by_force(recorded)
-    plant, left = Plant(fit.friction, fit.actuator, fit.effects), Corrected.of_nothing(recorded)
-    for _ in range(CORRECTION_ROUNDS if fit.bad else 0):
-        left = left.by(plant, misfit(plant, left.recorded.logs, recorded.drive))
-    return _over_windows(fit, plant, left.recorded)
+    plant = Plant(fit.friction, fit.actuator, fit.effects)
+    return _over_windows(fit, plant, recorded)
 
 
 def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:

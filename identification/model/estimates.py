@@ -11,7 +11,6 @@ from identification.effects._base import Acting
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
-from identification.signals.bad_samples import BadSamples
 
 Drive = Literal["command", "force"]
 NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
@@ -74,7 +73,6 @@ class KarnoppFit:
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
     whole: whether its run follows the logs as long as a run by the command may be, and not from one
     window of 2 s to the next.
-    bad: samples of the logs that the run contradicts, which were excluded.
     command_period: time [s] after which the drive gives its next command, None where no log shows
     that it is sooner than the next sample. surroundings: what acts beside the applied force, which
     was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
@@ -97,7 +95,6 @@ class KarnoppFit:
     breakaways: tuple[int, int]
     remarks: tuple[str, ...]
     effects: tuple[Acting, ...] = ()
-    bad: tuple[BadSamples, ...] = ()
     command_period: float | None = None
     surroundings: Surroundings = NO_SURROUNDINGS
     left: tuple[float, float] | None = None

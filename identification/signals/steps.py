@@ -83,29 +83,26 @@ def line_weights(side: int) -> tuple[Array, Array]:
     return height, slope
 
 
-def steps_between(
-    x: Array, sides: tuple[int, ...] = LINE_SIDES, clear: float = CLEAR_OF_LINES
-) -> Array:  # fmt: skip
+def steps_between(x: Array) -> Array:
     """How much each sample steps beyond the motion around it, (n - 1,); 0 where that is a kink.
 
     The least of the heights between the lines of each number of samples, where all agree in sign.
-    clear: times what the lines leave of their samples, that it is at least.
     """
-    n, widest = len(x), sides[-1]
+    n, widest = len(x), LINE_SIDES[-1]
     least = np.full(n - 1, 0.0 if n < 2 * widest else np.inf)
     way = np.zeros(n - 1)
     bend = np.zeros(n - 1)
-    for side in sides:
+    for side in LINE_SIDES:
         height, slope = line_weights(side)
         here = slice(side - 1, n - side)
         found = np.correlate(x, height, mode="valid")
         least[here] = np.minimum(least[here], np.abs(found))
         way[here] += np.sign(found)
         bend[here] = np.maximum(bend[here], np.abs(np.correlate(x, slope, mode="valid")))
-    agreed = (np.abs(way) == len(sides)) & (least > BEND_SHARE * bend)
+    agreed = (np.abs(way) == len(LINE_SIDES)) & (least > BEND_SHARE * bend)
     agreed[: widest - 1] = agreed[n - widest :] = False
-    size = np.where(agreed, least, 0.0)
-    return np.asarray(np.sign(way) * np.where(size > clear * _roughness(x, widest), size, 0.0))
+    size = np.where(agreed & (least > CLEAR_OF_LINES * _roughness(x, widest)), least, 0.0)
+    return np.asarray(np.sign(way) * size)
 
 
 def _roughness(x: Array, side: int) -> Array:

@@ -12,7 +12,7 @@ from tests.test_lengths import ROOT, tree
 
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
-    "contradicted", "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
+    "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
     "regressed_plant", "residual_drift", "run_or_equation", "settling", "structure_fit",
     "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip
@@ -26,9 +26,8 @@ NO_NUMBERS = {
 ENOUGH = {
     "CURVE_ROWS", "FEWEST_COMPARED", "FEWEST_OF_DIRECTION", "FEWEST_ROWS", "FEWEST_RUNS",
     "FEWEST_SAMPLES", "FEWEST_WINDOWS", "FEWEST_WINDOWS_OF_A_TURN", "FEW_VALUES", "GRID_PLACES",
-    "LEAST_SD", "LEAST_SUMS", "LONGEST_SMALL", "MANY_ROWS", "OF_EQUATION",
-    "OUTLYING_ROW", "OVERLAPPING", "ROWS_IN_PERIOD", "RUN_SIDES", "SLIDES", "SLIDING_SAMPLES",
-    "SWINGS",
+    "LEAST_SD", "LEAST_SUMS", "MANY_ROWS", "OF_EQUATION", "OUTLYING_ROW", "OVERLAPPING",
+    "ROWS_IN_PERIOD", "SLIDES", "SLIDING_SAMPLES", "SWINGS",
 }  # fmt: skip
 # Where a search begins, what it tries and when it ends.
 STEER = {
@@ -37,11 +36,10 @@ STEER = {
 }  # fmt: skip
 # What still decides outside of `thresholds`.
 ELSEWHERE = {
-    "BENT", "BRAKES", "BY_CHANCE", "INERTIA_SHARE", "KICK_FROM", "KICK_GAINS",
-    "MOST_EXPLAINED", "MOST_SPIKES", "RIGID_CONTACT",
-    "SECOND_SIGNAL", "SHIFT", "SIGNAL_SHOWN", "SMALL_TERM",
+    "BRAKES", "BY_CHANCE", "INERTIA_SHARE", "RIGID_CONTACT",
+    "SECOND_SIGNAL", "SHIFT", "SMALL_TERM",
 }  # fmt: skip
-LITERALS = {0.5, 1e-300, 3, 4, 50}  # halves, rows of a statistic, and what is not to be divided by
+LITERALS = {0.5, 1e-300, 3, 50}  # halves, rows of a statistic, and what is not to be divided by
 ARGUMENTS = {0.01, 10.0}  # bounds of what `DriftSettings` may be given
 
 

@@ -25,10 +25,9 @@ from identification.drift.single_log import detectable_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.errors import BadSpecification
-from identification.estimation import contradicted
 from identification.estimation.axis_equation import slides_enough
 from identification.estimation.estimates import Events, estimates
-from identification.estimation.fit import are_few, leaves_much
+from identification.estimation.fit import leaves_much
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.imposed_motion import is_unexplained
 from identification.estimation.latent_force import rubs
@@ -68,7 +67,6 @@ from identification.frequency.stretches import bands
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_random_walk import shows
 from identification.signals.frozen import frozen
@@ -532,27 +530,6 @@ def test_fault_from() -> None:
     assert np.any(small_spikes(smooth(13.0, 2000, 1)))
 
 
-def rest(size: float, length: int) -> Array:
-    """Errors of a run that follows, off by this much for a while."""
-    r = np.random.default_rng(2).standard_normal(2000)
-    r[1000 : 1000 + length] += size
-    return r
-
-
-STEADY = np.ones(2000)  # a clock that does not jitter
-
-
-def test_fault_from_a_run() -> None:
-    """What stays off a run by a few deviations has jumped; a single error of so many deviations is
-    the sensor's."""
-    assert not len(contradicted._jumps(rest(4.5, 1000), BEGUN))
-    assert len(contradicted._jumps(rest(7.5, 1000), BEGUN))
-    small, large = rest(6.0, 1), rest(13.0, 1)
-    assert not np.any(contradicted._without_spikes(small, small, STEADY)[1])
-    assert np.any(contradicted._without_spikes(large, large, STEADY)[1])
-    assert not np.any(contradicted._without_spikes(large, rest(0.0, 1), STEADY)[1])
-
-
 def test_many_of_a_kind_in_a_row() -> None:
     """A value that a noisy signal repeats so many times stands still."""
 
@@ -593,30 +570,6 @@ def test_material_beyond_friction() -> None:
     """By so much of one Coulomb level the other is below 0 where a weight is more than both."""
     assert not larger_than_friction(30.0, -0.008 * 30.0)
     assert larger_than_friction(-0.0125 * 30.0, 30.0)
-
-
-def contradicted_at(*lengths: int) -> list[BadSamples]:
-    return [
-        BadSamples("a", "u", "spike", float(k), float(k), length, None, "interpolated")
-        for k, length in enumerate(lengths)
-    ]
-
-
-def test_places_excluded() -> None:
-    """A run that contradicts a log in more places than these is a wrong model."""
-    logs = [seen(made(3))]
-    logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
-    assert are_few(contradicted_at(1, 1, 1, 1, 1), logs)
-    assert not are_few(contradicted_at(1, 1, 1, 1, 1, 1), logs)
-
-
-def test_as_good_as_none_of_a_log() -> None:
-    """Nor is more of a log than this share excluded for it."""
-    logs = [seen(made(3))]
-    logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
-    assert len(logs[0].log) == 10_000
-    assert are_few(contradicted_at(8), logs)
-    assert not are_few(contradicted_at(12), logs)
 
 
 def test_half_a_turn() -> None:

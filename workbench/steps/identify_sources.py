@@ -70,8 +70,9 @@ def identify_sources(
         raise NotIdentifiable("; ".join([str(error), *said])) from error
     gate = identifiability_of_runs(logs, sources.rig, options.drive, fit=fit)
     now = present_of_card(sources.card, sources.rig, model.period)
-    bad = (*sources.bad, *fit.bad)
-    model = replace(model, bad_samples=bad, controller=now, identifiability=gate.identifiability)
+    model = replace(
+        model, bad_samples=sources.bad, controller=now, identifiability=gate.identifiability
+    )
     posterior_samples = _posterior_samples(sources, fit, seed, on_progress) if posterior else None
     if posterior_samples is not None:
         model = replace(model, posterior=_posterior(posterior_samples, fit))
