@@ -131,3 +131,12 @@ def test_the_speed_of_the_motors_angle_drives_nothing(tmp_path: Path) -> None:
     table = (t, np.gradient(swung, H), swung, np.gradient(angle, H), angle)
     with pytest.raises(BadLog, match="no column moves as a body that another one drives"):
         propose(tmp_path, "time,angle_velocity,angle,motor_velocity,motor_angle", *table)
+
+
+def test_a_time_that_goes_back_is_named_and_is_no_signal(tmp_path: Path) -> None:
+    """A second that a serial port wrote twice, beside the milliseconds of the controller."""
+    t, pwm, angle, *_ = wheels()
+    stamp = 24.0 + t - np.isin(np.arange(len(t)), (13, 14))
+    found = propose(tmp_path, "timestamp,ms,pwm,theta", stamp, 1e3 * t, pwm, angle)
+    assert {one.name: one.column for one in found.signals} == {"t": "ms", "y": "theta", "u": "pwm"}
+    assert found.unused["'timestamp'"] == "is called a time, but goes back in data row 14"

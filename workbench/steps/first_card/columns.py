@@ -183,7 +183,9 @@ def columns_of(log: UnknownLog) -> Columns:
     step = float(np.median(np.diff(clock.values)))
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
     left_out |= dict.fromkeys(sorted(clocks), "goes up with the clock, as another one does")
-    others = [one for one in usable if one is not clock and one.raw.number not in clocks]
+    back = {one.raw.number: _gone_back(one) for one in usable if one is not clock}
+    left_out |= {number: said for number, said in back.items() if said and number not in clocks}
+    others = [one for one in usable if one is not clock and one.raw.number not in left_out]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
     log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
@@ -284,6 +286,14 @@ def _second(one: Column, clock: Column) -> bool:
     off = float(np.max(np.abs(one.values - np.polyval(line, clock.values))))
     most = LONGEST_GAP * float(np.median(np.diff(one.values))) if counts else 0.0
     return off < max(most, SECOND_CLOCK * float(np.ptp(one.values)))
+
+
+def _gone_back(one: Column) -> str:
+    """What is said of a column that is called a time, but falls in some of its rows; else empty."""
+    falls = np.diff(one.values) < 0.0
+    if set(one.header.means) != {"time"} or not 0.0 < np.mean(falls) < MOST_UNEVEN:
+        return ""
+    return f"is called a time, but goes back in data row {int(np.argmax(falls)) + 2}"
 
 
 def _rises(one: Column) -> bool:
