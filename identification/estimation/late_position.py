@@ -132,5 +132,8 @@ def _run(logs: Sequence[Log], rig: Rig, halt: Halt | None, none: _Run | None) ->
     noise = tuple(one.noise for one in recorded.logs)
     if none is None or none.plant is None:
         return _Run(model.misfit, model.plant, noise)
-    alike = [replace(one, noise=own) for one, own in zip(recorded.logs, none.noise, strict=True)]
+    alike = [  # few runs, which are not halted: they tell what was found
+        replace(one, noise=own, halt=Halt())
+        for one, own in zip(recorded.logs, none.noise, strict=True)
+    ]
     return _Run(misfit(model.plant, alike, recorded.drive, weighed_by=none.plant))

@@ -1,6 +1,7 @@
 """A lag between the columns of force and position: found where a run or the equation shows it."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
+from identification.progress import Halt
 from identification.simulation.free_run import free_run
 from tests.identification.jumping_command import MASS, cart_log
 from tests.identification.jumping_command import H as ROW
@@ -85,3 +87,13 @@ def test_a_plant_that_drifts_more_gains_nothing_by_it(monkeypatch: pytest.Monkey
     made = replace(model, plant=light, misfit=own)
     monkeypatch.setattr(late_position, "plain_structure", lambda *_: made)
     assert late_position._run([log], rig, None, none).misfit > 1.2 * own
+
+
+def test_a_halted_run_is_told_as_well_as_a_whole_one() -> None:
+    """The doctor's own end of a run is no end of the comparison."""
+    log, rig = cart_log(1, 1), Rig("motor", force_per_command=1.0)
+    none = late_position._run([log], rig, None, None)
+    for looks in (0, 20):
+        halt = Halt(partial(next, iter([True] * looks), False))
+        assert np.isfinite(late_position._run([log], rig, halt, none).misfit)
+        assert halt.reached()
