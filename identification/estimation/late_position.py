@@ -8,12 +8,13 @@ leaves is believed without, where no loop is known, or where it is too short for
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.errors import UserError
 from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.regression.equation_rows import LogNoise
 from identification.estimation.structure_fit import plain_structure
 from identification.estimation.surroundings import (
     explains,
@@ -21,7 +22,9 @@ from identification.estimation.surroundings import (
     lag_explains,
     surroundings,
 )
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log, Rig
+from identification.model.plant import Plant
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
@@ -35,6 +38,15 @@ DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
 NEARER = (2.0, 1.0, 0.5)  # samples, to either side of the best so far
 LAG_SD = 0.25  # samples, within which the best of halves is known
 SEED = 0  # the lags are compared on the same draws
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What a plant's run leaves of logs with a lag taken out; plant, noise: where without one."""
+
+    misfit: float
+    plant: Plant | None = None
+    noise: tuple[LogNoise, ...] = ()
 
 
 def what_acts_beside(
@@ -53,15 +65,16 @@ def what_acts_beside(
         return replace(found, lag=NOT_SHOWN, sampled=False)
     h, halt = logs[0].h, halt or Halt()
     found = replace(found, gives=rig.force_per_command if motor else None)
-    tried: dict[float, float] = {}
+    tried: dict[float, _Run] = {}
 
     def left(samples: float) -> float:
         """Misfit of the plain plant on the logs with that lag taken out."""
         if samples not in tried:
             late = replace(found, lag=Size(samples * h))
             shifted = [late.taken_out(log) for log in logs]
-            tried[samples] = _misfit(shifted, rig, halt if each is Halt else each())
-        return tried[samples]
+            own = halt if each is Halt else each()
+            tried[samples] = _run(shifted, rig, own, tried.get(0.0))
+        return tried[samples].misfit
 
     def follows(samples: float) -> bool:
         """Whether a run follows with that lag where it clearly does not without."""
@@ -105,9 +118,22 @@ def _best_lag(left: Callable[[float], float], halt: Halt) -> float:
     return best
 
 
-def _misfit(logs: Sequence[Log], rig: Rig, halt: Halt | None) -> float:
+def _run(logs: Sequence[Log], rig: Rig, halt: Halt | None, none: _Run | None) -> _Run:
+    """The run of the plain plant on these logs, its misfit in the units of that without a lag.
+
+    By its own, whichever plant drifts farthest with the noise of its force would follow best, as
+    would a log that its lag has smoothed between the samples.
+    """
     try:
         recorded = recorded_logs(logs, rig, None, halt)
-        return plain_structure(recorded, np.random.default_rng(SEED)).misfit
+        model = plain_structure(recorded, np.random.default_rng(SEED))
     except UserError:
-        return np.inf
+        return _Run(np.inf)
+    noise = tuple(one.noise for one in recorded.logs)
+    if none is None or none.plant is None:
+        return _Run(model.misfit, model.plant, noise)
+    alike = [  # few runs, which are not halted: they tell what was found
+        replace(one, noise=own, halt=Halt())
+        for one, own in zip(recorded.logs, none.noise, strict=True)
+    ]
+    return _Run(misfit(model.plant, alike, recorded.drive, weighed_by=none.plant))

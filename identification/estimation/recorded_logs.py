@@ -25,6 +25,7 @@ from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.model.plant import units_of
 from identification.model.size import NOT_SHOWN, Size
 from identification.progress import Halt
 from identification.remarks import MinorRemark
@@ -211,9 +212,10 @@ def recorded_logs(
     found = RecordedLogs((), rig, chosen, halt=halt or Halt()).of(slower)
     for one in found.logs:
         if not np.any(one.signals["d"]):
+            speed = units_of(rig.motion)["dv_p"]
             raise NotIdentifiable(
                 f"{one.log.name}: no motion above the noise of the velocity"
-                f" ({one.noise.v:.3g} m/s); record a run that moves"
+                f" ({one.noise.v:.3g} {speed}); record a run that moves"
             )
     return with_clocks(found, slower_remarks(logs, slower))
 

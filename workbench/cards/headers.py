@@ -307,9 +307,16 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
         return {"acceleration": _TWO_WEIGHTS}
     if any(one == "dot" or (one.endswith("dot") and len(one) < 9) for one in words):
         return {"velocity": _TWO_WEIGHTS}
-    if words[:1] == ["current"] and "position" in found:  # the present position
+    of_it = words[:1] == ["current"] or {"motor"} == {one for one in words if _commands(one)}
+    if of_it and "position" in found:  # the present position, or that of the motor
         found.pop("command", None)
     return found
+
+
+def _commands(word: str) -> bool:
+    """Whether a word holds one that may mean a command."""
+    parts = any(one in word for one in _WORDS["command"].split())
+    return parts or "command" in _SHORT_WORDS.get(word, {})
 
 
 def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> Purpose:

@@ -4,6 +4,7 @@ take from it."""
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from identification.arrays import Array
 from identification.errors import BadLog
@@ -16,7 +17,7 @@ from identification.estimation.regression.equation_rows import (
     integral,
     mechanical,
 )
-from identification.estimation.regression.weighted_rows import least_squares, solve_rows
+from identification.estimation.regression.weighted_rows import OVERLAP, least_squares, solve_rows
 from identification.log import Log
 from identification.signals.clock_jitter import position_noise
 from identification.signals.differentiate import Motion, differentiate
@@ -29,6 +30,7 @@ from identification.signals.noise import (
     rounding_of_force,
 )
 from identification.signals.weak_form import all_windows, noise_gain, sliding_windows, weights
+from identification.thresholds import CHANCE_LEVEL
 
 WINDOW_SECONDS = 0.06  # of a window
 EXACT_SHARE = 1e-12  # of its range, to which any position is uncertain
@@ -45,7 +47,7 @@ OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff ma
 CALM_SHARE = 0.9  # of the samples, those that show the controller
 OF_DRIFT = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
-FEWEST_LEFT = 20  # from which what they leave shows noise
+OFF_ITS_ROW = 8  # samples, to either side, by which a motor's force may act off its row
 
 
 def motion_log(
@@ -186,17 +188,22 @@ def _beside_control(log: Log) -> float:
 
 
 def _left_of_force(one: MotionLog) -> float:
-    """Noise of a motor's force [N] that would leave as much of the equation of motion as is left.
+    """Noise of a motor's force [N] that would hardly leave so little of the equation of motion.
 
     No more than that is noise: what its controller makes of a noise that no signal shows was given
-    to the motor too, and is none.
+    to the motor too, and is none. Noise leaves the same at any lag, a command that acts off its row
+    more than its noise: so by the lag that leaves least. Of a chi-square; ours.
     """
-    rows = mechanical(one, NOTHING_KNOWN)
-    if len(rows.b) < FEWEST_LEFT:
+    X = mechanical(one, NOTHING_KNOWN).X
+    free = int((X.shape[0] - X.shape[1]) / OVERLAP)
+    if free < 1:
         return np.inf
-    rest = rows.b - rows.X @ least_squares(rows.X, rows.b)
+    F, at = np.asarray(one.log["F"]), np.arange(len(one.log))
+    lags = range(-OFF_ITS_ROW, OFF_ITS_ROW + 1)
+    rows = [one.sliding.held @ np.interp(at - lag, at, F) for lag in lags]
+    square = min(float(np.sum((b - X @ least_squares(X, b)) ** 2)) for b in rows) / OVERLAP
     mean = weights(one.sliding.length, one.log.h)[0]
-    return float(np.sqrt(np.mean(rest**2) / noise_gain(mean)))
+    return float(np.sqrt(square / chdtri(free, 1.0 - CHANCE_LEVEL) / noise_gain(mean)))
 
 
 def _unexplained(one: MotionLog) -> float:

@@ -2,6 +2,7 @@
 steps."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,6 +35,16 @@ def motor_log(seed: int = 0, seconds: float = 10.0) -> Log:
     run = free_run(Plant(SERVO, Motor(K_A)), blank, (0.1, 0.35, K_A * u[0]), "command")
     y = run.y + 1e-5 * rng.standard_normal(len(t))
     return Log("motor", {"t": t, "y": y, "u": u, "F": K_A * u})
+
+
+@pytest.mark.parametrize(("motion", "unit"), [("linear", "m/s"), ("rotary", "rad/s")])
+def test_a_motor_that_stands_still_is_told_in_its_units(
+    motion: Literal["linear", "rotary"], unit: str
+) -> None:
+    log = made(3, n=2000)
+    still = log.with_signals(y=1e-3 * np.random.default_rng(1).standard_normal(2000))
+    with pytest.raises(NotIdentifiable, match=rf"noise of the velocity \([0-9.]+ {unit}\)"):
+        recorded_logs([still], replace(RIG, motion=motion))
 
 
 @pytest.mark.slow

@@ -1,16 +1,25 @@
 """A lag between the columns of force and position: found where a run or the equation shows it."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
 from identification.estimation import late_position
 from identification.estimation.late_position import what_acts_beside
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.structure_fit import plain_structure
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
+from identification.progress import Halt
 from identification.simulation.free_run import free_run
+from tests.identification.jumping_command import MASS, cart_log
+from tests.identification.jumping_command import H as ROW
 
 H = 2e-3
 BODY = Plant(Karnopp(0.15, 0.3, 0.3, 0.05, 0.05, 1e-3, -1e-3, 0.36, -0.36))
@@ -48,8 +57,43 @@ def test_a_lag_that_no_run_bears_out_is_believed_where_it_explains_most_and_no_l
     lag = Surroundings(lag=Size(3.0 * H, 0.1 * H))
     monkeypatch.setattr(late_position, "surroundings", lambda *_: lag)
     monkeypatch.setattr(late_position, "lag_explains", lambda *_: (1.0, left))
-    monkeypatch.setattr(late_position, "_misfit", lambda *_: 20.0)
+    monkeypatch.setattr(late_position, "_run", lambda *_: late_position._Run(20.0))
     log = late_log(0.0)
     motor = log.with_signals(u=log["F"], **({"r": log["y"]} if in_loop else {}))
     rig = Rig("motor", motion="rotary", force_per_command=1.0)
     assert bool(what_acts_beside([motor], rig).lag.value) == (believed and not in_loop)
+
+
+@pytest.mark.parametrize(("seed", "late"), [(0, 0), (0, 1), (1, 0), (1, 2), (4, 1)])
+def test_a_lag_of_a_short_slow_log_is_found_where_the_command_jumps_and_nowhere_else(
+    seed: int, late: int
+) -> None:
+    """Of such a command's jumps no noise is made, and a plant that drifts more gains nothing by it:
+    seed 0 had a lag of a sample, which it has not, and 1 of the others none."""
+    found = what_acts_beside([cart_log(seed, late)], Rig("motor", force_per_command=1.0))
+    assert abs(found.lag.value / ROW - late) < 0.3
+
+
+def test_a_plant_that_drifts_more_gains_nothing_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each at its own weights, a body of a sixth of the mass would follow a noisy log as well."""
+    log = cart_log(0, 0)
+    noisy = log["F"] + 0.6 * np.random.default_rng(1).standard_normal(len(log))
+    log, rig = log.with_signals(F=noisy, u=noisy), Rig("motor", force_per_command=1.0)
+    recorded = recorded_logs([log], rig)
+    model = plain_structure(recorded, np.random.default_rng(0))
+    light = replace(model.plant, friction=replace(model.plant.friction, m=MASS / 6.0))
+    own = misfit(light, recorded.logs, recorded.drive)
+    none = late_position._run([log], rig, None, None)
+    made = replace(model, plant=light, misfit=own)
+    monkeypatch.setattr(late_position, "plain_structure", lambda *_: made)
+    assert late_position._run([log], rig, None, none).misfit > 1.2 * own
+
+
+def test_a_halted_run_is_told_as_well_as_a_whole_one() -> None:
+    """The doctor's own end of a run is no end of the comparison."""
+    log, rig = cart_log(1, 1), Rig("motor", force_per_command=1.0)
+    none = late_position._run([log], rig, None, None)
+    for looks in (0, 20):
+        halt = Halt(partial(next, iter([True] * looks), False))
+        assert np.isfinite(late_position._run([log], rig, halt, none).misfit)
+        assert halt.reached()

@@ -1,7 +1,14 @@
 """From a regression's sizes to a plant."""
 
+import numpy as np
+
 from identification.effects._library import built_in
+from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regressed_plant import slight
+from identification.estimation.structure_fit import plain_structure
+from identification.log import Rig
+from identification.thresholds import COMPLETE
+from tests.identification.jumping_command import MASS, cart_log
 
 KEY = "position_dependent_friction"
 
@@ -28,3 +35,11 @@ def test_the_one_size_of_an_effect_is_never_taken_for_nothing() -> None:
     effect = built_in()["spring"]
     assert slight(effect, {"k": 0.1, "k_3": 1e6}, {"k": 1.0, "k_3": 1.0}) == set()
     assert slight(effect, {"k": 50.0, "k_3": 1.0}, {"k": 1.0, "k_3": 10.0}) == {"k_3"}
+
+
+def test_a_log_with_few_rows_of_sliding_is_followed_from_what_these_give() -> None:
+    """From its first estimate alone the run ends where one direction has no Coulomb friction."""
+    recorded = recorded_logs([cart_log(1, 0)], Rig("motor", force_per_command=1.0), None)
+    model = plain_structure(recorded, np.random.default_rng(0))
+    assert model.misfit <= COMPLETE
+    assert abs(model.plant.friction.m / MASS - 1.0) < 0.01

@@ -49,6 +49,15 @@ def test_a_header_tells_unit_and_meaning(
     assert found.purpose == purpose
 
 
+@pytest.mark.parametrize(
+    ("text", "drives"),
+    [("motor_angle", False), ("motorPosition", False), ("motor", True), ("motor_pos_cmd", True),
+     ("motor_current", True), ("valve_position", True)],
+)  # fmt: skip
+def test_where_a_motor_stands_is_no_command(text: str, drives: bool) -> None:
+    assert ("command" in read_header(text).means) == drives
+
+
 @pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x"])
 def test_a_name_with_an_index_has_no_unit(text: str) -> None:
     assert read_header(text).unit is None

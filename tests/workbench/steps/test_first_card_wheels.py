@@ -109,3 +109,34 @@ def test_a_header_names_no_clock_that_nothing_logs_as_fast(tmp_path: Path) -> No
     one = propose(tmp_path, "time_us,pwm,theta", 0.1 * t, pwm, angle).signal("t")
     assert one is not None and (one.unit, one.sure) == ("s", False)
     assert "the header's us makes rows 5e-10 s apart" in one.why
+
+
+@pytest.mark.parametrize("header", ["Step", "n"])
+def test_a_counter_is_no_signal_where_the_rows_come_unevenly(tmp_path: Path, header: str) -> None:
+    """Whole milliseconds that a loop counts, beside the stamps that the reader gave the rows."""
+    rng = np.random.default_rng(2)
+    counted = 9454.0 + np.cumsum(rng.integers(4, 7, 900))
+    stamp = 1e-3 * (np.round(counted + rng.uniform(-1.0, 1.0, 900)))
+    angle = np.round(200.0 * np.cos(4.0 * stamp))
+    with pytest.raises(
+        BadLog, match=r"no column moves as a body .*'Theta'; left out: .* as another one"
+    ):
+        propose(tmp_path, f"Timestamp,{header},Theta", stamp, counted, angle)
+
+
+def test_the_speed_of_the_motors_angle_drives_nothing(tmp_path: Path) -> None:
+    """A pendulum on a motor of which only angle and speed were logged, as the robot sends them."""
+    t, _, angle, *_ = wheels()
+    swung = 20.0 * np.sin(5.0 * t) + 0.2 * angle
+    table = (t, np.gradient(swung, H), swung, np.gradient(angle, H), angle)
+    with pytest.raises(BadLog, match="no column moves as a body that another one drives"):
+        propose(tmp_path, "time,angle_velocity,angle,motor_velocity,motor_angle", *table)
+
+
+def test_a_time_that_goes_back_is_named_and_is_no_signal(tmp_path: Path) -> None:
+    """A second that a serial port wrote twice, beside the milliseconds of the controller."""
+    t, pwm, angle, *_ = wheels()
+    stamp = 24.0 + t - np.isin(np.arange(len(t)), (13, 14))
+    found = propose(tmp_path, "timestamp,ms,pwm,theta", stamp, 1e3 * t, pwm, angle)
+    assert {one.name: one.column for one in found.signals} == {"t": "ms", "y": "theta", "u": "pwm"}
+    assert found.unused["'timestamp'"] == "is called a time, but goes back in data row 14"

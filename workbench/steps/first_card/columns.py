@@ -182,8 +182,10 @@ def columns_of(log: UnknownLog) -> Columns:
         clock = next(one for one in usable if one.raw.number == clock.raw.number)
     step = float(np.median(np.diff(clock.values)))
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
-    left_out |= dict.fromkeys(sorted(clocks), "goes up evenly, as another clock does")
-    others = [one for one in usable if one is not clock and one.raw.number not in clocks]
+    left_out |= dict.fromkeys(sorted(clocks), "goes up with the clock, as another one does")
+    back = {one.raw.number: _gone_back(one) for one in usable if one is not clock}
+    left_out |= {number: said for number, said in back.items() if said and number not in clocks}
+    others = [one for one in usable if one is not clock and one.raw.number not in left_out]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
     log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
@@ -269,14 +271,29 @@ def _ticks(one: Column) -> bool:
 
 
 def _second(one: Column, clock: Column) -> bool:
-    """Whether a column is one more clock, or counts the rows."""
-    if not _ticks(one):
-        return False
-    if {"time", "count"} & set(one.header.means):
+    """Whether a column is one more clock, or counts rows or ticks, be it as unevenly as the rows
+    come."""
+    means = one.header.means
+    ticks = _ticks(one)
+    if ticks and {"time", "count"} & set(means):
         return True
+    counts = (
+        one.whole and _rises(one) and all(means[what] < 1.0 for what in means if what != "count")
+    )
+    if not (counts or ticks):
+        return False
     line = np.polyfit(clock.values, one.values, 1)
     off = float(np.max(np.abs(one.values - np.polyval(line, clock.values))))
-    return off < SECOND_CLOCK * float(np.ptp(one.values))
+    most = LONGEST_GAP * float(np.median(np.diff(one.values))) if counts else 0.0
+    return off < max(most, SECOND_CLOCK * float(np.ptp(one.values)))
+
+
+def _gone_back(one: Column) -> str:
+    """What is said of a column that is called a time, but falls in some of its rows; else empty."""
+    falls = np.diff(one.values) < 0.0
+    if set(one.header.means) != {"time"} or not 0.0 < np.mean(falls) < MOST_UNEVEN:
+        return ""
+    return f"is called a time, but goes back in data row {int(np.argmax(falls)) + 2}"
 
 
 def _rises(one: Column) -> bool:

@@ -96,6 +96,7 @@ def ways_of(
     named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_SAYS]
     # what the velocity follows may well drive a valve, where nothing else is said to drive
     alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
+    places = [i for i, one in enumerate(pairs.signals) if said(one, "y") >= HEADER_SAYS]
     for k, law in enumerate(laws):
         one = pairs.signals[k]
         if one is y:
@@ -103,8 +104,8 @@ def ways_of(
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
             continue
-        if one is not alone and pairs.rate[seen.at, k] > EXACT_VELOCITY:
-            continue
+        if one is not alone and np.max(pairs.rate[[seen.at, *places], k]) > EXACT_VELOCITY:
+            continue  # the velocity of this position, or of what is called another
         v_share = 0.0 if one is alone else float(seen.v_share[k])
         physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
         physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
