@@ -16,8 +16,6 @@ from identification.estimation.regression.equation_rows import (
     BREAKAWAY,
     FIVE,
     MECHANICAL,
-    NOTHING_KNOWN,
-    mechanical,
 )
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
@@ -25,7 +23,6 @@ from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.regression.weighted_rows import (
     OVERLAP,
     inverse_of_gram,
-    least_squares,
 )
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
@@ -89,30 +86,12 @@ def regressed_plant(
 
 def first_plant(recorded: RecordedLogs) -> Plant:
     """The plant of the first estimates, the median over the logs: before any equation's rows."""
-    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    found = [first_estimate(one).nine for one in recorded.logs]
     nine = np.median(found, axis=0)
     least = LEAST_OF_FIRST * max(float(np.max(np.abs(nine))), 1e-300)
     signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
     drives = fit_actuator(recorded.plain).nearest if recorded.by_command else motor_of(recorded.rig)
     return Plant(Karnopp.from_array(signs * np.maximum(signs * nine, least)), drives)
-
-
-def plant_of_few_rows(recorded: RecordedLogs, plant: Plant) -> Plant | None:
-    """The same plant, but the mass and the sliding friction that the few rows of sliding give which
-    are no fit of their own; None where they give none of these. A direction without rows is taken
-    to be as the other. Of the rows, Messenger, Bortz (2021)."""
-    rows = [mechanical(one, NOTHING_KNOWN) for one in recorded.logs]
-    X, b = np.concatenate([one.X for one in rows]), np.concatenate([one.b for one in rows])
-    if len(b) <= len(FIVE):
-        return None
-    five = dict(zip(FIVE, least_squares(X, b).tolist(), strict=True))
-    for one, other in (("p", "n"), ("n", "p")):
-        if not np.any(X[:, FIVE.index(f"F_c{one}")]):
-            five |= {f"F_{k}{one}": five[f"F_{k}{other}"] for k in "cv"}
-    if min(five.values()) <= 0.0:
-        return None
-    limits = {"F_sp": USUAL_STICK * five["F_cp"], "F_sn": -USUAL_STICK * five["F_cn"]}
-    return replace(plant, friction=replace(plant.friction, **five, **limits))
 
 
 def motor_of(rig: Rig) -> Motor | None:

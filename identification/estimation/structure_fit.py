@@ -13,7 +13,6 @@ from identification.estimation.regressed_plant import (
     RegressedPlant,
     first_plant,
     inertia_is_lost,
-    plant_of_few_rows,
     regressed_plant,
 )
 from identification.estimation.regression.effect_columns import Values
@@ -184,20 +183,12 @@ def _from_first_estimate(
     if model.imposed:
         return model
     try:
-        done = _from_start(plant, recorded)
-        beside = plant_of_few_rows(recorded, plant)
-        if beside is not None and done.misfit > COMPLETE:
-            other = _from_start(beside, recorded)
-            done = other if other.misfit < done.misfit else done
+        band = max(plant.friction.dv_p, -plant.friction.dv_n)
+        done = refit(plant, recorded.logs, recorded.drive, prior={}, band=band)
         return model.refined(_from_far_off(done, [], recorded))
     except Halted as halted:
         best, least = _best_so_far(plant, None, halted, recorded)
         return replace(model, plant=best, misfit=least)
-
-
-def _from_start(plant: Plant, recorded: RecordedLogs) -> Refit:
-    band = max(plant.friction.dv_p, -plant.friction.dv_n)
-    return refit(plant, recorded.logs, recorded.drive, prior={}, band=band)
 
 
 def searched(

@@ -228,7 +228,7 @@ def identifiability_of_runs(
         around = first.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
-        m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
+        m = max(float(first_estimate(one).nine[0]) for one in recorded.logs)
     except (BadLog, NotIdentifiable) as error:
         return RunsIdentifiability(motion, reason=str(error))
     ways = _ways(recorded.logs, m)

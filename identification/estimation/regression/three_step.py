@@ -7,6 +7,7 @@ The paper names a three-step method of a companion paper without giving it; this
 Smoothing blurs steps 2 and 3, so their outcome only centres the search that follows.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,15 +15,18 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import NotIdentifiable
-from identification.log import Log
-from identification.model.inverse_model import InverseModel, Smoothing, fit_inverse
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    NOTHING_KNOWN,
+    MotionLog,
+    mechanical,
+)
+from identification.estimation.regression.weighted_rows import least_squares
 from identification.signals.differentiate import Motion, differentiate
 
 NO_MOTION = 1.5  # times the noise below which a position's own spread is no motion
 FASTER_MOVES = 5.0  # times the noise of the velocity: faster samples move
 BEFORE_STOP = 0.02  # s of motion used before a stop
-CUTOFFS = (None, 10.0, 3.0)  # Hz; slow motion needs more smoothing to stand out of its noise
-PERIODS = 40.0  # of a cut-off that a log must last
 SEARCH_FACTOR = 4.0  # the search goes this factor beyond a first estimate
 FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
 
@@ -37,12 +41,13 @@ class FirstEstimate:
     high: Array
 
 
-def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
+def first_estimate(one: MotionLog) -> FirstEstimate:
     """First estimate of the nine from position and force.
 
-    held: the force is a zero-order hold of a command. Raises NotIdentifiable where nothing in the
-    log moves. Ours: the paper names three steps of a companion paper and gives none.
+    Raises NotIdentifiable where nothing in the log moves. Of sliding, Messenger, Bortz
+    (2021); the rest is ours: the paper names three steps of a companion paper and gives none.
     """
+    log = one.log
     motion = differentiate(log["y"], log.h)
     moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
     fastest = float(np.quantile(np.abs(motion.v), FASTEST_QUANTILE))
@@ -56,7 +61,7 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
         )
     force = np.abs(log["F"] - np.mean(log["F"]))
     level = float(np.quantile(force, 0.9))
-    sliding = _sliding(log, held)
+    sliding = _sliding(one)
     m, coulomb_p, coulomb_n, viscous_p, viscous_n = _magnitudes(sliding, motion, level, fastest)
     rest = ~moving
     stick_p, stick_n = _breakaways(log["F"], rest, motion.v, (coulomb_p, coulomb_n))
@@ -66,7 +71,7 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     )
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
     # A motor's force has no ramps that would show a narrow band: do not search one.
-    narrow = fastest / (500 if held else 3000)
+    narrow = fastest / (500 if one.held else 3000)
     low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
     steepest = 2 * max(viscous_p, viscous_n, 0.1 * scale / fastest)
     high = np.array(
@@ -75,36 +80,35 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     return FirstEstimate(nine, low, high)
 
 
-def usable_cutoffs(log: Log) -> list[float | None]:
-    """Of CUTOFFS those that the log's sampling and length allow."""
-    return [c for c in CUTOFFS if c is None or (c * log.h < 0.4 and c * log.duration > PERIODS)]
-
-
-def _sliding(log: Log, held: bool) -> InverseModel | None:
-    for cutoff in usable_cutoffs(log):
-        try:
-            return fit_inverse(log, "directional", Smoothing(cutoff=cutoff, held=held))
-        except NotIdentifiable:
-            continue
-    return None
+def _sliding(one: MotionLog) -> dict[str, float] | None:
+    """Mass and sliding friction by the rows of one direction, however few; a direction without rows
+    is taken to be as the other. None where there are too few for five numbers."""
+    rows = mechanical(one, NOTHING_KNOWN)
+    if len(rows.b) <= len(FIVE):
+        return None
+    five = dict(zip(FIVE, least_squares(rows.X, rows.b).tolist(), strict=True))
+    for way, other in (("p", "n"), ("n", "p")):
+        if not np.any(rows.X[:, FIVE.index(f"F_c{way}")]):
+            five |= {f"F_{kind}{way}": five[f"F_{kind}{other}"] for kind in "cv"}
+    return five
 
 
 def _magnitudes(
-    sliding: InverseModel | None, motion: Motion, level: float, fastest: float
+    sliding: Mapping[str, float] | None, motion: Motion, level: float, fastest: float
 ) -> tuple[float, float, float, float, float]:
     """Step 1, bounded to be positive: mass and friction that could explain forces of this level."""
     peak = float(np.quantile(np.abs(motion.a), FASTEST_QUANTILE))
     mass = level / max(peak, 1e-12)
     if sliding is None:
         return mass, 0.5 * level, 0.5 * level, 0.5 * level / fastest, 0.5 * level / fastest
-    m = sliding.m if sliding.m > 0.01 * mass else 0.3 * mass
+    m = sliding["m"] if sliding["m"] > 0.01 * mass else 0.3 * mass
     floor = 0.02 * level
     return (
         m,
-        max(sliding.F_cp, floor),
-        max(sliding.F_cn, floor),
-        max(sliding.F_vp, 0.0),
-        max(sliding.F_vn, 0.0),
+        max(sliding["F_cp"], floor),
+        max(sliding["F_cn"], floor),
+        max(sliding["F_vp"], 0.0),
+        max(sliding["F_vn"], 0.0),
     )
 
 

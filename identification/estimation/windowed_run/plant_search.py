@@ -42,7 +42,7 @@ class Box:
     @classmethod
     def about(cls, logs: Sequence[MotionLog]) -> "Box":
         """That which holds every log's range about its first estimate."""
-        firsts = [first_estimate(one.log, held=one.held) for one in logs]
+        firsts = [first_estimate(one) for one in logs]
         ends = np.array([np.min([first.low for first in firsts], axis=0),
                          np.max([first.high for first in firsts], axis=0)])  # fmt: skip
         ends[:, LOGARITHMIC] = np.log(np.maximum(ends[:, LOGARITHMIC], 1e-300))
