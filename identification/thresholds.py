@@ -19,7 +19,7 @@ FAR_LESS = 0.3  # left at most by another law of the same: two masses for one, a
 OF_ACCOUNT = 0.1  # less of what is missing, or of all, is of no account
 NEARLY_ALL = 1.0 - OF_ACCOUNT  # chance with which a test alarms that is to find a change
 MATERIAL = 0.01  # of the Coulomb level, of a value, of an equation's square: the least reported
-AS_GOOD_AS_NONE = 1e-3  # of the force, the motion, the samples of a log
+AS_GOOD_AS_NONE = 1e-3  # of the force, the motion
 
 # What is left, as a mean square in units of the noise: of a free run in windows, of whole runs, of
 # an equation's rows, of the test logs (blind.py: clean, single; nine_parameters.py; drift.py).

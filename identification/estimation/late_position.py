@@ -132,7 +132,7 @@ def _run(logs: Sequence[Log], rig: Rig, halt: Halt | None, none: _Run | None) ->
     noise = tuple(one.noise for one in recorded.logs)
     if none is None or none.plant is None:
         return _Run(model.misfit, model.plant, noise)
-    alike = [  # few runs, which are not halted: they tell what was found
+    alike = [  # few runs, not halted, of what is found already
         replace(one, noise=own, halt=Halt())
         for one, own in zip(recorded.logs, none.noise, strict=True)
     ]

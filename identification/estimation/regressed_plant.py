@@ -11,19 +11,11 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.effect_columns import Values, in_columns
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    BREAKAWAY,
-    FIVE,
-    MECHANICAL,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
 from identification.estimation.regression.three_step import first_estimate
-from identification.estimation.regression.weighted_rows import (
-    OVERLAP,
-    inverse_of_gram,
-)
+from identification.estimation.regression.weighted_rows import OVERLAP, inverse_of_gram
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant

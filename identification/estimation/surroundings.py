@@ -266,8 +266,8 @@ def explains(without: float, left: float) -> bool:
 
 
 def explains_most(without: float, left: float) -> bool:
-    """Whether what leaves this of a square, in place of that without it, explains most of it, as a
-    loop's noise explains of no lag and a wrong model of no sample."""
+    """Whether what leaves this of a square, in place of that without it, explains most of it: a
+    loop's noise makes no lag do so."""
     return left <= HALF * without
 
 
