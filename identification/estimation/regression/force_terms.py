@@ -65,8 +65,9 @@ def fewest_terms(data: Sequence[Rows]) -> ForceFit:
     the levels are as uncertain as beside viscous friction that is left out, where these logs
     separate the two."""
     every = [fitted(data, used) for used in COLUMN_SETS]
-    fits = [one for one in every if _may_be(one) and (1 in one.used or _rubs(every[-1]))]
     rows = stacked(data)
+    rubs = _rubs(every[-1], rows.b)
+    fits = [one for one in every if _may_be(one) and (1 in one.used or rubs)]
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
     levels = np.isin(best.used, LEVEL_COLUMNS)
@@ -93,10 +94,14 @@ def _may_be(fit: ForceFit) -> bool:
     return known and not found.get("m", 1.0) < 0.0
 
 
-def _rubs(whole: ForceFit) -> bool:
-    """Whether no Coulomb level is significantly below 0 in the fit of all columns."""
+def _rubs(whole: ForceFit, force: Array) -> bool:
+    """Whether no Coulomb level is significantly below 0 in the fit of all columns, by more than the
+    equation errs of the force (r,)."""
     found, sd = dict(zip((FIVE[i] for i in whole.used), whole.theta, strict=True)), whole.sd
-    return all(found[level] >= -NORMAL_95 * sd[level] for level in ("F_cp", "F_cn"))
+    errs = OF_EQUATION * rms(force)
+    return all(
+        found[level] >= -float(np.hypot(NORMAL_95 * sd[level], errs)) for level in ("F_cp", "F_cn")
+    )
 
 
 def predicts_as_much(left: float, least: float) -> bool:
