@@ -1,22 +1,21 @@
-"""Several independent ensembles of walkers, sampled until they agree.
-
-Each is one of emcee's. Half of its moves are along the walkers' own differences, which cross the
-ridges of a rough likelihood; the others are drawn from a t-distribution about what the ensemble has
-seen so far: where the likelihood is about normal one of those forgets all that was before.
+"""Several independent ensembles of walkers, each one of emcee's, sampled until they agree.
 
 Affine-invariant ensembles, Goodman, Weare, Commun. Appl. Math. Comput. Sci. 5 (2010) 65, in emcee,
-Foreman-Mackey et al., PASP 125 (2013) 306; differential-evolution moves, ter Braak, Statistics and
-Computing 16 (2006) 239.
+Foreman-Mackey et al., PASP 125 (2013) 306; most moves are of differential evolution, which cross
+the ridges of a rough likelihood: ter Braak, Statistics and Computing 16 (2006) 239. R-hat and
+effective sample size are arviz's: Vehtari, Gelman, Simpson, Carpenter, Bürkner, Bayesian Analysis
+16 (2021) 667.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
+from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.convergence import bulk_ess, rank_r_hat
 
 ENSEMBLES = 4  # as many as Vehtari et al. (2021) ask for, so that one that is caught is seen
 R_HAT_MOST = 1.01  # their limits of chains that can be believed: of R-hat,
@@ -25,9 +24,7 @@ WARM_STEPS = 100  # before the first steps that may count; each round then doubl
 MOST_CHAIN_STEPS = 6400  # of each walker
 WALKERS_APIECE = 4  # walkers for each unknown, in whole blocks of the kernels' lanes (twice 16)
 WALKER_BLOCK = 32
-OWN_FREEDOM = 8.0  # degrees of freedom of the moves drawn about what has been seen
-OWN_WIDTH = 1.1  # times the spread seen: narrower tails than the likelihood's would hold walkers
-MOVE_SHARES = (0.4, 0.4, 0.2)  # of the own, the differential-evolution and the stretch moves
+EVOLUTION, STRETCH = 0.67, 0.33  # shares of the moves of differential evolution, and the others
 Cost = Callable[[Array], Array]
 
 
@@ -65,115 +62,71 @@ def independent_ensembles(
 
     cost: members (k, d) to costs (k,), infinite where a member cannot be; called from a thread for
     each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; steps: of a
-    walker at most. A round begins with moves made to what the one before has seen, and only the
-    last round counts. Sources: Goodman, Weare (2010); Foreman-Mackey et al. (2013); limits, Vehtari
-    et al. (2021).
+    walker at most. Only the last round counts. Sources: Goodman, Weare (2010); Foreman-Mackey et
+    al. (2013); limits, Vehtari et al. (2021).
     """
-    walks = [_Ensemble(cost, own, one) for own, one in zip(seeds, rng.spawn(len(seeds)),
-                                                           strict=True)]  # fmt: skip
+    report = on_progress or (lambda _: None)
+    samplers = [_sampler(cost, *own.shape) for own in seeds]
+    states = [_state(own, one) for own, one in zip(seeds, rng.spawn(len(seeds)), strict=True)]
+    shown = [lambda made: report(made / steps), *[lambda _: None for _ in seeds[1:]]]
     done, now = 0, min(WARM_STEPS, steps)
-    with ThreadPoolExecutor(len(walks)) as pool:
+    with ThreadPoolExecutor(len(seeds)) as pool:
         while True:
-            shares = [0] * len(walks)
-
-            def report(which: int, made: int, counts: list[int] = shares, was: int = done) -> None:
-                counts[which] = made
-                if on_progress and which == 0:
-                    on_progress((was + min(counts)) / steps)
-
-            jobs = [pool.submit(one.round, now, report, i) for i, one in enumerate(walks)]
-            chains = np.array([job.result() for job in jobs])
+            states = list(pool.map(_walked, samplers, states, repeat(now), shown))
+            chains = np.array([one.get_chain(discard=done) for one in samplers])
             done += now
-            found = _compared(chains, walks, done)
+            found = _compared(chains, samplers, done)
             if (done > WARM_STEPS and found.converged) or done >= steps:
                 break
             now = min(done, steps - done)
-    if on_progress:
-        on_progress(1.0)
+    report(1.0)
     return found
 
 
-class _Ensemble:
-    """One ensemble of walkers, at the place to which its rounds have brought it."""
+def _sampler(cost: Cost, walkers: int, d: int) -> Any:
+    """emcee's sampler of exp(-cost / 2)."""
+    import emcee
 
-    def __init__(self, cost: Cost, first: Array, rng: np.random.Generator) -> None:
-        import emcee
-
-        self.cost, self.accepted, self.moves = cost, 0.0, 0
-        self.evaluations = len(first)
-        self.state = emcee.State(
-            first, random_state=np.random.RandomState(int(rng.integers(2**32))).get_state()
-        )
-        self.seen: Array | None = None
-
-    def round(self, steps: int, report: Callable[[int, int], None], which: int) -> Array:
-        """The next steps, (steps, walkers, d)."""
-        import emcee
-
-        walkers, d = self.state.coords.shape
-        sampler = emcee.EnsembleSampler(
-            walkers, d, self._log_probability, vectorize=True, moves=self._moves(d)
-        )
-        chain = sampler.sample(self.state, iterations=steps, skip_initial_state_check=True)
-        with np.errstate(invalid="ignore"):  # a walker where none can be compares infinities
-            for made, state in enumerate(chain, start=1):
-                self.state = state
-                report(which, made)
-        self.seen = np.asarray(sampler.get_chain(), dtype=np.float64)
-        self.accepted += float(np.mean(sampler.acceptance_fraction)) * steps
-        self.moves += steps
-        return self.seen
-
-    def _log_probability(self, members: Array) -> Array:
-        values = -0.5 * self.cost(members)
-        self.evaluations += len(members)
+    def log_probability(members: Array) -> Array:
+        values = -0.5 * cost(members)
         return np.where(np.isfinite(values), values, -np.inf)
 
-    def _moves(self, d: int) -> Sequence[tuple[object, float]]:
-        import emcee
-
-        own, evolution, stretch = MOVE_SHARES
-        others = [(emcee.moves.DEMove(), evolution), (emcee.moves.StretchMove(), stretch)]
-        if self.seen is None:
-            return others
-        half = self.seen[len(self.seen) // 2 :].reshape(-1, d)
-        return [(emcee.moves.MHMove(_OwnDraw(half), ndim=d), own), *others]
+    moves = [(emcee.moves.DEMove(), EVOLUTION), (emcee.moves.StretchMove(), STRETCH)]
+    return emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, moves=moves)
 
 
-class _OwnDraw:
-    """Draws from a t-distribution about samples (k, d), whatever the walkers are."""
+def _state(first: Array, rng: np.random.Generator) -> Any:
+    """Walkers (walkers, d) with a random state of their own."""
+    import emcee
 
-    def __init__(self, samples: Array) -> None:
-        self.center = np.mean(samples, axis=0)
-        self.scale = np.maximum(np.std(samples, axis=0), 1e-300)
-        covariance = np.atleast_2d(np.cov(((samples - self.center) / self.scale).T))
-        values, vectors = np.linalg.eigh(covariance)
-        self.root = OWN_WIDTH * vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))
-        self.inverse = np.linalg.inv(self.root)
-
-    def __call__(self, members: Array, random: np.random.RandomState) -> tuple[Array, Array]:
-        """New members (k, d), and the logarithm of how much likelier the way back is, (k,)."""
-        normal = random.standard_normal(members.shape)
-        drawn = normal * np.sqrt(OWN_FREEDOM / random.chisquare(OWN_FREEDOM, (len(members), 1)))
-        new = self.center + self.scale * (drawn @ self.root.T)
-        old = ((members - self.center) / self.scale) @ self.inverse.T
-        return new, self._log_density(old) - self._log_density(drawn)
-
-    def _log_density(self, at: Array) -> Array:
-        square = np.sum(at**2, axis=1) / OWN_FREEDOM
-        return np.asarray(-0.5 * (OWN_FREEDOM + at.shape[1]) * np.log1p(square))
+    drawn = np.random.RandomState(int(rng.integers(2**32)))
+    return emcee.State(first, random_state=drawn.get_state())
 
 
-def _compared(chains: Array, walks: Sequence[_Ensemble], steps: int) -> SampledChains:
+def _walked(sampler: Any, state: Any, steps: int, report: Callable[[int], None]) -> Any:
+    """The state after so many more steps; report: is given the steps made in all."""
+    with np.errstate(invalid="ignore"):  # of walkers where none can be
+        for after in sampler.sample(state, iterations=steps, skip_initial_state_check=True):
+            state = after
+            report(sampler.iteration)
+    return state
+
+
+def _compared(chains: Array, samplers: list[Any], steps: int) -> SampledChains:
     """The chains (ensembles, steps, walkers, d) with how they agree."""
+    from arviz_stats.base.array import array_stats
+
     e, n, w, d = chains.shape
     # An ensemble is one chain in order of time; its walkers are separated for how much it is
     # worth, since a draw says little of the next of the same walker.
-    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(d)]
-    apart = np.moveaxis(chains, 2, 1)
-    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(d)]
+    whole = chains.reshape(e, n * w, d)
+    apart = np.moveaxis(chains, 2, 1).reshape(e * w, n, d)
+    axes = {"chain_axis": 0, "draw_axis": 1}
     return SampledChains(
-        chains, np.array(r_hat), np.array(ess),
-        float(np.mean([one.accepted / max(one.moves, 1) for one in walks])), steps,
-        sum(one.evaluations for one in walks),
-    )  # fmt: skip
+        chains,
+        np.nan_to_num(array_stats.rhat(whole, **axes), nan=np.inf),  # of too short chains
+        np.nan_to_num(array_stats.ess(apart, **axes, method="bulk")),
+        float(np.mean([one.acceptance_fraction for one in samplers])),
+        steps,
+        e * w * (1 + steps),
+    )
