@@ -31,7 +31,7 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import again
 from identification.log import Log
 from identification.model.plant import Plant
-from identification.signals.kalman import Chain, N, log_densities, smoothed
+from identification.signals.kalman import Chain, N, innovations, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from identification.thresholds import AS_GOOD_AS_NONE
 
@@ -165,6 +165,13 @@ class _Known:
         found = log_densities(self.z, R, self.seen, self.free, chain)
         return np.where(self.slides, found, 0.0)
 
+    def whitened(self, sigma: float, tau: float, rougher: Rougher) -> Array:
+        """Error of each sample measured while the body slides, predicted from those before it, in
+        its deviations, (n,)."""
+        chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
+        e, S = innovations(self.z, R, self.seen, self.free, chain)
+        return np.where(self.slides, e / np.sqrt(S), 0.0)
+
     def latent(self, sigma: float, tau: float, rougher: Rougher) -> LatentForce:
         """d of this log."""
         chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
@@ -217,6 +224,16 @@ def latent_forces(
     most = float(np.exp(brentq(beyond, low, bounds[1], xtol=CLOSE_ENOUGH) if out else bounds[1]))
     found = (one.latent(best.sigma, best.tau, best.rougher) for one in known)
     return LatentForces(best.sigma, best.tau, most, best.rougher, tuple(found))
+
+
+def prediction_errors(
+    plant: Plant, logs: Sequence[MotionLog], slowest: float, noise: LatentForces
+) -> Array:
+    """Errors with which each sample of the position that is measured while the bodies slide is
+    predicted from those before it, under this latent force, in their deviations, (n,) over all
+    logs: white where nothing else is missing. Source: Kalman (1960)."""
+    known = [_known(plant, one, slowest) for one in logs]
+    return np.concatenate([one.whitened(noise.sigma, noise.tau, noise.rougher) for one in known])
 
 
 def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:

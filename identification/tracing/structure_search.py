@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtri
 
 from identification.estimation.fit import finished
 from identification.estimation.latent_force import latent_forces
+from identification.estimation.prediction_error import prediction_error_fit, significant
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.run_or_equation import by_equation_if_surer
@@ -15,7 +15,6 @@ from identification.estimation.windowed_run.parameters import plant_with, values
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import CHANCE_LEVEL
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     fewest,
@@ -54,12 +53,12 @@ def refinement(
 
 
 def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
-    """The model, with sliding friction and effects as the equations identify them where this makes
-    what was measured while sliding significantly likelier.
+    """The model, with sliding friction and effects as the equations identify them, or as they make
+    what was measured while sliding likeliest, where that is significantly likelier.
 
     A run begins and ends its stops by the noise of a measured force, and is bent by those that it
     loses. By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, of the position measured
-    under a latent force (`latent_force`, (1)).
+    under a latent force (`latent_force`, (1)); prediction-error method, Ljung (1999), 7.2.
     """
     if model.imposed or not choice.steps:
         return model
@@ -70,9 +69,14 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     run, equations = (
         latent_forces(one, setting.logs, slowest).log_likelihood for one in (model.plant, plant)
     )
-    if 2.0 * (equations - run) <= chdtri(len(names), CHANCE_LEVEL):
+    if significant(2.0 * (equations - run), len(names)):
+        model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in names}})
+    if not any(one.walks(setting.drive) for one in setting.logs):
         return model
-    return replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in names}})
+    best = prediction_error_fit(model.plant, names, setting.logs, slowest)
+    if best is None or not best.is_likelier:
+        return model
+    return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
 
 
 def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:
