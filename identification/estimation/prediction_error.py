@@ -30,7 +30,7 @@ from identification.thresholds import CHANCE_LEVEL, MATERIAL
 
 ROUNDS = 2  # in which the latent force, by which errors are weighed, converges
 STEPS = 3  # of each: the errors are nearly linear in the parameters
-STRETCHES = 40  # of time, by whose scatter the deviations go
+SCORE_STRETCHES = 40  # of time, by whose scatter the deviations go
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,4 +102,4 @@ def significant(gain: float, parameters: int) -> bool:
 def _stretches(logs: Sequence[MotionLog]) -> IntArray:
     """Number of the stretch of every sample over all logs, (n,): as many of each."""
     n = sum(len(one.log) for one in logs)
-    return np.arange(n) * STRETCHES // n
+    return np.arange(n) * SCORE_STRETCHES // n
