@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.drives_rig import make
 from identification.errors import NotIdentifiable
-from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
