@@ -42,6 +42,7 @@ LEAST_NOISE_F = 1e-6  # of the largest force, to which any force is uncertain
 SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
 CLOSE_ENOUGH = 0.02  # of log sigma
 WHITE_NOISES = (1.5, 3.0, 6.0, 15.0, 40.0, 120.0)  # times the noise, that either may be
+SIGMA_SHARES = (1.0, 0.1, 1e-3)  # of sigma, that may be left beside more white noise
 WHITE_GAINS = 5.0  # nats, by which more noise has to be the likelier
 NATS_95 = 1.353  # nats below the largest likelihood: one-sided 95 % of chi-square over two
 FORCE, VELOCITY = 2, 1  # states beside the position
@@ -212,7 +213,11 @@ def latent_forces(
             noises = [Rougher(x) for x in WHITE_NOISES]
             if not all(one.imposed for one in logs):  # then the force is what is measured
                 noises += [Rougher(force=x) for x in WHITE_NOISES]
-            other = min(pool.map(lambda more: least(best.tau, more), noises))
+            tried = [
+                (share * best.sigma, best.tau, more) for more in noises for share in SIGMA_SHARES
+            ]
+            costs = list(pool.map(lambda at: cost(*at), tried))
+            other = least(best.tau, tried[int(np.argmin(costs))][2])
             if other.cost < best.cost - WHITE_GAINS:
                 best = min(pool.map(lambda tau: least(tau, other.rougher), memories))
 

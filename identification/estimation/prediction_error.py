@@ -78,14 +78,14 @@ def prediction_error_fit(
     unit = units_in(plant, own, values_of(plant, own))
     begun = noise = latent_forces(plant, logs, slowest)
     x = values_of(plant, own) / unit
-    for _ in range(ROUNDS):
+    for one in range(ROUNDS):
 
         def errors(at: Array, noise: LatentForces = noise) -> Array:
             return prediction_errors(plant_with(plant, own, at * unit), logs, slowest, noise)
 
         found = gauss_newton(errors, x, STEPS)
         x, best = found.x, plant_with(plant, own, found.x * unit)
-        noise = latent_forces(best, logs, slowest)
+        noise = latent_forces(best, logs, slowest, begun.rougher if one < ROUNDS - 1 else None)
     covariance = found.covariance(_stretches(logs)) * np.outer(unit, unit)
     gain = 2.0 * (noise.log_likelihood - begun.log_likelihood)
     return PredictionErrorFit(best, own, covariance, gain, noise)

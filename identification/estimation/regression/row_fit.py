@@ -135,11 +135,12 @@ def has_rows(stage: EffectRows, equation: str) -> bool:
     return rows >= least and finite
 
 
-def base_fits(stage: EffectRows) -> dict[str, RowFit]:
-    """Every equation of which the logs have enough rows, with the structure found so far."""
+def base_fits(stage: EffectRows, equations: Sequence[str] = EQUATIONS) -> dict[str, RowFit]:
+    """Each of these equations of which the logs have enough rows, with the structure found so
+    far."""
     return {
         equation: row_fit(stage, equation, stacked(stage.parts[equation]))
-        for equation in EQUATIONS
+        for equation in equations
         if (equation != ACTUATOR or stage.by_command) and has_rows(stage, equation)
     }
 
@@ -149,13 +150,12 @@ def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
 
     Source: iterated weighted least squares (Aitken 1936).
     """
-    found = base_fits(stage)
     for _ in range(2):
+        found = base_fits(stage, (MECHANICAL, ACTUATOR))
         theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
         theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
         stage = replace(stage, theta=theta, theta_a=theta_a)
-        found = base_fits(stage)
-    return stage, found
+    return stage, base_fits(stage)
 
 
 def first_stage(
