@@ -108,7 +108,8 @@ def answered(
     except Halted:
         with recorded.halt.closing():
             fit = settled(found.plant, recorded, found.misfit, report, quick=True)
-    return on_the_floor(fit, recorded, found.outcomes[MECHANICAL].slowest)
+    sliding = found.outcomes.get(MECHANICAL)
+    return on_the_floor(fit, recorded, np.inf if sliding is None else sliding.slowest)
 
 
 def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> KarnoppFit:
@@ -118,8 +119,6 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> Kar
     (1974) 111; the comparison is ours."""
     if fit.effects:
         return fit
-    if fit.adequate:
-        fit = _likeliest(fit, recorded, slowest)
     left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
@@ -132,6 +131,8 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> Kar
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
+    else:
+        fit = _likeliest(fit, recorded, slowest)
     return fit if left is None else _unless_unexplained(fit, left)
 
 
@@ -142,7 +143,8 @@ def _likeliest(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> Karno
 
     Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
-    if not any(one.walks(recorded.drive) for one in recorded.logs):
+    noisy = any(one.walks(recorded.drive) for one in recorded.logs)
+    if not (noisy and np.isfinite(slowest)):  # infinite where too little slides
         return fit
     plant = Plant(fit.friction, fit.actuator)
     found = prediction_error_fit(plant, FIVE, recorded.logs, slowest)
