@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from identification.effects._base import AT_REST
 from identification.errors import NotIdentifiable
+from identification.estimation.estimates import effect_estimates
 from identification.estimation.imposed_motion import (
     FEWEST_COMPARED,
     fit_imposed,
@@ -24,9 +26,9 @@ from identification.estimation.imposed_motion import (
 )
 from identification.estimation.prediction_error import prediction_error_fit
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
+from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL
 from identification.estimation.regression.motion_rows import rows_and_windows
-from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.row_fit import first_stage, rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.settling import (
     between_samples_sd,
@@ -108,17 +110,16 @@ def answered(
     except Halted:
         with recorded.halt.closing():
             fit = settled(found.plant, recorded, found.misfit, report, quick=True)
-    sliding = found.outcomes.get(MECHANICAL)
-    return on_the_floor(fit, recorded, np.inf if sliding is None else sliding.slowest)
+    return on_the_floor(fit, recorded)
 
 
-def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> KarnoppFit:
+def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
     equation than least squares do on held-out stretches: its run is not followed, or only down to a
     noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
     (1974) 111; the comparison is ours."""
     if fit.effects:
-        return fit
+        return likeliest(fit, recorded)
     left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
@@ -132,22 +133,27 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> Kar
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
     else:
-        fit = _likeliest(fit, recorded, slowest)
+        fit = likeliest(fit, recorded)
     return fit if left is None else _unless_unexplained(fit, left)
 
 
-def _likeliest(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> KarnoppFit:
-    """The fit with mass and sliding friction of largest likelihood, where its own are significantly
-    less likely: a run that a noisy force or command drives begins and ends its stops by that noise,
-    and is bent by those that it loses. Stick limits and bands stay the run's.
+def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
+    """A fit that is adequate with mass, sliding friction and effects of largest likelihood, where
+    its own are significantly less likely: a run that a noisy force or command drives begins and
+    ends its stops by that noise, and is bent by those that it loses. Stick limits and bands stay
+    the run's.
 
     Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
-    noisy = any(one.walks(recorded.drive) for one in recorded.logs)
-    if not (noisy and np.isfinite(slowest)):  # infinite where too little slides
+    if not (fit.adequate and any(one.walks(recorded.drive) for one in recorded.logs)):
         return fit
-    plant = Plant(fit.friction, fit.actuator)
-    found = prediction_error_fit(plant, FIVE, recorded.logs, slowest)
+    rows = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
+    if MECHANICAL not in rows:  # too little slides
+        return fit
+    plant = Plant(fit.friction, fit.actuator, fit.effects)
+    of_effects = [n for n in fit.free if "." in n and n.partition(".")[2] not in AT_REST]
+    names = [*(n for n in fit.free if n in FIVE), *of_effects]
+    found = prediction_error_fit(plant, names, recorded.logs, rows[MECHANICAL].slowest)
     if found is None or not found.is_likelier:
         return fit
     more = between_samples_sd(found.names, values_of(found.plant, found.names), recorded, of=1.0)
@@ -158,9 +164,11 @@ def _likeliest(fit: KarnoppFit, recorded: RecordedLogs, slowest: float) -> Karno
     sd = {name: float(own[i]) for name, i in zip(stops, at, strict=True)}
     sd |= dict(zip(found.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     told = structure_estimates(found.plant, sd, recorded)
+    told |= effect_estimates(found.plant.effects, sd)
     return replace(
         fit,
         friction=found.plant.friction,
+        effects=found.plant.effects,
         estimates={**fit.estimates, **{name: told[name] for name in found.names}},
         free=(*found.names, *stops),
         covariance=block_diag(covariance, fit.covariance[np.ix_(at, at)]),

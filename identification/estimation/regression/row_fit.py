@@ -145,8 +145,11 @@ def base_fits(stage: EffectRows, equations: Sequence[str] = EQUATIONS) -> dict[s
     }
 
 
-def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes.
+def settled_fits(
+    stage: EffectRows, equations: Sequence[str] = EQUATIONS
+) -> tuple[EffectRows, dict[str, RowFit]]:
+    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes of these
+    equations.
 
     Source: iterated weighted least squares (Aitken 1936).
     """
@@ -155,15 +158,15 @@ def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
         theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
         theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
         stage = replace(stage, theta=theta, theta_a=theta_a)
-    return stage, base_fits(stage)
+    return stage, base_fits(stage, equations)
 
 
 def first_stage(
-    logs: Sequence[MotionLog], by_command: bool
+    logs: Sequence[MotionLog], by_command: bool, equations: Sequence[str] = EQUATIONS
 ) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The model without effects."""
+    """The model without effects, and the outcomes of these equations."""
     first = NOTHING_KNOWN, np.array([0.0, 0.0, 0.0])
-    return settled_fits(EffectRows(tuple(logs), *first, by_command))
+    return settled_fits(EffectRows(tuple(logs), *first, by_command), equations)
 
 
 def mean_square(o: RowFit) -> float:

@@ -247,7 +247,7 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     recorded: Any = SimpleNamespace(plain=[log], logs=())
     monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)
-    found: Any = run_or_equation.on_the_floor(run, recorded, 0.0)
+    found: Any = run_or_equation.on_the_floor(run, recorded)
     assert (found.name, found.adequate) == (by, adequate)
 
 
