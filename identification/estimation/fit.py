@@ -35,7 +35,7 @@ from identification.estimation.recorded_logs import (
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.row_fit import rough
-from identification.estimation.run_or_equation import answered
+from identification.estimation.run_or_equation import answered, likeliest
 from identification.estimation.settling import settled
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import (
@@ -148,13 +148,13 @@ def _fit(
     recorded = recorded_logs(logs, rig, drive, halt)
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
-        fit = _with_effects(prior, recorded, report)
+        fit = likeliest(_with_effects(prior, recorded, report), recorded)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     near = None
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            fit = settled(near.plant, recorded, near.misfit, report)
+            fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
             return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     found = plain_structure(recorded, begin)
     if near is not None and near.misfit < found.misfit:

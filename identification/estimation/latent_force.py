@@ -31,7 +31,7 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import again
 from identification.log import Log
 from identification.model.plant import Plant
-from identification.signals.kalman import Chain, N, log_densities, smoothed
+from identification.signals.kalman import Chain, N, innovations, log_densities, smoothed
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from identification.thresholds import AS_GOOD_AS_NONE
 
@@ -42,6 +42,7 @@ LEAST_NOISE_F = 1e-6  # of the largest force, to which any force is uncertain
 SHARE_OF_WINDOW = 4  # of a weak window's length, over which the motion's smoothing reaches
 CLOSE_ENOUGH = 0.02  # of log sigma
 WHITE_NOISES = (1.5, 3.0, 6.0, 15.0, 40.0, 120.0)  # times the noise, that either may be
+SIGMA_SHARES = (1.0, 0.1, 1e-3)  # of sigma, that may be left beside more white noise
 WHITE_GAINS = 5.0  # nats, by which more noise has to be the likelier
 NATS_95 = 1.353  # nats below the largest likelihood: one-sided 95 % of chi-square over two
 FORCE, VELOCITY = 2, 1  # states beside the position
@@ -165,6 +166,13 @@ class _Known:
         found = log_densities(self.z, R, self.seen, self.free, chain)
         return np.where(self.slides, found, 0.0)
 
+    def whitened(self, sigma: float, tau: float, rougher: Rougher) -> Array:
+        """Error of each sample measured while the body slides, predicted from those before it, in
+        its deviations, (n,)."""
+        chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
+        e, S = innovations(self.z, R, self.seen, self.free, chain)
+        return np.where(self.slides, e / np.sqrt(S), 0.0)
+
     def latent(self, sigma: float, tau: float, rougher: Rougher) -> LatentForce:
         """d of this log."""
         chain, R = self.chain(sigma, tau, rougher.force), self.R * rougher.measured**2
@@ -205,7 +213,11 @@ def latent_forces(
             noises = [Rougher(x) for x in WHITE_NOISES]
             if not all(one.imposed for one in logs):  # then the force is what is measured
                 noises += [Rougher(force=x) for x in WHITE_NOISES]
-            other = min(pool.map(lambda more: least(best.tau, more), noises))
+            tried = [
+                (share * best.sigma, best.tau, more) for more in noises for share in SIGMA_SHARES
+            ]
+            costs = list(pool.map(lambda at: cost(*at), tried))
+            other = least(best.tau, tried[int(np.argmin(costs))][2])
             if other.cost < best.cost - WHITE_GAINS:
                 best = min(pool.map(lambda tau: least(tau, other.rougher), memories))
 
@@ -217,6 +229,16 @@ def latent_forces(
     most = float(np.exp(brentq(beyond, low, bounds[1], xtol=CLOSE_ENOUGH) if out else bounds[1]))
     found = (one.latent(best.sigma, best.tau, best.rougher) for one in known)
     return LatentForces(best.sigma, best.tau, most, best.rougher, tuple(found))
+
+
+def prediction_errors(
+    plant: Plant, logs: Sequence[MotionLog], slowest: float, noise: LatentForces
+) -> Array:
+    """Errors with which each sample of the position that is measured while the bodies slide is
+    predicted from those before it, under this latent force, in their deviations, (n,) over all
+    logs: white where nothing else is missing. Source: Kalman (1960)."""
+    known = [_known(plant, one, slowest) for one in logs]
+    return np.concatenate([one.whitened(noise.sigma, noise.tau, noise.rougher) for one in known])
 
 
 def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:

@@ -192,7 +192,7 @@ def plain_share(recorded: RecordedLogs) -> Size:
     if recorded.held and any(not len(one.sliding.start) for one in recorded.logs):
         return NOT_SHOWN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
-    stage = first_stage(recorded.logs, recorded.by_command)[1]
+    stage = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
     shown = stage.get(MECHANICAL if recorded.held else ACTUATOR)
     return share_between(recorded.logs, shown.rows, shown.slowest) if shown else NOT_SHOWN
 

@@ -4,7 +4,8 @@ One place decides. A rig that prescribes the motion, or a run by a measured forc
 body's own, leaves the equation. Else the run is settled, whole where it is followed so
 (`settling`); and where it leaves clearly more of the equation than the equation's own least squares
 do on held-out stretches, or identifies less of mass and sliding friction without following the log,
-the equation answers after all. Of a motor's noisy command both answer, each for what it shows.
+the equation answers after all. Where the force or command is noisy, mass and sliding friction are
+those of largest likelihood, if the run's are significantly less likely (`prediction_error`).
 """
 
 from contextlib import suppress
@@ -13,7 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from identification.effects._base import AT_REST
 from identification.errors import NotIdentifiable
+from identification.estimation.estimates import effect_estimates
 from identification.estimation.imposed_motion import (
     FEWEST_COMPARED,
     fit_imposed,
@@ -21,14 +24,20 @@ from identification.estimation.imposed_motion import (
     is_unexplained,
     without_estimates,
 )
+from identification.estimation.prediction_error import prediction_error_fit
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import FIVE
+from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL
 from identification.estimation.regression.motion_rows import rows_and_windows
-from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.row_fit import first_stage, rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
-from identification.estimation.settling import is_adequate, settled
+from identification.estimation.settling import (
+    between_samples_sd,
+    is_adequate,
+    settled,
+    structure_estimates,
+)
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.run_errors import misfit
+from identification.estimation.windowed_run.parameters import values_of
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
@@ -36,7 +45,6 @@ from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
 
-WAYS_OF_SLIDING = (("F_cp", "F_vp"), ("F_cn", "F_vn"))
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 STEPS_WHY = (
     "nothing is identifiable from the equation of motion of steps of force; log a force that"
@@ -46,9 +54,9 @@ FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
 )
-STOPS_WHY = MinorRemark(
-    "mass and sliding friction are those of the equation of motion, since the command is noisy;"
-    " stick limits and bands those of the run"
+LIKELIEST_WHY = MinorRemark(
+    "mass and sliding friction are those that make the position measured while sliding likeliest,"
+    " since the force or command is noisy; stick limits and bands those of the run"
 )
 LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
@@ -111,7 +119,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     noise that the equation averages out. Source: cross-validation, Stone, J. R. Stat. Soc. B 36
     (1974) 111; the comparison is ours."""
     if fit.effects:
-        return fit
+        return likeliest(fit, recorded)
     left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
@@ -124,43 +132,47 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             fit = replace(other, adequate=fit.adequate)
-    elif recorded.by_noisy_command:
-        fit = _with_stops(fit, recorded)
+    else:
+        fit = likeliest(fit, recorded)
     return fit if left is None else _unless_unexplained(fit, left)
 
 
-def _with_stops(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
-    """A motor's mass and sliding friction by the equation of motion, and by the run what that does
-    not show: stick limits and bands.
+def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
+    """A fit that is adequate with mass, sliding friction and effects of largest likelihood, where
+    its own are significantly less likely: a run that a noisy force or command drives begins and
+    ends its stops by that noise, and is bent by those that it loses. Stick limits and bands stay
+    the run's.
 
-    Of a noisy command the equation has white errors, the run their integral over a window: weighed
-    sample by sample it is the less exact and biased. Where its values do not follow the log that
-    the run's follow, their errors are not of that noise, and the run's stand. Source: equation
-    error against output error, Ljung, System Identification (1999), 7.3.
+    Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
-    other = _by_equation(recorded, LESS_ERROR_WHY)
-    if other is None or _identified(other) < _identified(fit):
+    if not (fit.adequate and any(one.walks(recorded.drive) for one in recorded.logs)):
         return fit
-    five = {name: getattr(other.friction, name) for name in FIVE}
-    mixed = Plant(replace(fit.friction, **five), fit.actuator)
-    if not is_adequate(misfit(mixed, recorded.logs, recorded.drive)):
+    rows = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
+    if MECHANICAL not in rows:  # too little slides
         return fit
-    told = {name: other.estimates[name] for name in FIVE}
-    for level, slope in WAYS_OF_SLIDING:  # known only without its partner
-        one = fit.estimates[level]
-        if one.value is None and slope not in other.free:
-            told[level] = told[level].withheld(one.reason or "", five[level])
-    stops = [name for name in fit.free if name not in FIVE]
+    plant = Plant(fit.friction, fit.actuator, fit.effects)
+    of_effects = [n for n in fit.free if "." in n and n.partition(".")[2] not in AT_REST]
+    names = [*(n for n in fit.free if n in FIVE), *of_effects]
+    found = prediction_error_fit(plant, names, recorded.logs, rows[MECHANICAL].slowest)
+    if found is None or not found.is_likelier:
+        return fit
+    more = between_samples_sd(found.names, values_of(found.plant, found.names), recorded, of=1.0)
+    covariance = found.covariance + np.diag(more**2)
+    stops = [name for name in fit.free if name not in found.names]
     at = [fit.free.index(name) for name in stops]
+    own = np.sqrt(np.diag(fit.covariance))
+    sd = {name: float(own[i]) for name, i in zip(stops, at, strict=True)}
+    sd |= dict(zip(found.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    told = structure_estimates(found.plant, sd, recorded)
+    told |= effect_estimates(found.plant.effects, sd)
     return replace(
         fit,
-        friction=mixed.friction,
-        estimates={**fit.estimates, **told},
-        free=(*other.free, *stops),
-        covariance=block_diag(other.covariance, fit.covariance[np.ix_(at, at)]),
-        left=other.left,
-        falling=other.falling,
-        remarks=(*fit.remarks, STOPS_WHY),
+        friction=found.plant.friction,
+        effects=found.plant.effects,
+        estimates={**fit.estimates, **{name: told[name] for name in found.names}},
+        free=(*found.names, *stops),
+        covariance=block_diag(covariance, fit.covariance[np.ix_(at, at)]),
+        remarks=(*fit.remarks, LIKELIEST_WHY),
     )
 
 

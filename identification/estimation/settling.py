@@ -177,10 +177,13 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     return np.asarray(covariance)
 
 
-def between_samples_sd(names: Sequence[str], values: Array, recorded: RecordedLogs) -> Array:
-    """Deviations (d,) of values that the force between its samples adds, as far as it drives."""
+def between_samples_sd(
+    names: Sequence[str], values: Array, recorded: RecordedLogs, *, of: float | None = None
+) -> Array:
+    """Deviations (d,) of values that the force between its samples adds, as far as it drives: of
+    that part, by default as a run is driven."""
     gain = max(one.noise.corrected for one in recorded.logs)
-    part = 1.0 if recorded.drive == "force" else gain**2
+    part = of if of is not None else 1.0 if recorded.drive == "force" else gain**2
     return np.asarray(part * np.array([BETWEEN.get(name, 0.0) for name in names]) * np.abs(values))
 
 

@@ -129,19 +129,29 @@ def smoother_kernel(
             _sandwich(step, B, nothing, half)
 
 
-def log_densities(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chain) -> Array:
-    """Log density of each measured z (n,) given those before it, (n,); 0 where none is seen.
+def innovations(
+    z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chain
+) -> tuple[Array, Array]:
+    """Each measured z less its mean given those before it, and the variance of that, (n,) each; 0
+    and 1 where none is seen.
 
-    R: variance of each; seen, free: (n,). Source: Kalman (1960); prediction-error decomposition,
-    Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61.
+    R: variance of each; seen, free: (n,). Source: Kalman (1960).
     """
     e, S = np.zeros(len(z)), np.zeros(len(z))
     none, nothing = np.zeros((0, N)), np.zeros((0, N, N))
     filter_kernel(z, R, seen, free, of.A, of.Q, of.A_free, of.Q_free, of.c, of.x0, of.P0,
                   none, nothing, e, S)  # fmt: skip
-    out, S = np.zeros(len(z)), np.maximum(S, R)  # which rounding may take below the noise
-    out[seen] = -0.5 * (np.log(2.0 * np.pi * S[seen]) + e[seen] ** 2 / S[seen])
-    return out
+    return e, np.where(seen, np.maximum(S, R), 1.0)  # which rounding may take below the noise
+
+
+def log_densities(z: Array, R: Array, seen: BoolArray, free: BoolArray, of: Chain) -> Array:
+    """Log density of each measured z (n,) given those before it, (n,); 0 where none is seen.
+
+    R: variance of each; seen, free: (n,). Source: prediction-error decomposition, Schweppe, IEEE
+    Trans. Inf. Theory 11 (1965) 61.
+    """
+    e, S = innovations(z, R, seen, free, of)
+    return np.where(seen, -0.5 * (np.log(2.0 * np.pi * S) + e**2 / S), 0.0)
 
 
 def smoothed(

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.fit import finished
+from identification.estimation.latent_force import latent_forces
+from identification.estimation.prediction_error import prediction_error_fit, significant
 from identification.estimation.regressed_plant import regressed_plant
+from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.run_or_equation import by_equation_if_surer
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.model.plant import Plant
 from identification.progress import Progress
-from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.free_run.backward_elimination import (
     Setting,
-    equations_explained,
     fewest,
     suffices,
 )
@@ -48,26 +49,34 @@ def refinement(
         choice, model = fewest(choice, setting)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    return choice, by_equations(choice, model, setting)
+    return choice, likelier(choice, model, setting)
 
 
-def by_equations(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
-    """The model with sliding friction and effects as the equations identify them, where these are
-    explained and the run is not followed, which would bend them and make them unsure.
+def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
+    """The model, with sliding friction and effects as the equations identify them, or as they make
+    what was measured while sliding likeliest, where that is significantly likelier.
+
+    A run begins and ends its stops by the noise of a measured force, and is bent by those that it
+    loses. By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, of the position measured
+    under a latent force (`latent_force`, (1)); prediction-error method, Ljung (1999), 7.2.
     """
-    if model.imposed or model.misfit <= ADEQUATE or not choice.steps:
+    if model.imposed or not choice.steps:
         return model
-    if not equations_explained(choice.base):
+    found = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
+    names = [name for name, sd in found.prior.items() if name in model.sd and sd > 0.0]
+    plant = plant_with(model.plant, names, values_of(found.plant, names))
+    slowest = choice.base[MECHANICAL].slowest
+    run, equations = (
+        latent_forces(one, setting.logs, slowest).log_likelihood for one in (model.plant, plant)
+    )
+    if significant(2.0 * (equations - run), len(names)):
+        model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in names}})
+    if not any(one.walks(setting.drive) for one in setting.logs):
         return model
-    told = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
-    followed = model.misfit <= ASTRAY  # then whichever is surer
-    names = [
-        name
-        for name, sd in told.prior.items()
-        if name in model.sd and sd > 0.0 and not (followed and model.sd[name] < sd)
-    ]
-    plant = plant_with(model.plant, names, values_of(told.plant, names))
-    return replace(model, plant=plant, sd={**model.sd, **{n: told.prior[n] for n in names}})
+    best = prediction_error_fit(model.plant, names, setting.logs, slowest)
+    if best is None or not best.is_likelier:
+        return model
+    return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
 
 
 def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:

@@ -20,7 +20,6 @@ from identification.estimation.regression.effect_columns import (
 )
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
-    EQUATIONS,
     MECHANICAL,
     REST,
     MotionLog,
@@ -93,20 +92,9 @@ class EffectRows:
 
     @cached_property
     def parts(self) -> Mapping[str, list[Rows]]:
-        """Rows of each log in each equation, with the columns of the effects chosen."""
-        out = {}
-        for equation in EQUATIONS:
-            if equation == ACTUATOR and not self.by_command:
-                continue
-            own = [plain_rows(self, equation, i) for i in range(len(self.logs))]
-            for effect, values in self.chosen:
-                if equation in equations_of(effect, self.by_command, self.held):
-                    own = [
-                        with_effect(self, equation, effect, values, i, rows)
-                        for i, rows in enumerate(own)
-                    ]
-            out[equation] = own
-        return out
+        """Rows of each log in each equation, with the columns of the effects chosen; those of an
+        equation are made when it is first asked for."""
+        return _Parts(self)
 
     @cached_property
     def at_rest(self) -> tuple[Rest, ...]:
@@ -139,6 +127,26 @@ class EffectRows:
     def scale(self, equation: str) -> float:
         """What squares of rows are divided by, 1 where nothing but noise is left."""
         return self.scales.get(equation, 1.0)
+
+
+class _Parts(dict[str, list[Rows]]):
+    """The rows of a stage by equation."""
+
+    def __init__(self, stage: EffectRows) -> None:
+        super().__init__()
+        self.stage = stage
+
+    def __missing__(self, equation: str) -> list[Rows]:
+        stage = self.stage
+        own = [plain_rows(stage, equation, i) for i in range(len(stage.logs))]
+        for effect, values in stage.chosen:
+            if equation in equations_of(effect, stage.by_command, stage.held):
+                own = [
+                    with_effect(stage, equation, effect, values, i, rows)
+                    for i, rows in enumerate(own)
+                ]
+        self[equation] = own
+        return own
 
 
 def plain_rows(

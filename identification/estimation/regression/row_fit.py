@@ -135,35 +135,38 @@ def has_rows(stage: EffectRows, equation: str) -> bool:
     return rows >= least and finite
 
 
-def base_fits(stage: EffectRows) -> dict[str, RowFit]:
-    """Every equation of which the logs have enough rows, with the structure found so far."""
+def base_fits(stage: EffectRows, equations: Sequence[str] = EQUATIONS) -> dict[str, RowFit]:
+    """Each of these equations of which the logs have enough rows, with the structure found so
+    far."""
     return {
         equation: row_fit(stage, equation, stacked(stage.parts[equation]))
-        for equation in EQUATIONS
+        for equation in equations
         if (equation != ACTUATOR or stage.by_command) and has_rows(stage, equation)
     }
 
 
-def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes.
+def settled_fits(
+    stage: EffectRows, equations: Sequence[str] = EQUATIONS
+) -> tuple[EffectRows, dict[str, RowFit]]:
+    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes of these
+    equations.
 
     Source: iterated weighted least squares (Aitken 1936).
     """
-    found = base_fits(stage)
     for _ in range(2):
+        found = base_fits(stage, (MECHANICAL, ACTUATOR))
         theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
         theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
         stage = replace(stage, theta=theta, theta_a=theta_a)
-        found = base_fits(stage)
-    return stage, found
+    return stage, base_fits(stage, equations)
 
 
 def first_stage(
-    logs: Sequence[MotionLog], by_command: bool
+    logs: Sequence[MotionLog], by_command: bool, equations: Sequence[str] = EQUATIONS
 ) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The model without effects."""
+    """The model without effects, and the outcomes of these equations."""
     first = NOTHING_KNOWN, np.array([0.0, 0.0, 0.0])
-    return settled_fits(EffectRows(tuple(logs), *first, by_command))
+    return settled_fits(EffectRows(tuple(logs), *first, by_command), equations)
 
 
 def mean_square(o: RowFit) -> float:

@@ -244,7 +244,7 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     near = LogFit("made", (0.0, 0.0, 0.0), 1e-9, None, 1.0)
     run: Any = Told(table(1), adequate, "run", (near,))
     other = replace(run, adequate=False, name="equation")
-    recorded: Any = SimpleNamespace(plain=[log], by_noisy_command=False)
+    recorded: Any = SimpleNamespace(plain=[log], logs=())
     monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)
     found: Any = run_or_equation.on_the_floor(run, recorded)

@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.drives_rig import make
 from identification.errors import NotIdentifiable
-from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
@@ -110,25 +109,6 @@ def test_steps_that_no_run_follows_identify_nothing() -> None:
         NotIdentifiable, match="nothing is identifiable from the equation of motion of steps"
     ):
         fit_plant(logs, np.random.default_rng(0), rig=Rig("force", motion="rotary"))
-
-
-def test_a_coulomb_force_of_an_equation_without_its_viscous_term_is_none_of_a_run_that_shows_none(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    logs, rig = steps((1.0, -1.0, 0.6, -0.6)), Rig("motor", force_per_command=1.0, motion="rotary")
-    fit = fit_plant(logs, np.random.default_rng(0), rig=rig)
-    at = [i for i, name in enumerate(fit.free) if name != "F_vp"]
-    without = replace(fit, free=tuple(fit.free[i] for i in at),
-                      covariance=fit.covariance[np.ix_(at, at)])  # fmt: skip
-    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: without)
-    shown = run_or_equation._with_stops(fit, recorded_logs(logs, rig))
-    assert shown.estimates["F_cp"].value == fit.estimates["F_cp"].value
-    hidden = {**fit.estimates} | {
-        name: fit.estimates[name].withheld("too wide", 0.1) for name in ("F_cp", "F_cn", "F_vp")
-    }
-    shown = run_or_equation._with_stops(replace(fit, estimates=hidden), recorded_logs(logs, rig))
-    assert shown.estimates["F_cp"].value is None and shown.estimates["F_cp"].reason == "too wide"
-    assert shown.estimates["F_cn"].value == fit.estimates["F_cn"].value
 
 
 @pytest.mark.slow
