@@ -14,13 +14,17 @@ from identification.estimation.regression.equation_rows import (
     actuator,
 )
 from identification.estimation.regression.held_command import (
+    LARGEST_SHARE,
+    UNSEEN,
     between_samples,
     period_of,
+    rate_column,
     share_between,
     unseen,
 )
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.regression.motion_rows import settled_rows
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
@@ -31,7 +35,7 @@ from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import FAR_LESS, WORSE
+from identification.thresholds import BEYOND_CHANCE, WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +86,8 @@ class RecordedLogs:
     @property
     def instant_sd(self) -> float:
         """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
-        share above, of a measured one as likely anywhere up to where its lag would be seen."""
-        samples = self.share_sd if self.held else FAR_LESS / 3.0**0.5
+        share above, of a measured one as likely anywhere up to half a sample to either side."""
+        samples = self.share_sd if self.held else UNSEEN.sd
         return samples * self.logs[0].log.h
 
     @property
@@ -183,18 +187,25 @@ def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
 
 
 def plain_share(recorded: RecordedLogs) -> Size:
-    """Share of the command's step to the next sample, as a machine without effects shows it.
+    """Share of the command's step to the next sample, as a machine without effects shows it; of a
+    motor by windows that hold reversals, where those of sliding one way could show none.
 
     Ours: `regression/README.md`, (13).
     """
-    if not (recorded.held or recorded.by_command):
-        return NOT_SHOWN
-    if recorded.held and any(not len(one.sliding.start) for one in recorded.logs):
+    logs, motor = recorded.logs, recorded.held
+    if not (motor or recorded.by_command):
         return NOT_SHOWN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
-    stage = first_stage(recorded.logs, recorded.by_command)[1]
-    shown = stage.get(MECHANICAL if recorded.held else ACTUATOR)
-    return share_between(recorded.logs, shown.rows, shown.slowest) if shown else NOT_SHOWN
+    stage = first_stage(logs, recorded.by_command)[1]
+    shown, found = stage.get(MECHANICAL if motor else ACTUATOR), UNSEEN
+    if shown:
+        rates = [rate_column(one) for one in logs]
+        found = share_between(shown.rows, np.concatenate(rates), motor, shown.slowest)
+    if motor and found.sd * BEYOND_CHANCE > LARGEST_SHARE:
+        made = settled_rows(logs)
+        rates = [rate_column(one, of.windows) for one, of in zip(logs, made, strict=True)]
+        found = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)
+    return found
 
 
 def recorded_logs(

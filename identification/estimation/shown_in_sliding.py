@@ -57,7 +57,7 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     every = stacked([one.rows for one in made])
     if not len(every.b):
         return fit
-    logged = zip(made, recorded.plain, strict=True)
+    logged = list(zip(made, recorded.plain, strict=True))
     y = np.concatenate([one.windows.mean @ np.asarray(log["y"]) for one, log in logged])
     steady = [np.abs(every.X[:, level]) > ONE_WAY_THROUGHOUT for level, _ in COLUMNS_OF_WAYS]
     reasons = dict[str, str]()
@@ -78,7 +78,8 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if recorded.drive == "force" and fit.adequate and not fit.imposed:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
-    return _of_any_instant(fit, recorded.instant_sd)
+    rate = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
+    return _of_any_instant(fit, replace(every, b=np.concatenate(rate)), recorded.instant_sd)
 
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
@@ -93,22 +94,21 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
     return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
 
 
-def _of_any_instant(fit: KarnoppFit, instant_sd: float) -> KarnoppFit:
-    """The fit whose mass errs by as much as it is unsure when the force acts, deviation [s]: of
-    viscous friction a lag makes inertia.
+def _of_any_instant(fit: KarnoppFit, rate: Rows, instant_sd: float) -> KarnoppFit:
+    """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
+    deviation [s]; rate: the equation's rows, of the force's rate of change.
 
-    F_v y'(t - lag) = F_v y' - F_v lag y'', to first order; ours.
+    F(t - lag) = F - lag F', to first order; ours.
     """
-    one, viscous = fit.estimates["m"], 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
-    more = viscous * instant_sd
-    if one.sd is None or not more:
-        return fit
-    wider = widened(one, float(np.hypot(one.sd, more)) / one.sd)
-    covariance = fit.covariance.copy()
-    if "m" in fit.free:
-        at = fit.free.index("m")
-        covariance[at, at] += more**2
-    return replace(fit, estimates={**fit.estimates, "m": wider}, covariance=covariance)
+    moved = dict(zip(FIVE, instant_sd * solve_rows(rate).theta, strict=True))
+    wider = {
+        name: widened(one, float(np.hypot(one.sd, moved[name])) / one.sd)
+        for name, one in fit.estimates.items()
+        if name in moved and one.sd
+    }
+    errs = np.array([moved.get(name, 0.0) for name in fit.free])
+    covariance = fit.covariance + np.outer(errs, errs)
+    return replace(fit, estimates={**fit.estimates, **wider}, covariance=covariance)
 
 
 def _of_one_speed(steady: Rows, column: int) -> bool:
