@@ -98,9 +98,11 @@ def _of_any_instant(fit: KarnoppFit, rate: Rows, instant_sd: float) -> KarnoppFi
     """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
     deviation [s]; rate: the equation's rows, of the force's rate of change.
 
-    F(t - lag) = F - lag F', to first order; ours.
+    F(t - lag) = F - lag F', to first order, by which a run has F_v of a lag as mass; ours.
     """
-    moved = dict(zip(FIVE, instant_sd * solve_rows(rate).theta, strict=True))
+    theta, viscous = solve_rows(rate).theta, 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
+    theta[0] = max(theta[0], viscous)
+    moved = dict(zip(FIVE, instant_sd * theta, strict=True))
     wider = {
         name: widened(one, float(np.hypot(one.sd, moved[name])) / one.sd)
         for name, one in fit.estimates.items()
