@@ -17,6 +17,7 @@ from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
 from workbench.logs.clocks import clock_groups
 from workbench.logs.faulty_rows import are_few
+from workbench.logs.labelled import as_table
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
@@ -167,7 +168,7 @@ def _head(path: Path, encoding: str) -> str:
         except (LookupError, UnicodeDecodeError):
             text = ""
         if len(text) > _EXAMINED and "\0" not in text:
-            return text
+            return as_table(text)
     return _decode(path, encoding)
 
 
@@ -190,7 +191,7 @@ def _decode(path: Path, encoding: str) -> str:
         raise BadLog(f"{path}: is a binary file, not text; give its format in the card's [file]")
     if "\n" not in text:
         text = text.replace("\r", "\n")
-    return text.removeprefix("\ufeff")
+    return as_table(text.removeprefix("\ufeff"))
 
 
 def _skipped(line: str, comment: str) -> bool:
