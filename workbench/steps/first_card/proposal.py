@@ -188,7 +188,7 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     """The card by these roles."""
     other = roles.other
     roles, area = _pressure_beside_force(columns, roles)
-    motion = known_motion(roles)
+    motion = known_motion(roles, columns.read)
     units = guessed_units(columns, roles, motion)
     turns = "" if motion.sure else "linear" if motion.motion == "rotary" else "rotary"
     rig = [

@@ -213,10 +213,11 @@ def _by_relation(name: str, units: Mapping[str, str], given: Units, slope: float
 def contradicted_clock(columns: Columns, roles: Roles, units: Units) -> float | None:
     """How much faster the position moves by a logged velocity than by clock and units.
 
-    None where the two agree, or no velocity is logged. Units that no header gives are any.
+    None where the two agree, no velocity is logged, or its unit or the position's is a guess: by
+    other units it would be another.
     """
     slope = _slope(columns, roles)
-    if slope is None:
+    if slope is None or not (units["y"].sure and units["v"].sure):
         return None
     names = {name: units[name].unit for name in ("t", "y", "v")}
     off = _off(names, units, slope)
