@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
+from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
@@ -20,7 +21,8 @@ from workbench.logs.faulty_rows import are_few
 from workbench.logs.labelled import as_table
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
-from workbench.logs.table import Table
+from workbench.logs.table import Table, of_array
+from workbench.logs.times import with_whole_seconds
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _WHOLE = re.compile(r"[+-]?\d+")
@@ -77,9 +79,19 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     columns, remarks = _parse(path, content, marks, len(names), first_row)
     headed = bool(found.names)
     table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
-    if found.groups or not found.names:
-        return table
-    return _grouped(table, fields[found.data : found.data + _COMPARED], marks)
+    rows = fields[found.data : found.data + _COMPARED]
+    if not headed and len(rows) < SHORTEST_LOG <= len(names) and len(fields) < SHORTEST_LOG:
+        return _of_long_rows(path, table, spec) or table
+    table = with_whole_seconds(table, rows)
+    return table if found.groups or not headed else _grouped(table, rows, marks)
+
+
+def _of_long_rows(path: Path, table: Table, spec: FileSpec) -> Table | None:
+    """The table of a file that has a row a signal; None where it holds text."""
+    columns = [table.fetch(k) for k in range(len(table.names))]
+    if any(one.dtype.kind != "f" for one in columns):
+        return None
+    return of_array(path, np.column_stack(columns), spec)
 
 
 def holds_blocks(path: Path, spec: FileSpec) -> bool:

@@ -254,7 +254,8 @@ def _first_of_data(rows: Sequence[Sequence[str]]) -> int | None:
 
     def is_data(row: Sequence[str]) -> bool:
         full = [one for one in row if one]
-        return len(full) > 1 and sum(map(is_number, full)) >= _MOSTLY * len(row)
+        numbers = sum(map(is_number, full))
+        return len(full) > 1 and (numbers >= _MOSTLY * len(row) or numbers == len(full))
 
     for at in range(len(rows)):
         block = [row for row in rows[at : at + 2 * _BELOW] if any(row)][:_BELOW]
