@@ -73,6 +73,10 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
             f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
             " that it is the right file"
         )
+    if not found.names and len(names) >= SHORTEST_LOG:
+        long = _of_long_rows(path, body, marks, spec)
+        if long is not None:
+            return long
     first_row = start + found.data + 1
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
@@ -80,18 +84,19 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     headed = bool(found.names)
     table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
     rows = fields[found.data : found.data + _COMPARED]
-    if not headed and len(rows) < SHORTEST_LOG <= len(names) and len(fields) < SHORTEST_LOG:
-        return _of_long_rows(path, table, spec) or table
     table = with_whole_seconds(table, rows)
     return table if found.groups or not headed else _grouped(table, rows, marks)
 
 
-def _of_long_rows(path: Path, table: Table, spec: FileSpec) -> Table | None:
-    """The table of a file that has a row a signal; None where it holds text."""
-    columns = [table.fetch(k) for k in range(len(table.names))]
-    if any(one.dtype.kind != "f" for one in columns):
+def _of_long_rows(path: Path, body: str, marks: _Marks, spec: FileSpec) -> Table | None:
+    """The table of rows of numbers that are a signal each, where they are far fewer than long."""
+    if body.count("\n", 0, len(body) - 1) >= SHORTEST_LOG:
         return None
-    return of_array(path, np.column_stack(columns), spec)
+    rows = [_split(line, marks) for line in body.splitlines() if line.strip()]
+    if any(len(row) != len(rows[0]) or not all(map(is_number, row)) for row in rows):
+        return None
+    numbers = [[float(cell.replace(marks.decimal, ".") or "nan") for cell in row] for row in rows]
+    return of_array(path, np.array(numbers), spec.model_copy(update={"skip_rows": 0}))
 
 
 def holds_blocks(path: Path, spec: FileSpec) -> bool:

@@ -81,6 +81,8 @@ def with_whole_seconds(table: Table, rows: Sequence[Sequence[str]]) -> Table:
     for k in range(len(cells) - 1):
         if not all(one.isdigit() for pair in cells[k : k + 2] for one in pair):
             continue
+        if max(map(int, cells[k + 1])) <= _MILLI / _NANO or len(set(cells[k + 1])) == 1:
+            continue
         whole, part = (np.asarray(table.fetch(at), dtype=np.float64) for at in (k, k + 1))
         if _counts_seconds(whole, part):
             return _joined(table, k, whole + _NANO * part)

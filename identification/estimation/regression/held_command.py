@@ -42,7 +42,7 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     """
     keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
-    if len(with_rate.b) < 4 * with_rate.X.shape[1]:
+    if len(with_rate.b) < 4 * with_rate.X.shape[1] or not np.ptp(with_rate.block):
         return UNSEEN
     found, without = solve_rows(with_rate), solve_rows(rows.at(keep)).cost
     if without <= 0.0:
