@@ -8,7 +8,7 @@ is evidence only, which the column's own numbers may outweigh.
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Quantity = Literal[
@@ -187,11 +187,23 @@ _ERRORS = (
 _FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
 _FILTERED_SHORT = ("filt", "lpf")
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
+_PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
 
 def read_header(text: str, unit_below: str = "") -> Header:
-    """The header's parts; unit_below: the field of a row of units under it."""
+    """The header's parts; unit_below: the field of a row of units under it.
+
+    Of a path, as a message's field has, the last part tells the quantity, all of it the purpose.
+    """
+    whole, last = _read(text, unit_below), text.rpartition("/")[2]
+    if text.count("/") < _PATH or len("".join(words_of(last)[:1])) < _SPOKEN:
+        return whole
+    own = _read(last, unit_below)
+    return replace(whole, means=own.means, unit=own.unit) if own.means else whole
+
+
+def _read(text: str, unit_below: str) -> Header:
     plain = unicodedata.normalize("NFKC", text).strip().strip("\"'")
     name, unit, doubtful = _without_unit(plain)
     if unit_below.strip():

@@ -16,7 +16,7 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
-from workbench.logs.clocks import clock_groups
+from workbench.logs.clocks import clock_groups, topic_groups
 from workbench.logs.faulty_rows import are_few
 from workbench.logs.labelled import as_table
 from workbench.logs.layout import Layout, find_layout, is_number
@@ -85,7 +85,9 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
     rows = fields[found.data : found.data + _COMPARED]
     table = with_whole_seconds(table, rows)
-    return table if found.groups or not headed else _grouped(table, rows, marks)
+    if found.groups or not headed:
+        return table
+    return topic_groups(table, rows) or _grouped(table, rows, marks)
 
 
 def _of_long_rows(path: Path, body: str, marks: _Marks, spec: FileSpec) -> Table | None:

@@ -45,3 +45,30 @@ def test_a_row_a_signal_is_read_as_a_column_a_signal(tmp_path: Path) -> None:
     found = read_unknown(path)
     assert [one.number for one in found.columns] == [0, 1, 2]
     assert found.columns[1].values == pytest.approx(Y)
+
+
+def test_rows_of_one_message_alone_are_groups_on_their_own_clocks(tmp_path: Path) -> None:
+    """As plots of topics are exported: each row has the values of one of them, the rest empty."""
+    rows = []
+    for k, (t, y) in enumerate(zip(T, Y, strict=True)):
+        rows.append(f"{t:.6f},{y:.6f},{2 * y:.6f},")
+        rows += [f"{t + 1e-3:.6f},,,{y + 1.0:.6f}"] * (k % 2)
+    path = tmp_path / "log.csv"
+    path.write_text("__time,/joint/position,/joint/effort,/cmd/position\n" + "\n".join(rows))
+    table = read_table(path, FileSpec())
+    assert len(set(table.groups)) == 2
+    found = {one.header: one for one in read_unknown(path).columns if not one.unusable}
+    assert found["/joint/position"].values == pytest.approx(Y, abs=1e-6)
+    asked = found["/cmd/position"].values
+    inside = np.isfinite(asked)
+    assert np.mean(inside) > 0.95
+    assert asked[inside] == pytest.approx(Y[inside] + 1.0, abs=0.05)
+
+
+def test_a_few_empty_cells_make_no_groups(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [
+        f"{t:.6f},{y:.6f},{'' if k == 3 else k}" for k, (t, y) in enumerate(zip(T, Y, strict=True))
+    ]
+    path.write_text("t,y,F\n" + "\n".join(rows))
+    assert read_table(path, FileSpec()).groups == ()
