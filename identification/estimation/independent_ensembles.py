@@ -24,7 +24,7 @@ WARM_STEPS = 100  # before the first steps that may count; each round then doubl
 MOST_CHAIN_STEPS = 6400  # of each walker
 WALKERS_APIECE = 4  # walkers for each unknown, in whole blocks of the kernels' lanes (twice 16)
 WALKER_BLOCK = 32
-EVOLUTION, STRETCH = 0.67, 0.33  # shares of the moves of differential evolution, and the others
+EVOLUTION, STRETCHING = 0.67, 0.33  # shares of the moves of differential evolution, and the others
 Cost = Callable[[Array], Array]
 
 
@@ -91,7 +91,7 @@ def _sampler(cost: Cost, walkers: int, d: int) -> Any:
         values = -0.5 * cost(members)
         return np.where(np.isfinite(values), values, -np.inf)
 
-    moves = [(emcee.moves.DEMove(), EVOLUTION), (emcee.moves.StretchMove(), STRETCH)]
+    moves = [(emcee.moves.DEMove(), EVOLUTION), (emcee.moves.StretchMove(), STRETCHING)]
     return emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True, moves=moves)
 
 

@@ -84,10 +84,8 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
     """The fit of a run that follows by a measured force, of which the equation leaves so many times
-    its noise: that noise was estimated too small, and so are the deviations.
-
-    Source: scale by the median of what is left, Huber, Robust Statistics (1981), 5.1.
-    """
+    its noise, estimated too small as the deviations are. Source: scale by the median of what is
+    left, Huber, Robust Statistics (1981), 5.1."""
     if noises <= 1.0:
         return fit
     wider = {name: widened(one, noises) for name, one in fit.estimates.items()}
@@ -96,10 +94,8 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
 
 def _of_any_instant(fit: KarnoppFit, rate: Rows, instant_sd: float) -> KarnoppFit:
     """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
-    deviation [s]; rate: the equation's rows, of the force's rate of change.
-
-    F(t - lag) = F - lag F', to first order, by which a run has F_v of a lag as mass; ours.
-    """
+    deviation [s]; rate: the equation's rows, of the force's rate of change. F(t - lag) = F - lag F'
+    to first order, by which a run has F_v of a lag as mass; ours."""
     theta, viscous = solve_rows(rate).theta, 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
     theta[0] = max(theta[0], viscous)
     moved = dict(zip(FIVE, instant_sd * theta, strict=True))

@@ -55,7 +55,7 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     apart = [share_of(theta) for theta in without_each_block(with_rate)]
     sd = float(spread_of_left_out(np.array(apart)))
     share = significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
-    return Size(share, sd)
+    return Size(share, min(sd, UNSEEN.sd))
 
 
 def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
