@@ -18,8 +18,8 @@ _CELL = re.compile(
     r"(?P<label>[^\d\s:=][^:=]*[:=])?\s*"
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\s,;]*)?"
 )
-_DELIMITERS = (",", ";", "\t", "|")
-_COMPARED, _FEWEST = 40, 5  # lines by which such a text is known
+_SEPARATORS = (",", ";", "\t", "|")
+_LINES_SEEN, _FEWEST_LINES = 40, 5  # lines by which such a text is known
 _ABOVE = 3  # lines above the numbers at most, of which the last may be a header
 
 
@@ -41,13 +41,15 @@ def as_table(text: str) -> str:
     lines = text[: 64 * 1024].splitlines()[:-1] or text.splitlines()
     if len(_GOT_AT.findall("\n".join(lines))) > len(lines) / 2:
         rest = [_GOT_AT.sub("", line) for line in lines]
-        sign = next((one for one in _DELIMITERS if one in rest[-1]), ",")
-        own = _has_clock([_split(line, sign) for line in rest[-_COMPARED:]])
+        sign = next((one for one in _SEPARATORS if one in rest[-1]), ",")
+        own = _has_clock([_split(line, sign) for line in rest[-_LINES_SEEN:]])
         return as_table(_GOT_AT.sub("" if own else rf"\1{sign}", text))
     filled = [line for line in lines if line.strip()]
-    for delimiter in _DELIMITERS:
-        rows = [_split(line, delimiter) for line in filled[-_COMPARED:]]
-        if len(rows) > _FEWEST and (parts := _parts(rows[-max(_FEWEST, len(rows) - _ABOVE) :])):
+    for delimiter in _SEPARATORS:
+        rows = [_split(line, delimiter) for line in filled[-_LINES_SEEN:]]
+        if len(rows) > _FEWEST_LINES and (
+            parts := _parts(rows[-max(_FEWEST_LINES, len(rows) - _ABOVE) :])
+        ):
             return _rewritten(text, delimiter, parts)
     return text
 
@@ -58,7 +60,7 @@ def _has_clock(rows: Sequence[Sequence[str]]) -> bool:
     for cells in zip(*rows, strict=False):
         numbers = [found["number"] for one in cells if (found := _CELL.fullmatch(one))]
         x = [float(one) for one in numbers]
-        if len(x) == len(rows) > _FEWEST and all(a < b for a, b in pairwise(x)):
+        if len(x) == len(rows) > _FEWEST_LINES and all(a < b for a, b in pairwise(x)):
             return True
     return False
 
