@@ -88,3 +88,15 @@ def test_a_speed_of_turning_beside_the_position_tells_that_it_turns(
     found = propose(tmp_path, "ms,tacho,erpm,current", 1e3 * servo["t"], servo["y"] / 6.0,
                     erpm + 30.0 * noise, servo["F"])  # fmt: skip
     assert found.motion == "rotary"
+
+
+def test_the_current_of_which_a_torque_was_made_is_no_command(
+    servo: dict[str, Array], tmp_path: Path
+) -> None:
+    """Of six digits each, so that the two are not the same to the last one."""
+    noise = 3e-3 * np.random.default_rng(5).standard_normal(ROWS)
+    made = np.array([float(f"{one:.6g}") for one in servo["F"] + noise])
+    found = propose(tmp_path, "t,position,current,torque", servo["t"], servo["y"],
+                    np.round(made / 9.13, 5), made)  # fmt: skip
+    assert found.kind == "force"
+    assert found.signal("u") is None
