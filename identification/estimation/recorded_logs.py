@@ -14,9 +14,9 @@ from identification.estimation.regression.equation_rows import (
     actuator,
 )
 from identification.estimation.regression.held_command import (
-    LARGEST_SHARE,
     UNSEEN,
     between_samples,
+    could_show,
     period_of,
     rate_column,
     share_between,
@@ -35,7 +35,7 @@ from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import BEYOND_CHANCE, WORSE
+from identification.thresholds import WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +193,7 @@ def plain_share(recorded: RecordedLogs) -> Size:
     if shown:
         rates = [rate_column(one) for one in logs]
         found = share_between(shown.rows, np.concatenate(rates), motor, shown.slowest)
-    if motor and found.sd * BEYOND_CHANCE > LARGEST_SHARE:
+    if motor and not could_show(found):
         made = settled_rows(logs)
         rates = [rate_column(one, of.windows) for one, of in zip(logs, made, strict=True)]
         found = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)

@@ -58,6 +58,11 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     return Size(share, min(sd, UNSEEN.sd))
 
 
+def could_show(found: Size) -> bool:
+    """Whether rows that leave a share so unsure could show the largest one."""
+    return found.sd * BEYOND_CHANCE <= LARGEST_SHARE
+
+
 def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
     """What a whole step to the next sample would add to the rows of a log, (r,); windows: of a
     motor's, by default those of sliding one way."""
