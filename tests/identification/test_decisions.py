@@ -13,7 +13,7 @@ from tests.test_lengths import ROOT, tree
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
     "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
-    "regressed_plant", "residual_drift", "run_or_equation", "settling", "structure_fit",
+    "regressed_plant", "run_or_equation", "settling", "structure_fit",
     "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip
 # Names of equations, parameters, signals and remarks, and bounds of what a parameter can be.
