@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import (
     Events,
@@ -153,14 +153,13 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
-    """The equation of motion of logs that move one way: mass, viscous and Coulomb friction.
-
-    Raises NotIdentifiable where they go both ways, or hardly slide. Source: as `fit_imposed`,
-    Messenger, Bortz (2021).
-    """
+    """The equation of motion of logs that move one way, as `fit_imposed` has it of both: mass,
+    viscous and Coulomb friction. Raises NotIdentifiable where they go both ways, or hardly slide.
+    Source: Messenger, Bortz (2021)."""
     moved = _moved(recorded.plain, recorded.held)
-    way = _way(moved)
-    if way is None:
+    up = np.concatenate([one.up for one in moved])
+    way = _way(up)
+    if way is None or len(up) < FEWEST_COMPARED:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
     return _made(fitted(data, ONE_WAY[way]), data, recorded, why)
@@ -168,7 +167,8 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    return _way(_moved(logs, held), fewest=1)
+    d = np.concatenate([one.signals["d"] for one in _moved(logs, held)])
+    return _way(d[d != 0.0] > 0.0)
 
 
 def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
@@ -176,11 +176,10 @@ def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
     return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
 
 
-def _way(moved: Sequence[MotionLog], fewest: int = FEWEST_COMPARED) -> bool | None:
-    """The way that at least so many windows of sliding go, as `way_of`."""
-    up = np.concatenate([one.up for one in moved])
+def _way(up: BoolArray) -> bool | None:
+    """The way of samples or windows (n,), as `way_of`."""
     share = float(np.mean(up)) if len(up) else 0.5
-    return share > 0.5 if len(up) >= fewest and is_one_way(share) else None
+    return share > 0.5 if is_one_way(share) else None
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:

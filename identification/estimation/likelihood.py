@@ -9,8 +9,9 @@ A measured force drives a run with its noise, which turns on stops and drifts: n
 samples at once is to be had then. What is left is a likelihood of each by itself, with the weights
 of the estimator. Such a one is far too narrow; here it counts for less and is stretched about
 its maximum, so that there it is as wide as draws of the noise move the estimator (Ribatet, Cooley,
-Davison, Statistica Sinica 22 (2012) 813, eqs. 2.8 and 2.10): the shape is the likelihood's, the
-width that of the errors.
+Davison, Statistica Sinica 22 (2012) 813, eqs. 2.8 and 2.10), and its maximum is laid on the fit,
+whose sliding friction may be that of the prediction errors: the shape is that of the run's
+likelihood, place and width are those of the fit and its errors.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,11 +29,13 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.settling import between_samples_sd
 from identification.estimation.windowed_run.likely_square import LikelyLog
 from identification.estimation.windowed_run.parameters import (
+    even,
     kernel_rows,
     plant_with,
     units_in,
     values_of,
 )
+from identification.estimation.windowed_run.refinement import refit
 from identification.estimation.windowed_run.run_errors import NOISE_LOSS
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
@@ -96,8 +99,10 @@ def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Like
     covariance = np.atleast_2d(fit.covariance)
     logs, drive = recorded.logs, recorded.drive
     seconds = longest_window(plant, logs, drive) if fit.whole else RUN_WINDOW
-    windows = LikelyWindows.of(plant, logs, drive, fit.free, covariance, seconds)
-    center = values_of(plant, fit.free)
+    own, center = plant, values_of(plant, fit.free)
+    if any(one.walks(drive) for one in logs):
+        own = refit(plant, logs, drive, prior=even(plant), effort="near").plant
+    windows = LikelyWindows.of(own, logs, drive, fit.free, covariance, seconds, center)
     further = between_samples_sd(fit.free, center, recorded)
     if windows.stretch is not None:  # which has that in it already
         further = np.zeros(len(center))
@@ -125,9 +130,9 @@ class LikelyWindows:
     """Logs in windows, as a likelihood of parameters `names` (d,) of a plant like this one.
 
     found: by log, how its run changes with the windows' states; low, high (d,): bounds; center
-    (d,): the plant's own values; stretch (d, d): of what is off them, in cost; factor: of the
-    robust square sum; granted: independent samples for which a residual that is no noise counts, 0
-    where it is noise.
+    (d,): the plant's own values; stretch (d, d): of what is off the fit (d,), in cost; factor: of
+    the robust square sum; granted: independent samples for which a residual that is no noise
+    counts, 0 where it is noise.
     """
 
     plant: Plant
@@ -138,18 +143,20 @@ class LikelyWindows:
     low: Array
     high: Array
     stretch: Array | None = None
+    fit: Array | None = None
     factor: float = 1.0
     granted: float = 0.0
 
     @classmethod
     def of(
         cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, names: Sequence[str],
-        covariance: Array, seconds: float,
+        covariance: Array, seconds: float, fit: Array | None = None,
     ) -> "LikelyWindows":  # fmt: skip
-        """The logs in the windows of so many seconds in which the fit has converged.
+        """The logs in the windows of so many seconds in which the plant's run has converged.
 
-        covariance (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed.
-        Source: composite likelihood, Ribatet, Cooley, Davison, Statistica Sinica 22 (2012) 813.
+        covariance (d, d): of the fit's errors; fit (d,): its values, by default the plant's own.
+        Raises BadModel where the plant cannot be followed. Source: composite likelihood, Ribatet,
+        Cooley, Davison, Statistica Sinica 22 (2012) 813.
         """
         found = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
         own = tuple(one for one in found if one is not None)
@@ -158,7 +165,7 @@ class LikelyWindows:
         posed = cls(plant, drive, tuple(names), tuple(logs), own, *_bounds(plant, names))
         if any(one.walks(drive) for one in logs):
             factor, stretch = posed.stretched(covariance)
-            return replace(posed, factor=factor, stretch=stretch)
+            return replace(posed, factor=factor, stretch=stretch, fit=fit)
         left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS
         if left <= ADEQUATE:
             return replace(posed, factor=AS_NOISE / left)
@@ -189,7 +196,8 @@ class LikelyWindows:
         inside = np.all((members >= self.low) & (members <= self.high), axis=1)
         at = members
         if self.stretch is not None:
-            at = self.center + (members - self.center) @ self.stretch.T
+            fit = self.center if self.fit is None else self.fit
+            at = self.center + (members - fit) @ self.stretch.T
             inside &= np.all((at >= self.low) & (at <= self.high), axis=1)
         out = np.full(len(members), np.inf)
         out[inside] = self.squares(at[inside])

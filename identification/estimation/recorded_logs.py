@@ -14,24 +14,28 @@ from identification.estimation.regression.equation_rows import (
     actuator,
 )
 from identification.estimation.regression.held_command import (
+    UNSEEN,
     between_samples,
+    could_show,
     period_of,
+    rate_column,
     share_between,
     unseen,
 )
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.motion_log import motion_log
+from identification.estimation.regression.motion_rows import settled_rows
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.plant import units_of
-from identification.model.size import NOT_SHOWN, Size
+from identification.model.size import Size
 from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import FAR_LESS, WORSE
+from identification.thresholds import WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +85,8 @@ class RecordedLogs:
 
     @property
     def instant_sd(self) -> float:
-        """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
-        share above, of a measured one as likely anywhere up to where its lag would be seen."""
-        samples = self.share_sd if self.held else FAR_LESS / 3.0**0.5
-        return samples * self.logs[0].log.h
+        """Deviation [s] of the instants at which the force of these logs acts."""
+        return self.share_sd * self.logs[0].log.h
 
     @property
     def moved(self) -> tuple[int, int]:
@@ -127,12 +129,8 @@ class RecordedLogs:
 
 
 def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
-    """The logs at the rates that their motion needs.
-
-    What a command does between its samples is in no mean: the stops and breakaways that it makes
-    there are others (true parameters on logs of `benchmarks/drives.py` at 2 and 4 kHz). So logs
-    with a command stay as they are.
-    """
+    """The logs at the rates that their motion needs; those with a command as they are: what it does
+    between its samples is in no mean, and makes other stops (`benchmarks/drives.py`, 4 kHz)."""
     if rig.kind == "motor" or commanded(logs):
         return list(logs)
     return [at_needed_rate(log) for log in logs]
@@ -183,29 +181,32 @@ def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
 
 
 def plain_share(recorded: RecordedLogs) -> Size:
-    """Share of the command's step to the next sample, as a machine without effects shows it.
-
-    Ours: `regression/README.md`, (13).
-    """
-    if not (recorded.held or recorded.by_command):
-        return NOT_SHOWN
-    if recorded.held and any(not len(one.sliding.start) for one in recorded.logs):
-        return NOT_SHOWN
+    """Share of the command's step to the next sample, as a machine without effects shows it; of a
+    motor by windows that hold reversals, where those of sliding one way could show none; none of a
+    measured force, which is of any instant of its sample. Ours: `regression/README.md`, (13)."""
+    logs, motor = recorded.logs, recorded.held
+    if not (motor or recorded.by_command):
+        return UNSEEN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
-    stage = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
-    shown = stage.get(MECHANICAL if recorded.held else ACTUATOR)
-    return share_between(recorded.logs, shown.rows, shown.slowest) if shown else NOT_SHOWN
+    stage = first_stage(logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
+    shown, found = stage.get(MECHANICAL if motor else ACTUATOR), UNSEEN
+    if shown:
+        rates = [rate_column(one) for one in logs]
+        found = share_between(shown.rows, np.concatenate(rates), motor, shown.slowest)
+    if motor and not could_show(found):
+        made = settled_rows(logs)
+        rates = [rate_column(one, of.windows) for one, of in zip(logs, made, strict=True)]
+        found = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)
+    return found
 
 
 def recorded_logs(
     logs: Sequence[Log], rig: Rig, drive: Drive | None = None, halt: Halt | None = None
 ) -> RecordedLogs:
-    """The logs with their motion; drive: by default the command where an actuator follows it.
-    halt: whether what is made of them is to go on.
-
-    A command is its mean until the next sample, where they show it. Raises BadLog where a signal is
-    missing, or the asked drive is not to be had, NotIdentifiable where nothing moves.
-    """
+    """The logs with their motion; drive: by default the command where an actuator follows it; halt:
+    whether what is made of them is to go on. A command is its mean until the next sample, where
+    they show it. Raises BadLog where a signal is missing, or the asked drive is not to be had,
+    NotIdentifiable where nothing moves."""
     check_driven(logs)
     slower = needed(logs, rig)
     chosen = chosen_drive(slower, rig, drive)

@@ -22,7 +22,6 @@ from identification.estimation.estimates import (
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.breakaway import risen_to
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.residual_drift import drift_size, widening
 from identification.estimation.windowed_run.parameters import even, names_of, values_of
 from identification.estimation.windowed_run.refinement import (
     Effort,
@@ -60,11 +59,6 @@ NO_REST_WHY = (
     " from rest, at the rate of the drive's loop"
 )
 STOP_TURNS_ON_LESS = "a stop turns on less than the noise there"
-RESIDUAL_DRIFT_SAID = (
-    "the run drifts slowly from the log (by {:.3g} deviations in all), less than the noise at any"
-    " sample: a sample of the command may be wrong, or the body was touched; intervals are widened"
-    " for it"
-)
 
 
 def settled(
@@ -91,10 +85,7 @@ def settled(
     logs = tuple(_log_fit(plant, one, recorded.drive, seconds, near.whole) for one in recorded.logs)
     remarks = _remarks(adequate, near, logs, recorded)
     if near.whole:
-        runs = [left_in_windows(plant, one, recorded.drive, seconds) for one in recorded.logs]
-        drift = drift_size([signal for r in runs if r is not None for signal in r])
-        covariance = covariance * (WALLS * widening(drift)) ** 2
-        remarks += [RESIDUAL_DRIFT_SAID.format(drift)] if drift else []
+        covariance = covariance * WALLS**2
     sd = dict(zip(near.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     own = {n: x for n, x in zip(near.names, values.tolist(), strict=True) if "." not in n}
     found = estimates(own, sd, events, recorded.rig, recorded.name)

@@ -57,7 +57,7 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     every = stacked([one.rows for one in made])
     if not len(every.b):
         return fit
-    logged = zip(made, recorded.plain, strict=True)
+    logged = list(zip(made, recorded.plain, strict=True))
     y = np.concatenate([one.windows.mean @ np.asarray(log["y"]) for one, log in logged])
     steady = [np.abs(every.X[:, level]) > ONE_WAY_THROUGHOUT for level, _ in COLUMNS_OF_WAYS]
     reasons = dict[str, str]()
@@ -78,37 +78,35 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if recorded.drive == "force" and fit.adequate and not fit.imposed:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
-    return _of_any_instant(fit, recorded.instant_sd)
+    rate = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
+    return _of_any_instant(fit, replace(every, b=np.concatenate(rate)), recorded.instant_sd)
 
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
     """The fit of a run that follows by a measured force, of which the equation leaves so many times
-    its noise: that noise was estimated too small, and so are the deviations.
-
-    Source: scale by the median of what is left, Huber, Robust Statistics (1981), 5.1.
-    """
+    its noise, estimated too small as the deviations are. Source: scale by the median of what is
+    left, Huber, Robust Statistics (1981), 5.1."""
     if noises <= 1.0:
         return fit
     wider = {name: widened(one, noises) for name, one in fit.estimates.items()}
     return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
 
 
-def _of_any_instant(fit: KarnoppFit, instant_sd: float) -> KarnoppFit:
-    """The fit whose mass errs by as much as it is unsure when the force acts, deviation [s]: of
-    viscous friction a lag makes inertia.
-
-    F_v y'(t - lag) = F_v y' - F_v lag y'', to first order; ours.
-    """
-    one, viscous = fit.estimates["m"], 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
-    more = viscous * instant_sd
-    if one.sd is None or not more:
-        return fit
-    wider = widened(one, float(np.hypot(one.sd, more)) / one.sd)
-    covariance = fit.covariance.copy()
-    if "m" in fit.free:
-        at = fit.free.index("m")
-        covariance[at, at] += more**2
-    return replace(fit, estimates={**fit.estimates, "m": wider}, covariance=covariance)
+def _of_any_instant(fit: KarnoppFit, rate: Rows, instant_sd: float) -> KarnoppFit:
+    """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
+    deviation [s]; rate: the equation's rows, of the force's rate of change. F(t - lag) = F - lag F'
+    to first order, by which a run has F_v of a lag as mass; ours."""
+    theta, viscous = solve_rows(rate).theta, 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
+    theta[0] = max(theta[0], viscous)
+    moved = dict(zip(FIVE, instant_sd * theta, strict=True))
+    wider = {
+        name: widened(one, float(np.hypot(one.sd, moved[name])) / one.sd)
+        for name, one in fit.estimates.items()
+        if name in moved and one.sd
+    }
+    errs = np.array([moved.get(name, 0.0) for name in fit.free])
+    covariance = fit.covariance + np.outer(errs, errs)
+    return replace(fit, estimates={**fit.estimates, **wider}, covariance=covariance)
 
 
 def _of_one_speed(steady: Rows, column: int) -> bool:

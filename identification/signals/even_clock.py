@@ -95,7 +95,7 @@ def _resample(log: Log, h: float) -> Log:
     t = log["t"]
     grid = t[0] + h * np.arange(int(np.floor((t[-1] - t[0]) / h + 1e-6)) + 1)
     others = {name: values for name, values in log.signals.items() if name != "t"}
-    signals = {name: at_times(name, t, values, grid, h) for name, values in others.items()}
+    signals = {name: between_rows(t, values, grid, h) for name, values in others.items()}
     return Log(log.name, {"t": grid, **signals})
 
 
@@ -151,18 +151,30 @@ def _two_valued(values: Array) -> bool:
 
 
 def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array:
-    """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`.
+    """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`,
+    the times of its own clock: a command `u` is held until the next, any other is as
+    `between_rows`."""
+    return _held(t, values, grid, h) if name == "u" else between_rows(t, values, grid, h)
 
-    The command `u` and a signal of two values are held (the last value at the middle of the new
-    period), any other follows a piecewise cubic. Before the first and after the last sample their
-    values stand.
+
+def between_rows(t: Array, values: Array, grid: Array, h: float) -> Array:
+    """A signal at the times `grid` [s], which are h [s] apart, from the rows at `t` of all signals.
+
+    One of two values is held, any other follows a piecewise cubic: rows that come unevenly are no
+    times at which a loop gives its command. Before the first and after the last sample their values
+    stand.
     """
     from scipy.interpolate import PchipInterpolator
 
-    if name == "u" or _two_valued(values):
-        held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
-        return values[np.maximum(held, 0)]
+    if _two_valued(values):
+        return _held(t, values, grid, h)
     return np.asarray(PchipInterpolator(t, values)(np.clip(grid, t[0], t[-1])))
+
+
+def _held(t: Array, values: Array, grid: Array, h: float) -> Array:
+    """The last value at the middle of each new period."""
+    held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
+    return np.asarray(values[np.maximum(held, 0)])
 
 
 def in_counts(values: Array, logged: Array) -> Array:

@@ -13,7 +13,7 @@ from tests.test_lengths import ROOT, tree
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
     "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
-    "regressed_plant", "residual_drift", "run_or_equation", "settling", "structure_fit",
+    "regressed_plant", "run_or_equation", "settling", "structure_fit",
     "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip
 # Names of equations, parameters, signals and remarks, and bounds of what a parameter can be.
@@ -26,7 +26,7 @@ NO_NUMBERS = {
 ENOUGH = {
     "CURVE_ROWS", "FEWEST_COMPARED", "FEWEST_OF_DIRECTION", "FEWEST_ROWS", "FEWEST_RUNS",
     "FEWEST_SAMPLES", "FEWEST_WINDOWS", "FEWEST_WINDOWS_OF_A_TURN", "FEW_VALUES", "GRID_PLACES",
-    "LEAST_SD", "LEAST_SUMS", "MANY_ROWS", "OF_EQUATION", "OUTLYING_ROW", "OVERLAPPING",
+    "LEAST_SD", "MANY_ROWS", "OF_EQUATION", "OUTLYING_ROW", "OVERLAPPING",
     "ROWS_IN_PERIOD", "SLIDES", "SLIDING_SAMPLES", "SWINGS",
 }  # fmt: skip
 # Where a search begins, what it tries and when it ends.

@@ -44,7 +44,6 @@ from identification.estimation.regression.force_terms import predicts_as_much
 from identification.estimation.regression.held_command import significant_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
-from identification.estimation.residual_drift import drift_size
 from identification.estimation.run_or_equation import LeftOfEquation, is_no_run
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
@@ -281,10 +280,6 @@ def test_beyond_chance() -> None:
     assert significant_share(0.4, 0.1, 1.0) == 0.0 and significant_share(0.4, 0.064, 1.0) == 0.4
     # A change of 20 or 31 by the rows, of which 2.5 count as one.
     assert not drifted(np.sqrt(0.5), 100) and drifted(np.sqrt(0.5), 156)
-    noise = np.random.default_rng(3).standard_normal(6000)
-    assert drift_size([noise]) == 0.0
-    assert drift_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
-    assert drift_size([noise + 0.12 * np.sin(np.arange(6000) / 600.0)]) > 0.0
 
 
 def test_chance_level() -> None:

@@ -8,7 +8,7 @@ is evidence only, which the column's own numbers may outweigh.
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Quantity = Literal[
@@ -101,7 +101,7 @@ _UNITS = dict(_table())
 _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
-_BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]\s*(.*)$")
+_BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
@@ -134,7 +134,7 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
 _SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each with its weight
     "time": "t 3 dt 1",
     "position": "y 3 x 3 z 2 q 2 s 1.5 enc 2 alpha 1.5 beta 1.5 psi 1.5",
-    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 rpm 3",
+    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 rpm 3 erpm 3",
     "acceleration": "a 1 acc 3 qdd 2 ddq 2",
     "force": "f 3 m 0.5 tau 2 trq 3 tor 2",
     "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
@@ -187,11 +187,23 @@ _ERRORS = (
 _FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
 _FILTERED_SHORT = ("filt", "lpf")
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
+_PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
 
 def read_header(text: str, unit_below: str = "") -> Header:
-    """The header's parts; unit_below: the field of a row of units under it."""
+    """The header's parts; unit_below: the field of a row of units under it.
+
+    Of a path, as a message's field has, the last part tells the quantity, all of it the purpose.
+    """
+    whole, last = _read(text, unit_below), text.rpartition("/")[2]
+    if text.count("/") < _PATH or len("".join(words_of(last)[:1])) < _SPOKEN:
+        return whole
+    own = _read(last, unit_below)
+    return replace(whole, means=own.means, unit=own.unit) if own.means else whole
+
+
+def _read(text: str, unit_below: str) -> Header:
     plain = unicodedata.normalize("NFKC", text).strip().strip("\"'")
     name, unit, doubtful = _without_unit(plain)
     if unit_below.strip():
@@ -240,10 +252,12 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         return text, found, False
     if _INDEX.search(text):  # "position[1]" of an array
         return text, None, False
-    if inside := _BRACKETS.match(text):
-        if found := written_unit(inside[2]):
-            return (f"{inside[1]} {inside[3]}".strip() or text), found, False
-        return f"{inside[1]} {inside[2]} {inside[3]}".strip(), None, False
+    every = list(_BRACKETS.finditer(text))
+    for inside in reversed(every):
+        if found := written_unit(inside[1]):
+            return _around(text, inside, "") or text, found, False
+    if every:
+        return _around(text, every[0], every[0][1]), None, False
     if (slash := _SLASH.match(text)) and (found := written_unit(slash[2])):
         return slash[1], found, False
     if (after := _IN.match(text)) and (found := written_unit(after[2])):
@@ -256,6 +270,12 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
         return suffix[1], found, not parted and letter
     return text, None, False
+
+
+def _around(text: str, bracket: re.Match[str], inside: str) -> str:
+    """The text without a bracket, what is inside instead of it."""
+    parts = (text[: bracket.start()].strip(), inside.strip(), text[bracket.end() :].strip())
+    return " ".join(one for one in parts if one)
 
 
 def words_of(name: str) -> list[str]:
@@ -324,11 +344,13 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
         return "error"
     if any(one in whole for one in _MODEL) or any(one in _MODEL_SHORT for one in words):
         return "model"
-    if any(one in whole for one in _REFERENCE) or any(one in _REFERENCE_SHORT for one in words):
+    said = any(one in whole for one in _MEASURED)  # beside which a letter is that of a parameter
+    short = [one for one in words if one in _REFERENCE_SHORT and not (said and len(one) == 1)]
+    if any(one in whole for one in _REFERENCE) or short:
         return "reference"
     if any(one.startswith("command") for one in words) and "position" in means:
         return "reference"
-    if any(one in whole for one in _MEASURED) or any(one in _MEASURED_SHORT for one in words):
+    if said or any(one in _MEASURED_SHORT for one in words):
         return "measured"
     if any(one.startswith("ist") for one in words):  # Istposition, Istwert
         return "measured"

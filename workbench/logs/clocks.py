@@ -10,11 +10,13 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.remarks import MinorRemark
+from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP, at_times
 from workbench.cards.headers import read_header
 from workbench.logs.table import RawColumn, Table
 
-FEWEST_GROUPS = 2
+FEWEST_GROUPS, FEWEST_TOPICAL = 2, 3  # groups, and columns with the clock
+MOSTLY_FULL = 0.9  # of the rows, in which a column that is no message's own has a value
 STEPS_ALIKE = 0.5  # of the median step, that most steps of a clock are off it at most
 MOSTLY_EVEN = 0.8  # of the steps of a clock
 IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
@@ -55,6 +57,37 @@ def clock_groups(table: Table, first: Sequence[Array]) -> Table | None:
         groups += [name] * (end - begin)
     at = {groups[k]: k for k in pairs}
     return replace(table, groups=tuple(groups), clocks=at) if len(at) == len(pairs) else None
+
+
+def topic_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
+    """The table in groups of the columns that have values in the same rows, each on the clock of
+    these, where a row has those of one message alone; None where most rows are full.
+
+    rows: the first of them, as text, which spare reading the others.
+    """
+    full = [sum(bool(cell) for cell in cells) for cells in zip(*rows, strict=False)]
+    if len(full) < FEWEST_TOPICAL or full[0] < len(rows) or min(full) > MOSTLY_FULL * len(rows):
+        return None
+    columns = [np.asarray(table.fetch(k)) for k in range(len(full))]
+    if any(x.dtype.kind != "f" for x in columns) or not np.all(np.diff(columns[0]) >= 0.0):
+        return None
+    there = [np.isfinite(x) for x in columns]
+    members = dict[bytes, list[int]]()
+    for k in range(1, len(columns)):
+        sparse = np.mean(there[k]) <= MOSTLY_FULL
+        members.setdefault(there[k].tobytes() if sparse else b"", []).append(k)
+    of = [(own, there[own[0]] if key else there[0]) for key, own in members.items()]
+    if len(of) < FEWEST_GROUPS or min(int(at.sum()) for _, at in of) < SHORTEST_LOG:
+        return None
+    names, groups, made, clocks = list[str](), list[str](), list[RawColumn](), dict[str, int]()
+    for own, at in of:
+        clocks[table.names[own[0]]] = len(names)
+        for k in (0, *own):
+            names.append(table.names[k])
+            groups.append(table.names[own[0]])
+            made.append(columns[k][at])
+    return replace(table, names=tuple(names), fetch=made.__getitem__, groups=tuple(groups),
+                   clocks=clocks)  # fmt: skip
 
 
 def _numbers(raw: RawColumn) -> Array:

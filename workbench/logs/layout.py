@@ -67,7 +67,7 @@ def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
     whole = [line for line in block if len(line) == width]
     if not whole or whole[-1] is not block[-1]:
         return None
-    while len(whole) > 1 and _is_units(whole[-1]):
+    while len(whole) > 1 and (_is_units(whole[-1]) or is_mark(whole[-1], whole[-2])):
         whole.pop()
     return Layout(tuple(whole[-1]), first)
 
@@ -99,6 +99,11 @@ def _is_data(line: Sequence[str], width: int) -> bool:
 def _is_units(line: Sequence[str]) -> bool:
     filled = [field for field in line if field]
     return 2 * len(filled) >= len(line) and all(_UNIT_CELL.fullmatch(field) for field in filled)
+
+
+def is_mark(line: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a line says only that the values begin, below one that names every column."""
+    return all(above) and not any(line[1:])
 
 
 def _scope(

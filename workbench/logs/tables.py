@@ -280,11 +280,14 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
     try:
         text = path.read_text(encoding=spec.encoding)
-        content = json.loads(text.removeprefix("\ufeff"))
+        text = text.removeprefix("\ufeff")
+        content = json.loads(text)
     except UnicodeDecodeError as error:
         raise damaged(path, "json", error) from None
     except json.JSONDecodeError as error:
-        raise _no_json(path, text, error) from None
+        content = _of_lines(text)
+        if content is None:
+            raise _no_json(path, text, error) from None
     rows = _part(path, content, spec, f"no key {spec.rows!r} for the rows")
     if isinstance(rows, dict):
         return _of_tree(rows, spec)
@@ -301,13 +304,21 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
     return of_array(path, np.asarray(rows), spec)
 
 
+def _of_lines(text: str) -> list[Any] | None:
+    """The rows of a text with one JSON value a line (JSON Lines), but for a last one that is cut
+    off; None where it is no such text."""
+    rows = list[Any]()
+    lines = [line for line in text.splitlines() if line.strip()]
+    for line in lines:
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError:
+            return rows if line is lines[-1] and len(rows) > 1 else None
+    return rows
+
+
 def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
-    """The one-line error for a text that is no JSON: cut off, lines of JSON, or wrong somewhere."""
-    if error.msg == "Extra data" and text[: error.pos].count("\n") == 1:
-        return BadLog(
-            f"{path}: holds one JSON value a line (JSON Lines), which is not read; write the lines"
-            " as one list, [a, b, ...], or its numbers as CSV"
-        )
+    """The one-line error for a text that is no JSON: cut off, or wrong somewhere."""
     if error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated"):
         return BadLog(
             f"{path}: the JSON ends in the middle (line {error.lineno}), damaged or cut off; copy"

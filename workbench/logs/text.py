@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
+from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
-from workbench.logs.clocks import clock_groups
+from workbench.logs.clocks import clock_groups, topic_groups
 from workbench.logs.faulty_rows import are_few
+from workbench.logs.labelled import as_table
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
-from workbench.logs.table import Table
+from workbench.logs.table import Table, of_array
+from workbench.logs.times import with_whole_seconds
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _WHOLE = re.compile(r"[+-]?\d+")
@@ -70,15 +73,32 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
             f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
             " that it is the right file"
         )
+    if not found.names and len(names) >= SHORTEST_LOG:
+        long = _of_long_rows(path, body, marks, spec)
+        if long is not None:
+            return long
     first_row = start + found.data + 1
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
     columns, remarks = _parse(path, content, marks, len(names), first_row)
     headed = bool(found.names)
     table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
-    if found.groups or not found.names:
+    rows = fields[found.data : found.data + _COMPARED]
+    table = with_whole_seconds(table, rows)
+    if found.groups or not headed:
         return table
-    return _grouped(table, fields[found.data : found.data + _COMPARED], marks)
+    return topic_groups(table, rows) or _grouped(table, rows, marks)
+
+
+def _of_long_rows(path: Path, body: str, marks: _Marks, spec: FileSpec) -> Table | None:
+    """The table of rows of numbers that are a signal each, where they are far fewer than long."""
+    if body.count("\n", 0, len(body) - 1) >= SHORTEST_LOG:
+        return None
+    rows = [_split(line, marks) for line in body.splitlines() if line.strip()]
+    if any(len(row) != len(rows[0]) or not all(map(is_number, row)) for row in rows):
+        return None
+    numbers = [[float(cell.replace(marks.decimal, ".") or "nan") for cell in row] for row in rows]
+    return of_array(path, np.array(numbers), spec.model_copy(update={"skip_rows": 0}))
 
 
 def holds_blocks(path: Path, spec: FileSpec) -> bool:
@@ -167,7 +187,7 @@ def _head(path: Path, encoding: str) -> str:
         except (LookupError, UnicodeDecodeError):
             text = ""
         if len(text) > _EXAMINED and "\0" not in text:
-            return text
+            return as_table(text)
     return _decode(path, encoding)
 
 
@@ -190,7 +210,7 @@ def _decode(path: Path, encoding: str) -> str:
         raise BadLog(f"{path}: is a binary file, not text; give its format in the card's [file]")
     if "\n" not in text:
         text = text.replace("\r", "\n")
-    return text.removeprefix("\ufeff")
+    return as_table(text.removeprefix("\ufeff"))
 
 
 def _skipped(line: str, comment: str) -> bool:

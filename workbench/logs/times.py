@@ -1,7 +1,9 @@
 """Times written as durations, clock times or dates, as seconds."""
 
 import re
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 from typing import Any
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadLog
-from workbench.logs.table import RawColumn
+from workbench.logs.table import RawColumn, Table
 
 _PER_SECOND = {
     **{"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0},
@@ -22,6 +24,7 @@ _ZONE = r" ?(?:Z|UTC|([+-])(\d\d)(?::?(\d\d))?)"
 _MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?:{_ZONE})?")
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d")
 _DAY = 86400.0
+_NANO, _MILLI = 1e-9, 1e-3  # s
 
 
 def is_time(field: str) -> bool:
@@ -66,6 +69,48 @@ def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
         if day is not None and begun is not None:
             out[row] += (day - begun).days * _DAY
     return out if begun is not None else _over_midnight(out, first)
+
+
+def with_whole_seconds(table: Table, rows: Sequence[Sequence[str]]) -> Table:
+    """The table with one clock where two columns beside each other hold its whole seconds and the
+    nanoseconds beyond them, as a message's stamp does: the first has both then, the second none.
+
+    rows: the first of them, as text.
+    """
+    cells = list(zip(*rows, strict=False))
+    for k in range(len(cells) - 1):
+        if not all(one.isdigit() for pair in cells[k : k + 2] for one in pair):
+            continue
+        if max(map(int, cells[k + 1])) <= _MILLI / _NANO or len(set(cells[k + 1])) == 1:
+            continue
+        whole, part = (np.asarray(table.fetch(at), dtype=np.float64) for at in (k, k + 1))
+        if _counts_seconds(whole, part):
+            return _joined(table, k, whole + _NANO * part)
+    return table
+
+
+def _counts_seconds(whole: Array, part: Array) -> bool:
+    """Whether whole numbers go up by a second each time that parts of it begin again."""
+    if not (np.all(np.isfinite(whole)) and np.all(np.isfinite(part))):
+        return False
+    step, back = np.diff(whole), np.diff(part) < 0.0
+    inside = part.max() < 1.0 / _NANO and part.max() > _MILLI / _NANO and part.min() >= 0.0
+    return bool(
+        inside and np.any(step > 0.0) and np.all(step >= 0.0) and np.all(step[back] > 0.0)
+        and np.all(np.diff(whole + _NANO * part) >= 0.0)
+    )  # fmt: skip
+
+
+def _joined(table: Table, at: int, seconds: Array) -> Table:
+    """The table with these seconds in one column, and nothing in the next."""
+    own = {at: seconds, at + 1: np.zeros(len(seconds))}
+    said = f"columns {at} and {at + 1} (from 0), seconds and nanoseconds, are one clock, the first"
+    fetch = table.fetch
+    return replace(
+        table,
+        fetch=lambda k: own[k] if k in own else fetch(k),
+        remarks=(*table.remarks, said),
+    )
 
 
 def _is_empty(value: object) -> bool:

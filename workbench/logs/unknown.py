@@ -20,7 +20,7 @@ from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header, written_unit
 from workbench.files import refuse_larger
 from workbench.logs.faulty_rows import numbers_in
-from workbench.logs.layout import is_number
+from workbench.logs.layout import is_mark, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
@@ -221,6 +221,8 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
     rows = [] if holds_blocks(path, spec) else first_lines(path, spec)
     at = _first_of_data(rows)
     above = [k for k in range(at or 0) if any(rows[k])]
+    while len(above) > 1 and is_mark(rows[above[-1]], rows[above[-2]]):
+        above.pop()
     if at is None or not above:
         return spec, (), ()
     width = len(rows[at])
@@ -254,7 +256,8 @@ def _first_of_data(rows: Sequence[Sequence[str]]) -> int | None:
 
     def is_data(row: Sequence[str]) -> bool:
         full = [one for one in row if one]
-        return len(full) > 1 and sum(map(is_number, full)) >= _MOSTLY * len(row)
+        numbers = sum(map(is_number, full))
+        return len(full) > 1 and (numbers >= _MOSTLY * len(row) or numbers == len(full))
 
     for at in range(len(rows)):
         block = [row for row in rows[at : at + 2 * _BELOW] if any(row)][:_BELOW]

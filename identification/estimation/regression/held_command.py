@@ -8,7 +8,6 @@ command is, and in that of an actuator. What the
 loop adds from period to period (its encoder's counts) no log shows: it is noise of a motor's force.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,27 +22,28 @@ from identification.estimation.regression.weighted_rows import (
 )
 from identification.log import Log
 from identification.model.size import NOT_SHOWN, Size
+from identification.signals.weak_form import WeakWindows
 from identification.thresholds import BEYOND_CHANCE, MATERIAL
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
+UNSEEN = Size(0.0, LARGEST_SHARE / 3.0**0.5)  # any share up to that one, where no rows show it
 FAR_FASTER = 50.0  # periods a sample, as which any more count
 STRETCH_OF_LOOP = 25  # samples
 
 
-def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -> Size:
+def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0) -> Size:
     """Share of the step to the next sample, by which what the machine was given is another command
     than the logged, with its deviation.
 
-    rows: of the equation of motion of a motor, else of the actuator's, over all logs; slowest
-    [m/s]: of those that count. The value is 0 where none shows beside what the rows leave: where an
-    effect is missing it may be confounded with the command's rate, and that is no share. Ours:
-    `README.md`, (13).
+    rows: of the equation of motion of a motor, else of the actuator's, over all logs; rate: what a
+    whole step to the next sample would add to them (r,); slowest [m/s]: of those that count. The
+    value is 0 where none shows beside what the rows leave: where an effect is missing it may be
+    confounded with the command's rate, and that is no share. Ours: `README.md`, (13).
     """
-    by_motor, keep = logs[0].held, np.asarray(rows.speed >= slowest)
-    rate = np.concatenate([_rate_column(one) for one in logs])
+    keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
-    if len(with_rate.b) < 4 * with_rate.X.shape[1]:
-        return NOT_SHOWN
+    if len(with_rate.b) < 4 * with_rate.X.shape[1] or not np.ptp(with_rate.block):
+        return UNSEEN
     found, without = solve_rows(with_rate), solve_rows(rows.at(keep)).cost
     if without <= 0.0:
         return NOT_SHOWN
@@ -55,13 +55,19 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
     apart = [share_of(theta) for theta in without_each_block(with_rate)]
     sd = float(spread_of_left_out(np.array(apart)))
     share = significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
-    return Size(share, sd)
+    return Size(share, min(sd, UNSEEN.sd))
 
 
-def _rate_column(one: MotionLog) -> Array:
-    """What a whole step to the next sample would add to the rows of a log, (r,)."""
+def could_show(found: Size) -> bool:
+    """Whether rows that leave a share so unsure could show the largest one."""
+    return found.sd * BEYOND_CHANCE <= LARGEST_SHARE
+
+
+def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
+    """What a whole step to the next sample would add to the rows of a log, (r,); windows: of a
+    motor's, by default those of sliding one way."""
     if one.held:
-        return np.asarray(one.sliding.held @ _steps(one.log["F"]))
+        return np.asarray((windows or one.sliding).held @ _steps(one.log["F"]))
     assert one.whole is not None
     return np.asarray(one.whole.first @ (one.log.h * one.log["u"]))
 

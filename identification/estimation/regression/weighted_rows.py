@@ -95,10 +95,7 @@ def left_unseen(rows: Rows) -> Array:
 
 
 def without_each_block(rows: Rows) -> Array:
-    """Parameters (blocks, k) of the least squares without each block in turn.
-
-    Source: for the jackknife, Tukey, Annals of Mathematical Statistics 29 (1958) 614.
-    """
+    """Parameters (blocks, k) of the least squares without each block in turn, by `left_out`."""
     return left_out(rows.block, lambda kept: solve_rows(rows, kept).theta)
 
 

@@ -1,5 +1,7 @@
 """The posterior agrees with the fit's intervals where both can be believed, and is silent else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,20 @@ def test_posterior_of_whole_runs_agrees_with_the_fit() -> None:
     assert np.min(wider) > 0.6 and np.max(wider) < 1.3
     narrow, wide = found.interval(0.5), found.interval(0.95)
     assert all(wide[n][0] < narrow[n][0] < narrow[n][2] < wide[n][2] for n in narrow)
+
+
+@pytest.mark.slow
+def test_a_posterior_by_a_noisy_force_lies_about_the_sliding_friction_of_the_fit() -> None:
+    """As that of the prediction errors, which is not where the run's own likelihood is largest."""
+    log = made_log(table(2), seed=14, seconds=6.0)
+    log = Log("by force", {name: log[name] for name in ("t", "y", "F")})
+    fit = fitted(log)
+    one = fit.estimates["F_vp"]
+    assert one.sd is not None and one.value is not None
+    other = one.value + 4.0 * one.sd
+    moved = replace(fit, friction=replace(fit.friction, F_vp=other))
+    found = sample_posterior(moved, [log], np.random.default_rng(2), rig=RIG)
+    assert abs(found.interval()["F_vp"][1] - other) < one.sd
 
 
 @pytest.mark.slow

@@ -126,16 +126,16 @@ def test_a_bridged_sample_stays_on_the_counts_of_its_sensor() -> None:
     assert resolution(repaired.log["y"]) == pytest.approx(1e-5, rel=1e-6)
 
 
-def test_step_does_not_ring_and_command_is_held() -> None:
+def test_steps_of_position_and_command_do_not_ring_and_a_switch_is_held() -> None:
     rng = np.random.default_rng(1)
     t = 0.01 * (np.arange(400, dtype=np.float64) + rng.uniform(-0.3, 0.3, 400))
     step = np.where(t < 2.0, 0.0, 1.0)
     steps3 = step + np.where(t < 3.0, 0.0, 1.0)
     (run,) = even_clock(Log("run", {"t": t, "y": steps3, "u": steps3, "on": step}))
-    assert set(run["u"]) == {0.0, 1.0, 2.0}
     assert set(run["on"]) == {0.0, 1.0}
-    assert np.all(np.diff(run["y"]) >= 0.0)
-    assert np.sum((run["y"] % 1.0) != 0.0) <= 4
+    for key in ("y", "u"):
+        assert np.all(np.diff(run[key]) >= 0.0)
+        assert np.sum((run[key] % 1.0) != 0.0) <= 4
 
 
 @settings(max_examples=25, deadline=None)

@@ -36,6 +36,11 @@ READ = [
     ("PosErr", None, "position", "error"),
     ("input_volts", "V", "other", ""),
     ("temp", None, "temperature", ""),
+    ("r80[0]: Actual torque value [Nm]", "N m", "force", "measured"),
+    ("r479[0]: Diagnostics position actual value Gn_XIST1 [LU]", None, "position", "measured"),
+    ("erpm", None, "velocity", ""),
+    ("/joint_states/hip/effort", None, "force", ""),
+    ("/cmd/hip/position", None, "position", "reference"),
 ]
 
 

@@ -9,6 +9,7 @@ from identification.errors import BadLog
 from tests.workbench.log_files import card, signals
 from workbench.logs.layout import find_layout
 from workbench.logs.runs import read_log
+from workbench.logs.unknown import read_unknown
 
 CARD = """
 [card]
@@ -148,3 +149,15 @@ def test_rows_of_missing_samples_at_the_start_are_rows() -> None:
     found = find_layout([["t", "y"], ["", ""], ["", ""], *[["1", "2"]] * 4])
     assert found is not None
     assert (found.names, found.data) == (("t", "y"), 1)
+
+
+def test_a_line_that_only_begins_the_values_is_no_header(tmp_path: Path) -> None:
+    """As a recorder writes it between its channels' names and their values."""
+    own = columns(120)
+    rows = [",".join(x.replace(",", ".") for x in row) for row in zip(*own.values(), strict=True)]
+    head = ["descriptor,,", '"date","2025-05-05 12:12"', "", "X-Axis,Angle [deg],Torque [Nm]"]
+    path = tmp_path / "rec1.csv"
+    path.write_text("\n".join([*head, "trace_values,,", *rows]) + "\n")
+    found = read_unknown(path).columns
+    assert [one.header for one in found] == ["X-Axis", "Angle [deg]", "Torque [Nm]"]
+    assert len(found[0].values) == 120

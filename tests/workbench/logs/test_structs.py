@@ -79,7 +79,7 @@ def test_two_vectors_of_one_name_keep_apart() -> None:
     ("text", "said"),
     [
         ('{"t": [0, 1, 2', "ends in the middle.*copy it again"),
-        ('{"t": 0}\n{"t": 1}\n{"t": 2}\n', "one JSON value a line"),
+        ('{"t": 0}\n{"t": 1\n{"t": 2}\n', "line 2, column 1 is no JSON"),
         ('{"t": [0, 1, x]}', "line 1, column 14 is no JSON"),
     ],
 )
@@ -89,6 +89,16 @@ def test_what_is_wrong_with_a_json_is_said(text: str, said: str, tmp_path: Path)
     with pytest.raises(BadLog, match=said) as refused:
         read_table(path, FileSpec())
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("end", ["\n", "", '\n{"t": 0.9, "motor": {"q"'])
+def test_a_json_value_a_line_is_a_row(end: str, tmp_path: Path) -> None:
+    """As telemetry is written, killed while it writes or not."""
+    rows = [json.dumps({"t": t, "motor": {"q": q}}) for t, q in zip(T, Q, strict=True)]
+    path = tmp_path / "a.jsonl"
+    path.write_text("\n".join(rows) + end, "utf-8")
+    found = {one.header: one.values.tolist() for one in read_unknown(path).columns}
+    assert found == {"t": T, "q": Q}
 
 
 def test_text_in_brackets_is_no_json(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Several axes or joints in one log: which column is of which, by what their headers share."""
 
 from collections.abc import Mapping, Sequence
+from itertools import takewhile
 
 import numpy as np
 
@@ -115,3 +116,14 @@ def correlation(x: Array) -> Array:
     """Correlation of the columns of x (n, k), (k, k)."""
     a = normed(x)
     return np.asarray(a.T @ a)
+
+
+def without_blocks(headers: Sequence[str]) -> list[str]:
+    """The headers without the blocks of a model in which all signals lie that have a path: they
+    tell nothing of one."""
+    paths = [one.split("/") for one in headers if "/" in one]
+    levels = zip(*(one[:-1] for one in paths), strict=False)
+    common = sum(1 for _ in takewhile(lambda names: len(set(names)) == 1, levels))
+    if len(paths) < 2:
+        return list(headers)
+    return ["/".join(one.split("/")[common:]) if "/" in one else one for one in headers]

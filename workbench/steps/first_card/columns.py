@@ -29,7 +29,7 @@ from workbench.logs.faulty_rows import (
     told_of_starts,
 )
 from workbench.logs.unknown import RawColumn, UnknownLog
-from workbench.steps.first_card.axes import axes_of, correlation
+from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
 from workbench.steps.first_card.registers import Register, read_register
 
 COLUMN = "column"
@@ -162,7 +162,9 @@ class Columns:
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    heads = [read_header(one.header, one.unit_below) for one in log.columns]
+    names = without_blocks([one.header for one in log.columns])
+    heads = [read_header(name, one.unit_below)
+             for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
     read = list[Column]()

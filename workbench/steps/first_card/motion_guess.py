@@ -1,5 +1,6 @@
 """Whether a machine turns or slides, and what a position's own values say of its unit."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +36,9 @@ class MotionGuess(NamedTuple):
         return "rotor" if self.rotor and self.motion == "rotary" else self.motion
 
 
-def known_motion(roles: Roles) -> MotionGuess:
-    """Turns or slides: by units, by words, by a turn in the position's values; else a guess."""
+def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
+    """Turns or slides: by units, by words, by a turn in the position's values; else a guess, by a
+    speed of turning among the columns beside too."""
     weak = {
         name: column.header.turning
         for name, column in roles.columns.items()
@@ -67,6 +69,9 @@ def known_motion(roles: Roles) -> MotionGuess:
         most = roles.columns[max(weak, key=lambda one: weak[one])]
         why = f"machines that turn have names like {most.shown} more often"
         return MotionGuess("rotary", why, False, rotor)
+    for one in beside:
+        if one.header.speed and one.header.angle and one.axis in ("", y.axis):
+            return MotionGuess("rotary", f"{one.shown} beside it is the speed of a turn", False)
     return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
 
 

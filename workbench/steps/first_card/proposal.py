@@ -188,7 +188,7 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     """The card by these roles."""
     other = roles.other
     roles, area = _pressure_beside_force(columns, roles)
-    motion = known_motion(roles)
+    motion = known_motion(roles, columns.read)
     units = guessed_units(columns, roles, motion)
     turns = "" if motion.sure else "linear" if motion.motion == "rotary" else "rotary"
     rig = [
@@ -289,7 +289,8 @@ def _rig(
         out.append(_around_the_rod(roles, units))
     if roles.kind == "motor":
         force = "N m" if motion == "rotary" else "N"
-        out.append(_motor_constant(columns, force))
+        asked = units["u"].unit == force
+        out.append(_as_asked(force) if asked else _motor_constant(columns, force))
     if "u" in roles.columns and (limit := _limit(roles.columns["u"])) is not None:
         out.append(RigGuess("control_limit_v", limit, "unit of u", False,
                             "the command stops there again and again"))  # fmt: skip
@@ -304,6 +305,12 @@ def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
     why = "not in any log: the pressure around the rod, mostly the ambient one; it matters where"
     why += " the areas differ; leave it out where pressures are measured against that"
     return RigGuess("supply_pressure_pa", AMBIENT if air else None, "Pa", False, why)
+
+
+def _as_asked(force: str) -> RigGuess:
+    """Force per command of a drive that is given a force."""
+    why = "the command is a force already, as the drive makes it"
+    return RigGuess("force_per_command", 1.0, f"{force}/u", False, why)
 
 
 def _motor_constant(columns: Columns, force: str) -> RigGuess:

@@ -35,6 +35,7 @@ from workbench.steps.first_card.ways import (
 )
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
+    EXACT_VELOCITY,
     LEAST_SCORE,
     RULED_OUT,
     SURE,
@@ -210,6 +211,9 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
             return -3.0  # one more position, of a model or another sensor
         if one.noisy and moved < MOVES_NOTHING:
             return -3.0
+        forces = [seen.pairs.signals.index(of) for name, of in way.columns.items() if name == "F"]
+        if any(abs(seen.pairs.alike[at, k]) > EXACT_VELOCITY for at in forces):
+            return -3.0  # the force once more, as the current that it was made of
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     return head + 1.0 if role == "F" else head - 1.0
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import derivative, lead
-from workbench.cards.units import Motion
+from workbench.cards.units import Motion, force_unit
 from workbench.steps.first_card.columns import Column, Columns
 from workbench.steps.first_card.motion_guess import (
     MotionGuess,
@@ -43,7 +43,8 @@ SHORTEST_TICK, LONGEST_DAY = 1.0, 1e-3  # steps of a clock of ticks, and of one 
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
-SHARES, ALL_OF_IT = ("pwm", "duty", "tastgrad"), 100.0  # words of a share; the whole, in %
+SHARES = ("pwm", "duty", "tastgrad")  # words of a share
+NEARLY_ALL_OF_IT, ALL_OF_IT = 95.0, 100.0  # the whole, in %
 USUAL_COMMANDS = {"V": "A", "A": "V", "1": "%", "%": "1"}  # and what it is otherwise
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
@@ -81,6 +82,7 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
         out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
     for name, column in found.items():
         nameless = name == "u" and not column.header.means and column.bits is None
+        nameless = nameless and not _stops_at_all(column)
         if name not in out and nameless and is_count(roles.columns["y"]):
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
@@ -213,10 +215,11 @@ def _by_relation(name: str, units: Mapping[str, str], given: Units, slope: float
 def contradicted_clock(columns: Columns, roles: Roles, units: Units) -> float | None:
     """How much faster the position moves by a logged velocity than by clock and units.
 
-    None where the two agree, or no velocity is logged. Units that no header gives are any.
+    None where the two agree, no velocity is logged, or its unit or the position's is a guess: by
+    other units it would be another.
     """
     slope = _slope(columns, roles)
-    if slope is None:
+    if slope is None or not (units["y"].sure and units["v"].sure):
         return None
     names = {name: units[name].unit for name in ("t", "y", "v")}
     off = _off(names, units, slope)
@@ -238,6 +241,9 @@ def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
 
 def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
     """The unit of a signal by its own size."""
+    if name == "u" and "force" in column.header.means and not is_current(column):
+        unit, why = force_unit(motion.motion), "the header speaks of a force that is asked for"
+        return UnitGuess(unit, None, False, why, "V")
     if name == "u":
         return _of_command(column)
     if name in ("p_p", "p_n", "F"):
@@ -265,9 +271,15 @@ def _of_command(column: Column) -> UnitGuess:
         return UnitGuess("1", None, False, "none: above 100, so no %; the PWM's own counts", "V")
     if share or 0.9 <= peak <= 1.0:
         return _command("1" if peak <= 1.0 else "%", "by its size: a share of all")
-    if 95.0 <= peak <= ALL_OF_IT:
+    if _stops_at_all(column):
         return _command("%", "it stops at 100")
     return _command("V", "the usual one, the header says none")
+
+
+def _stops_at_all(column: Column) -> bool:
+    """Whether a command goes up to about 100, as one in percent does."""
+    peak = float(np.nanmax(np.abs(column.values[np.isfinite(column.values)])))
+    return NEARLY_ALL_OF_IT <= peak <= ALL_OF_IT
 
 
 def _command(unit: str, why: str) -> UnitGuess:

@@ -77,6 +77,8 @@ def said(one: Column, role: str) -> float:
     for quantity, weight in head.means.items():
         if role in ROLES_OF[quantity]:
             total = max(total, weight if role != "r" else 0.5 * weight)
+        elif role == "u" and quantity == "force" and head.purpose in ("reference", "demand"):
+            total = max(total, 0.5 * weight)  # a force that is asked for is a command
     if head.means and total == 0.0:
         total -= 0.5 + max(head.means.values())
     if head.unit is not None:
@@ -95,9 +97,8 @@ def _by_purpose(one: Column, role: str) -> float:
     purpose, means = one.header.purpose, one.header.means
     if purpose == "reference":
         other = means and "position" not in means
-        return {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0}.get(
-            role, 0.0
-        )
+        own = {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0, "u": -1.0}
+        return own.get(role, 0.0)
     if purpose == "measured":
         return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
