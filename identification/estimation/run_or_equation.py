@@ -54,6 +54,7 @@ FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
 )
+LIKELIEST = "sliding friction of largest likelihood"
 LIKELIEST_WHY = MinorRemark(
     "mass and sliding friction are those that make the position measured while sliding likeliest,"
     " since the force or command is noisy; stick limits and bands those of the run"
@@ -153,7 +154,10 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     plant = Plant(fit.friction, fit.actuator, fit.effects)
     of_effects = [n for n in fit.free if "." in n and n.partition(".")[2] not in AT_REST]
     names = [*(n for n in fit.free if n in FIVE), *of_effects]
-    found = prediction_error_fit(plant, names, recorded.logs, rows[MECHANICAL].slowest)
+    slowest = rows[MECHANICAL].slowest
+    found = recorded.halt.tried(
+        LIKELIEST, lambda: prediction_error_fit(plant, names, recorded.logs, slowest), None
+    )
     if found is None or not found.is_likelier:
         return fit
     more = between_samples_sd(found.names, values_of(found.plant, found.names), recorded, of=1.0)

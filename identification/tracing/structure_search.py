@@ -9,7 +9,7 @@ from identification.estimation.latent_force import latent_forces
 from identification.estimation.prediction_error import prediction_error_fit, significant
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import MECHANICAL
-from identification.estimation.run_or_equation import by_equation_if_surer
+from identification.estimation.run_or_equation import LIKELIEST, by_equation_if_surer
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
@@ -73,7 +73,9 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
         model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in names}})
     if not any(one.walks(setting.drive) for one in setting.logs):
         return model
-    best = prediction_error_fit(model.plant, names, setting.logs, slowest)
+    best = setting.halt.tried(
+        LIKELIEST, lambda: prediction_error_fit(model.plant, names, setting.logs, slowest), None
+    )
     if best is None or not best.is_likelier:
         return model
     return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
