@@ -166,9 +166,16 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
-    """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    d = np.concatenate([one.signals["d"] for one in _moved(logs, held)])
-    return _way(d[d != 0.0] > 0.0)
+    """Whether logs slide up alone (True) or down alone (False); None: both ways, or hardly.
+
+    By windows of sliding, of quick motion, which has few of them, by samples.
+    """
+    moved = _moved(logs, held)
+    up = np.concatenate([one.up for one in moved])
+    if len(up) < FEWEST_COMPARED:
+        d = np.concatenate([one.signals["d"] for one in moved])
+        up = d[d != 0.0] > 0.0
+    return _way(up)
 
 
 def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:

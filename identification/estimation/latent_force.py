@@ -237,6 +237,8 @@ def prediction_errors(
     """Errors with which each sample of the position that is measured while the bodies slide is
     predicted from those before it, under this latent force, in their deviations, (n,) over all
     logs: white where nothing else is missing. Source: Kalman (1960)."""
+    for one in logs:
+        one.halt.ask()
     known = [_known(plant, one, slowest) for one in logs]
     return np.concatenate([one.whitened(noise.sigma, noise.tau, noise.rougher) for one in known])
 

@@ -35,7 +35,7 @@ from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import WORSE
+from identification.thresholds import FAR_LESS, WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,10 @@ class RecordedLogs:
 
     @property
     def instant_sd(self) -> float:
-        """Deviation [s] of the instants at which the force of these logs acts."""
-        return self.share_sd * self.logs[0].log.h
+        """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
+        share above, of a measured one as likely anywhere up to where its lag would be seen."""
+        samples = self.share_sd if self.held else FAR_LESS / 3.0**0.5
+        return samples * self.logs[0].log.h
 
     @property
     def moved(self) -> tuple[int, int]:
@@ -182,8 +184,8 @@ def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
 
 def plain_share(recorded: RecordedLogs) -> Size:
     """Share of the command's step to the next sample, as a machine without effects shows it; of a
-    motor by windows that hold reversals, where those of sliding one way could show none; none of a
-    measured force, which is of any instant of its sample. Ours: `regression/README.md`, (13)."""
+    motor by windows that hold reversals, where those of sliding one way could show none. Ours:
+    `regression/README.md`, (13)."""
     logs, motor = recorded.logs, recorded.held
     if not (motor or recorded.by_command):
         return UNSEEN

@@ -54,6 +54,7 @@ FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
 )
+LIKELIEST = "sliding friction of largest likelihood"
 LIKELIEST_WHY = MinorRemark(
     "mass and sliding friction are those that make the position measured while sliding likeliest,"
     " since the force or command is noisy; stick limits and bands those of the run"
@@ -137,6 +138,18 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     return fit if left is None else _unless_unexplained(fit, left)
 
 
+def shown_sliding(plant: Plant) -> list[str]:
+    """Names of the parameters that a plant shows while it slides: none of a stick limit, nor of an
+    effect that acts at rest, which stops and reversals show."""
+    of_effects = [
+        f"{acting.key}.{p.name}"
+        for acting in plant.effects
+        for p in acting.effect.params
+        if not acting.effect.place.at_rest and p.name not in AT_REST
+    ]
+    return [*FIVE, *of_effects]
+
+
 def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """A fit that is adequate with mass, sliding friction and effects of largest likelihood, where
     its own are significantly less likely: a run that a noisy force or command drives begins and
@@ -151,9 +164,11 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if MECHANICAL not in rows:  # too little slides
         return fit
     plant = Plant(fit.friction, fit.actuator, fit.effects)
-    of_effects = [n for n in fit.free if "." in n and n.partition(".")[2] not in AT_REST]
-    names = [*(n for n in fit.free if n in FIVE), *of_effects]
-    found = prediction_error_fit(plant, names, recorded.logs, rows[MECHANICAL].slowest)
+    names = [name for name in shown_sliding(plant) if name in fit.free]
+    slowest = rows[MECHANICAL].slowest
+    found = recorded.halt.tried(
+        LIKELIEST, lambda: prediction_error_fit(plant, names, recorded.logs, slowest), None
+    )
     if found is None or not found.is_likelier:
         return fit
     more = between_samples_sd(found.names, values_of(found.plant, found.names), recorded, of=1.0)

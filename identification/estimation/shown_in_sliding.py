@@ -78,8 +78,11 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if recorded.drive == "force" and fit.adequate and not fit.imposed:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
-    rate = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
-    return _of_any_instant(fit, replace(every, b=np.concatenate(rate)), recorded.instant_sd)
+    rate = np.zeros(len(FIVE))
+    if recorded.held:  # by the share of its step, which the rows show or not
+        changes = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
+        rate = solve_rows(replace(every, b=np.concatenate(changes))).theta
+    return _of_any_instant(fit, rate, recorded.instant_sd)
 
 
 def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
@@ -92,11 +95,12 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
     return replace(fit, estimates=wider, covariance=noises**2 * fit.covariance)
 
 
-def _of_any_instant(fit: KarnoppFit, rate: Rows, instant_sd: float) -> KarnoppFit:
+def _of_any_instant(fit: KarnoppFit, rate: Array, instant_sd: float) -> KarnoppFit:
     """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
-    deviation [s]; rate: the equation's rows, of the force's rate of change. F(t - lag) = F - lag F'
-    to first order, by which a run has F_v of a lag as mass; ours."""
-    theta, viscous = solve_rows(rate).theta, 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
+    deviation [s]; rate (5,): the fit of the equation's rows to the force's rate of change, 0 where
+    the mass alone does. F(t - lag) = F - lag F' to first order, by which a run has F_v of a lag as
+    mass; ours."""
+    theta, viscous = rate.copy(), 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
     theta[0] = max(theta[0], viscous)
     moved = dict(zip(FIVE, instant_sd * theta, strict=True))
     wider = {

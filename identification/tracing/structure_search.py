@@ -9,7 +9,11 @@ from identification.estimation.latent_force import latent_forces
 from identification.estimation.prediction_error import prediction_error_fit, significant
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import MECHANICAL
-from identification.estimation.run_or_equation import by_equation_if_surer
+from identification.estimation.run_or_equation import (
+    LIKELIEST,
+    by_equation_if_surer,
+    shown_sliding,
+)
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit
@@ -63,17 +67,21 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     if model.imposed or not choice.steps:
         return model
     found = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
-    names = [name for name, sd in found.prior.items() if name in model.sd and sd > 0.0]
-    plant = plant_with(model.plant, names, values_of(found.plant, names))
+    known = {name for name, sd in found.prior.items() if name in model.sd and sd > 0.0}
+    names = [name for name in shown_sliding(model.plant) if name in known]
+    given = [*names, *(name for name in ("k1", "k2") if name in known)]
+    plant = plant_with(model.plant, given, values_of(found.plant, given))
     slowest = choice.base[MECHANICAL].slowest
     run, equations = (
         latent_forces(one, setting.logs, slowest).log_likelihood for one in (model.plant, plant)
     )
     if significant(2.0 * (equations - run), len(names)):
-        model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in names}})
+        model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in given}})
     if not any(one.walks(setting.drive) for one in setting.logs):
         return model
-    best = prediction_error_fit(model.plant, names, setting.logs, slowest)
+    best = setting.halt.tried(
+        LIKELIEST, lambda: prediction_error_fit(model.plant, names, setting.logs, slowest), None
+    )
     if best is None or not best.is_likelier:
         return model
     return replace(model, plant=best.plant, sd={**model.sd, **best.sd})

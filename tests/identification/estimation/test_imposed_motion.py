@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.estimation.imposed_motion import fit_one_way
+from identification.estimation.imposed_motion import fit_one_way, way_of
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 
@@ -18,3 +18,13 @@ def test_a_direction_in_which_nothing_moved_is_not_said_to_need_no_friction() ->
     )
     for name in ("F_cn", "F_vn"):
         assert "0 samples of sliding in the negative direction" in str(fit.estimates[name].reason)
+
+
+def test_jerks_back_before_slow_passes_make_no_motion_both_ways() -> None:
+    """0.6 s of 20 go down, each time too briefly for a window of sliding."""
+    t = np.arange(10_000, dtype=np.float64) * 2e-3
+    v = np.where((t < 3.0) & (t % 0.25 < 0.05), -1.0, 0.5)
+    y = np.cumsum(v) * 2e-3 + 1e-5 * np.random.default_rng(0).standard_normal(len(t))
+    assert way_of([Log("slow", {"t": t, "y": y, "F": 0.4 + 0.1 * v})], held=False) is True
+    quick = 0.5 * np.sin(2.0 * np.pi * 8.0 * t)
+    assert way_of([Log("quick", {"t": t, "y": quick, "F": quick})], held=False) is None
