@@ -79,7 +79,7 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
     rate = np.zeros(len(FIVE))
-    if recorded.held:  # by the share of its step, which the rows show or not
+    if recorded.held and not fit.whole:  # whole runs know it better than the rows do
         changes = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
         rate = solve_rows(replace(every, b=np.concatenate(changes))).theta
     return _of_any_instant(fit, rate, recorded.instant_sd)
@@ -98,7 +98,7 @@ def _as_unsure(fit: KarnoppFit, noises: float) -> KarnoppFit:
 def _of_any_instant(fit: KarnoppFit, rate: Array, instant_sd: float) -> KarnoppFit:
     """The fit whose mass and sliding friction err by as much as it is unsure when the force acts,
     deviation [s]; rate (5,): the fit of the equation's rows to the force's rate of change, 0 where
-    the mass alone does. F(t - lag) = F - lag F' to first order, by which a run has F_v of a lag as
+    the mass alone errs. F(t - lag) = F - lag F' to first order, by which a run has F_v of a lag as
     mass; ours."""
     theta, viscous = rate.copy(), 0.5 * (fit.friction.F_vp + fit.friction.F_vn)
     theta[0] = max(theta[0], viscous)

@@ -91,7 +91,10 @@ def settled_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[Mo
     theta = NOTHING_KNOWN
     for _ in range(NOISE_ROUNDS):
         made = rows_and_windows(logs, theta, gravity=gravity)
-        theta = solve_rows(stacked([one.rows for one in made])).theta[: len(FIVE)]
+        rows = stacked([one.rows for one in made])
+        if not len(rows.b):
+            return made
+        theta = solve_rows(rows).theta[: len(FIVE)]
     return rows_and_windows(logs, theta, gravity=gravity)
 
 
