@@ -117,8 +117,8 @@ def answered(
 def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
     equation than least squares do on held-out stretches: its run is not followed, or only down to a
-    noise that the equation averages out; else by `likeliest`. Source: cross-validation, Stone, J. R.
-    Stat. Soc. B 36 (1974) 111; the comparison is ours."""
+    noise that the equation averages out; else by `likeliest`. Source: cross-validation, Stone, J.
+    R. Stat. Soc. B 36 (1974) 111; the comparison is ours."""
     if fit.effects:
         return likeliest(fit, recorded)
     left = left_by(fit.friction, recorded)
