@@ -65,27 +65,29 @@ class PredictionErrorFit:
 
 
 def prediction_error_fit(
-    plant: Plant, names: Sequence[str], logs: Sequence[MotionLog], slowest: float
-) -> PredictionErrorFit | None:
+    plant: Plant, names: Sequence[str], logs: Sequence[MotionLog], slowest: float,
+    begun: LatentForces | None = None,
+) -> PredictionErrorFit | None:  # fmt: skip
     """The parameters of a plant that make the position measured above a speed [m/s] likeliest, from
     those that it has; None where none of them is more than 0.
 
-    By (1): prediction-error method, Ljung (1999), 7.2.
+    begun: what the plant lacks on these logs, where that is known. By (1): prediction-error method,
+    Ljung (1999), 7.2.
     """
     own = tuple(n for n, x in zip(names, values_of(plant, names), strict=True) if abs(x) > AT_ZERO)
     if not own:
         return None
     unit = units_in(plant, own, values_of(plant, own))
-    begun = noise = latent_forces(plant, logs, slowest)
+    begun = noise = begun or latent_forces(plant, logs, slowest)
     x = values_of(plant, own) / unit
-    for one in range(ROUNDS):
+    for k in range(ROUNDS):
 
         def errors(at: Array, noise: LatentForces = noise) -> Array:
             return prediction_errors(plant_with(plant, own, at * unit), logs, slowest, noise)
 
         found = gauss_newton(errors, x, STEPS)
         x, best = found.x, plant_with(plant, own, found.x * unit)
-        noise = latent_forces(best, logs, slowest, begun.rougher if one < ROUNDS - 1 else None)
+        noise = latent_forces(best, logs, slowest, begun.rougher if k < ROUNDS - 1 else None)
     covariance = found.covariance(_stretches(logs)) * np.outer(unit, unit)
     gain = 2.0 * (noise.log_likelihood - begun.log_likelihood)
     return PredictionErrorFit(best, own, covariance, gain, noise)

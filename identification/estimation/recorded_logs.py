@@ -30,7 +30,7 @@ from identification.estimation.regression.weighted_rows import Fitted, solve_row
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.plant import units_of
-from identification.model.size import Size
+from identification.model.size import NOT_SHOWN, Size
 from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
@@ -188,7 +188,7 @@ def plain_share(recorded: RecordedLogs) -> Size:
     `regression/README.md`, (13)."""
     logs, motor = recorded.logs, recorded.held
     if not (motor or recorded.by_command):
-        return UNSEEN
+        return NOT_SHOWN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
     stage = first_stage(logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
     shown, found = stage.get(MECHANICAL if motor else ACTUATOR), UNSEEN

@@ -72,15 +72,16 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     given = [*names, *(name for name in ("k1", "k2") if name in known)]
     plant = plant_with(model.plant, given, values_of(found.plant, given))
     slowest = choice.base[MECHANICAL].slowest
-    run, equations = (
-        latent_forces(one, setting.logs, slowest).log_likelihood for one in (model.plant, plant)
-    )
-    if significant(2.0 * (equations - run), len(names)):
+    lacks, other = (latent_forces(one, setting.logs, slowest) for one in (model.plant, plant))
+    if significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names)):
+        lacks = other
         model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in given}})
     if not any(one.walks(setting.drive) for one in setting.logs):
         return model
     best = setting.halt.tried(
-        LIKELIEST, lambda: prediction_error_fit(model.plant, names, setting.logs, slowest), None
+        LIKELIEST,
+        lambda: prediction_error_fit(model.plant, names, setting.logs, slowest, lacks),
+        None,
     )
     if best is None or not best.is_likelier:
         return model

@@ -94,9 +94,9 @@ def test_the_current_of_which_a_torque_was_made_is_no_command(
     servo: dict[str, Array], tmp_path: Path
 ) -> None:
     """Of six digits each, so that the two are not the same to the last one."""
-    noise = 3e-3 * np.random.default_rng(5).standard_normal(ROWS)
-    made = np.array([float(f"{one:.6g}") for one in servo["F"] + noise])
+    noise = 3e-2 * np.random.default_rng(5).standard_normal(ROWS)
+    made = np.array([float(f"{one:.6g}") for one in 1e3 * (servo["F"] + noise)])
     found = propose(tmp_path, "t,position,current,torque", servo["t"], servo["y"],
-                    np.round(made / 9.13, 5), made)  # fmt: skip
+                    np.round(made / -9.13, 5), made)  # fmt: skip
     assert found.kind == "force"
     assert found.signal("u") is None
