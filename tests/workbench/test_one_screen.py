@@ -207,7 +207,7 @@ def predict() -> Iterator[Screen]:
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
-    yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml").screen(OUT)
+    yield prediction_view(Predicted((), summary), False, LOGS[0]).screen(OUT)
 
 
 def response() -> Iterator[Screen]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from workbench import options
+from workbench.ending import step
 from workbench.output import results
 from workbench.signature import option
 
@@ -47,9 +48,10 @@ def command(
         else:
             model = load_model(model_file, effects)
             found = predict(model, log, card, drive=drive, window=window)
-            view = prediction_view(found.found, found.rotary, log, card)
+            view = prediction_view(found.found, found.rotary, log)
         view.write(folder)
-    show(view, folder.final)
+    then = step("what is missing, where that is more than noise", "trace", log, "--card", card)
+    show(view, folder.final, then)
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":

@@ -42,8 +42,8 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     return lines
 
 
-def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str = "CARD") -> View:
-    """How far a model lies from a log; log, card: as the command to type next names them."""
+def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
+    """How far a model lies from a log."""
     first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
     remarks = found.summary["remarks"]
 
@@ -60,10 +60,9 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str 
         {"prediction.csv": lambda: prediction_csv(found.runs)},
         sections,
         lambda: prediction_chart(found, rotary),
-        [f"`workbench trace {log} --card {card}`, where that is more than noise"],
+        command="`workbench trace LOG --card CARD`, where that is more than noise",
         has_page=False,
         lead=first.rstrip(".") + ".",
-        then_below=len(more),
     )
 
 

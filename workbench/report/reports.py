@@ -41,7 +41,7 @@ from workbench.report.model_tables import (
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
-from workbench.report.view import OUT, Section, View, report_notes, table
+from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
@@ -49,8 +49,8 @@ from workbench.steps.predict import fitted_run
 from workbench.steps.predicted_force import missing_force
 
 THEN = (
-    f"`workbench validate MODEL {OUT}design.json` checks it in simulation, then `workbench export"
-    f" {OUT}design.json --to c` writes it as code"
+    "`workbench validate MODEL design.json` checks it in simulation, then `workbench export"
+    " design.json --to c` writes it as code"
 )
 THEN_WITHOUT = (
     "`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and identify again"
@@ -85,8 +85,7 @@ def identified_view(found: Identified) -> View:
         {"model.json": lambda: model_document(model)},
         sections,
         lambda: fit_chart(model, sources, runs()),
-        [next_of_model(model)],
-        then_by_command=True,
+        command=next_of_model(model),
     )
 
 
@@ -116,8 +115,7 @@ def design_view(found: Design, rotary: bool = False) -> View:
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
-        [THEN_WITHOUT if found.recommended == "none" else THEN],
-        then_by_command=found.recommended == "none",
+        command=THEN_WITHOUT if found.recommended == "none" else THEN,
     )
 
 

@@ -10,7 +10,7 @@ from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.design_tables import design_lines
-from workbench.report.reports import controllers, program_sections
+from workbench.report.reports import THEN, controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
@@ -146,8 +146,7 @@ def robust_view(found: Robust, rotary: bool) -> View:
         },
         lambda: _sections(found, rotary),
         lambda: robust_chart(found, rotary),
-        _then(found),
-        then_by_command=True,
+        command=_next(found),
     )
 
 
@@ -168,12 +167,13 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
     ]  # fmt: skip
 
 
-def _then(found: Robust) -> list[str]:
-    if not found.passed:
-        return ["`workbench experiment MODEL` finds the run that reduces the uncertainty, then"
-                " identify and design again"]  # fmt: skip
-    return ["`workbench validate MODEL design.json` shows its loops in time, `workbench export"
-            " design.json --to c` writes the code"]  # fmt: skip
+def _next(found: Robust) -> str:
+    if found.passed:
+        return THEN
+    return (
+        "`workbench experiment MODEL` finds the run that reduces the uncertainty, then identify and"
+        " design again"
+    )
 
 
 def robust_chart(found: Robust, rotary: bool) -> Chart:

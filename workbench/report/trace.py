@@ -23,7 +23,7 @@ from workbench.report.trace_tables import (
     rivals_table,
     trace_parts,
 )
-from workbench.report.trace_words import then_of, trace_sentence, words
+from workbench.report.trace_words import advice, next_of_trace, trace_sentence, words
 from workbench.report.view import Section, View, report_notes
 from workbench.steps.trace import Traced, trace_document
 
@@ -46,7 +46,8 @@ def traced_view(traced: Traced) -> View:
         },
         lambda: _sections(traced),
         lambda: _main_chart(traced),
-        then_of(traced),
+        advice(traced),
+        next_of_trace(traced),
     )
 
 

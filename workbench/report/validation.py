@@ -59,12 +59,9 @@ def validation_view(
         {"validation.json": lambda: validation_document(found)},
         sections,
         lambda: _step_chart(found, traces, "model", rotary),
-        [
-            "`workbench export DESIGN --to c` writes it as code for the drive"
-            if found.passed
-            else "`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"
-        ],
-        then_by_command=not found.passed,
+        command="`workbench export DESIGN --to c` writes it as code for the drive"
+        if found.passed
+        else "`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again",
     )
 
 

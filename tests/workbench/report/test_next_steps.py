@@ -25,6 +25,7 @@ from workbench.report.next_steps import (
     after_doctor,
     after_drift,
     after_identify,
+    after_trace,
     after_validate,
     check_of_refused,
     without_design,
@@ -34,6 +35,7 @@ from workbench.steps.validate import validate
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODEL = Path("my model/model.json")
+OUT = Path("out")
 FAST = Asked((300.0, 0.7))
 
 
@@ -105,17 +107,36 @@ def test_margins_that_are_missed_become_those_that_are_kept(too_fast: Design) ->
     near = replace(too_fast, rst=replace(too_fast.rst, margins=kept, missed=missed), pid=None)
     start = f"workbench design '{MODEL}' --from physical"
     asked = ("--from", "physical")
-    then = taken(after_design(near, MODEL, False, asked))
+    then = taken(after_design(near, MODEL, False, asked, OUT))
     assert then == f"{start} --modulus 0.41 --delay 1.23"
     slow = replace(near, rst=replace(too_fast.rst, missed=("a step overshoots by 9 %",)))
     w_n, zeta = too_fast.rst.dominant
-    then = taken(after_design(slow, MODEL, False, asked))
+    then = taken(after_design(slow, MODEL, False, asked, OUT))
     assert then == f"{start} --poles {0.7 * w_n:.3g},{zeta:.3g}"
 
 
 def test_poles_that_miss_the_goals_are_searched(found: Design, too_fast: Design) -> None:
-    assert taken(after_design(too_fast, MODEL, True, ())) == f"workbench design '{MODEL}'"
-    assert after_design(found, MODEL, False, ()) is None
+    assert taken(after_design(too_fast, MODEL, True, (), OUT)) == f"workbench design '{MODEL}'"
+
+
+def test_a_controller_is_tried_in_simulation_by_the_files_at_hand(found: Design) -> None:
+    then = taken(after_design(found, MODEL, False, (), OUT))
+    assert then == f"workbench validate '{MODEL}' out/design.json"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "command"),
+    [
+        ("none", (), "workbench design out/model.json"),
+        ("effect", ("spring",), "workbench design out/model.json"),
+        ("inseparable", ("spring",), "workbench design out/model.json"),
+        ("drift", (), "workbench identify new.csv --card emps"),
+        ("unknown", (), None),
+    ],
+)
+def test_after_trace(verdict: str, effects: tuple[str, ...], command: str | None) -> None:
+    then = after_trace(verdict, effects, ["new.csv"], "emps", OUT)
+    assert (then and taken(then)) == command
 
 
 @pytest.mark.slow
