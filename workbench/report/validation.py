@@ -160,7 +160,7 @@ def missed(found: Validation) -> str | None:
 
 def _missed(found: Validation, name: str) -> list[str]:
     return [
-        f"{name if name == PRESENT else called(name)} on the {place}: {limit}"
+        f"{called(name)} on the {place}: {limit}"
         for place, one in found.figures[name].items()
         for limit in one.missed
     ]

@@ -262,6 +262,13 @@ def test_nothing_is_not_said_of_a_force_that_could_not_have_been_seen() -> None:
     assert text.startswith("Open: a force of 35 % of friction would not show in these logs")
 
 
+def test_a_force_that_might_be_larger_than_friction_is_no_share_of_it() -> None:
+    bound: Any = SimpleNamespace(share=lambda level: 74.0, is_a_bound=True)
+    hidden: Any = SimpleNamespace(before=bound, after=bound, lessened=False)
+    text = trace_sentence(traced(replace(trace_of("unknown", ()), missing_force=hidden)))
+    assert text.endswith("Force missing: an unknown share of friction.")
+
+
 def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     found = replace(trace_of("unknown", ()), unknown=Dependence((), 0.0))
     text = trace_sentence(traced(replace(found, noise_force=0.01)))
