@@ -9,7 +9,6 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
-from workbench.report.design_tables import design_lines
 from workbench.report.reports import THEN, controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, tabled
@@ -163,7 +162,6 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
         ),
         controllers(design, rotary),
         *program_sections(design),
-        Section("Notes", design_lines(design, rotary)),
     ]  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from design.tune import Asked
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of
 from workbench import cli
+from workbench.commands.axis_test import after_axis_test
 from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
 from workbench.documents.design import Design
@@ -249,3 +250,17 @@ def test_logs_of_a_fleet_to_look_at() -> None:
     look = "workbench doctor /logs/m1/a.parquet --card emps"
     assert taken(then(report("set_aside", "promoted"))) == look
     assert taken(then(report("promoted"), in_registry=False)) == look
+
+
+def test_limits_of_a_registry_are_asked_for_only_where_one_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("WORKBENCH_REGISTRY", raising=False)
+    explained = SimpleNamespace(light="green")
+    test: Any = SimpleNamespace(light="yellow", untested=True, of=lambda _: explained)
+    then = after_axis_test(test, "a.csv", "card.toml", None)
+    assert taken(then) == "workbench identify a.csv --card card.toml"
+    Path("registry.db").touch()
+    then = after_axis_test(test, "a.csv", "card.toml", None)
+    assert taken(then).endswith("axis-test a.csv --card card.toml --registry registry.db")

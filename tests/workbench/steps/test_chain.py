@@ -176,8 +176,11 @@ def test_a_model_that_carries_no_design_is_refused() -> None:
     plant = identified().model.plant
     assert plant is not None
     wild = replace(plant, simulation_relative=0.9)
-    with pytest.raises(NotIdentifiable, match="leaves 90 % of the motion"):
+    with pytest.raises(NotIdentifiable, match=r"leaves 90 % of the motion.* moves the body freely"):
         designed(replace(model, plant=wild))
+    heavy = replace(model_of(TABLES["paper_table1"], ACTUATOR), plant=wild)
+    with pytest.raises(NotIdentifiable, match="design; the mass is identified: design on it"):
+        designed(heavy, source="arx")
     imposed = replace(model.log[0], position_rms=None)
     with pytest.raises(NotIdentifiable, match="prescribed"):
         designed(replace(model, log=(imposed,), actuator=None))
