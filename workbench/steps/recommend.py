@@ -81,7 +81,8 @@ def recommended(model: Model, found: Design) -> Recommendation:
         stays = True
         present_said = f"; {unclear}: no clear win over the present controller, keep it"
     decisive = _decisive(alone, found, figures)
-    why = f"{said}{f': {decisive}' if decisive else ''}{present_said}"
+    missed = "".join(f"; it misses a limit, {one}" for one in figures[taken].missed[:1])
+    why = f"{said}{f': {decisive}' if decisive else ''}{missed}{present_said}"
     return Recommendation(alone, better, why, stays)
 
 

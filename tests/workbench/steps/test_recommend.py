@@ -97,6 +97,14 @@ def test_a_loop_that_does_not_come_to_rest_is_not_taken(monkeypatch: pytest.Monk
     assert name == "rst" and "misses a limit, overshoot" in why
 
 
+def test_the_best_of_loops_that_all_miss_a_limit_is_said_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failing = replace(plain(), missed=("overshoot 30 %", "force"))
+    why = choose(monkeypatch, rst=failing, pid=failing)[2]
+    assert "; it misses a limit, overshoot 30 %; " in why and "force;" not in why
+
+
 def test_the_compensator_only_where_it_is_clearly_better(monkeypatch: pytest.MonkeyPatch) -> None:
     half = replace(plain(), settling=0.5 * plain().settling)
     for one, taken in ((half, True), (replace(half, limit_cycle=LimitCycle(1e-4, 0.3)), False)):
