@@ -213,7 +213,7 @@ def bode_chart(found: Design) -> Chart:
     if one is None or one.cascade is None or one.series is None:
         raise ValueError("a design without a filter has no Bode plot before and after it")
     A, B = np.array(found.plant.A), np.array(found.plant.B)
-    f = 0.5 / one.h * np.geomspace(LOWEST_DRAWN, 1.0, POINTS_OF_BODE)
+    f = 0.5 / one.h * np.geomspace(LOWEST_DRAWN, 1.0, POINTS_OF_BODE)[:-1]  # at the last it is real
     before, after = one.cascade.rst(one.h), one.rst
     pairs: tuple[tuple[str, RST, Colour], ...] = (
         ("without the filter", before, "before"), (f"with the {one.series.kind}", after, "model"),
