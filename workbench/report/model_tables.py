@@ -243,7 +243,10 @@ def fit_lines(model: Model) -> list[str]:
         lines.append("the equation of motion was fitted, not a free run")
     if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative
-        lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
+        lines.append(
+            f"force while sliding: {share:.2f} % unexplained from sample to sample, the noise of"
+            " the acceleration in it"
+        )
     runs = runs_to_add(model)
     if runs:
         lines.append(f"to identify the rest: {'; '.join(runs)}")

@@ -35,7 +35,9 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
         lines.append(f"position: {summary['run_refused']}")
     if summary["force_predicted_rms"] is not None:
         rms = force(summary["force_predicted_rms"], rotary)
-        lines.append(f"force, inverse model: error {rms} rms while sliding, outside the stick band")
+        lines.append(
+            f"force, inverse model: error {rms} rms while sliding, the acceleration's noise in it"
+        )
     if summary["force_simulated_rms"] is not None:
         rms = force(summary["force_simulated_rms"], rotary)
         lines.append(f"force, simulated: error {rms} rms")
