@@ -273,7 +273,7 @@ def _shift_row(shift: Shift) -> Row:
 def advice(found: Drifted) -> list[str]:
     """What to do next after a drift test, beside a command."""
     if found.slip:
-        return ["correct the unit in the card, or the logger, and test the log again"]
+        return ["where a unit is wrong, correct it in the card or the logger, and test again"]
     if found.verdict == "not_judged":
         return ["log longer, with more speeds, reversals and rests; the notes give the minimum"
                 " detectable change"]  # fmt: skip
