@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from workbench import options
-from workbench.ending import step
 from workbench.output import results
 from workbench.signature import option
 
@@ -38,6 +37,7 @@ def command(
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.logs import predict
     from workbench.interface.models import load_model
+    from workbench.report.next_steps import after_predict
     from workbench.report.prediction import prediction_view
     from workbench.report.view import show
 
@@ -50,8 +50,7 @@ def command(
             found = predict(model, log, card, drive=drive, window=window)
             view = prediction_view(found.found, found.rotary, log)
         view.write(folder)
-    then = step("what is missing, where that is more than noise", "trace", log, "--card", card)
-    show(view, folder.final, then)
+    show(view, folder.final, after_predict(log, card))
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":

@@ -13,6 +13,7 @@ from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
 from workbench.report.model_tables import reasons_once
+from workbench.report.next_steps import after_drift
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
@@ -49,7 +50,7 @@ def drift_view(found: Drifted, model_name: str) -> View:
         lambda: _sections(found),
         lambda: drift_chart(found, (_judged(found) or found.tests)[-1]),
         advice(found),
-        next_of_drift(found),
+        after_drift(found, [one.source.file for one in found.tests], "CARD"),
     )
 
 
@@ -281,19 +282,6 @@ def advice(found: Drifted) -> list[str]:
         return ["nothing to change; test the next log with the same `--state FILE`, which finds"
                 " slow changes too"]  # fmt: skip
     return []
-
-
-def next_of_drift(found: Drifted) -> str:
-    """The command that follows a change of the machine; "" of none."""
-    logs = _files(found, found.verdict).replace(", ", " ")
-    if found.verdict == "structure":
-        return f"`workbench trace {logs} --card CARD` finds the effect that joined"
-    if found.verdict != "drift" or found.slip:
-        return ""
-    return (
-        f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and a"
-        " controller of the machine as it is now"
-    )
 
 
 def what_the_columns_say(found: Drifted) -> list[str]:

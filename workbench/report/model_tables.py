@@ -216,14 +216,6 @@ def to_the_noise_by_equation(model: Model) -> bool:
     return all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE
 
 
-def next_of_model(model: Model) -> str:
-    """What to do with a model, and the command that does it."""
-    if not model.fit.adequate and model.resonance is None:
-        logs = " ".join(dict.fromkeys(e.file for e in model.log))
-        return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks, if any"
-    return "`workbench design model.json` makes a controller for this machine"
-
-
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
     from workbench.steps.predict import FORCE_WINDOW, in_windows

@@ -58,6 +58,11 @@ def after_trace(
     return None
 
 
+def after_predict(log: str, card: str) -> Step:
+    """What a model lacks on a log."""
+    return step("what is missing, where that is more than noise", "trace", log, "--card", card)
+
+
 def without_design(model: "Model | VelocityModel", card: str | None) -> Callable[[str], Step]:
     """After a refusal to design: look over the log that the model is of."""
     return check_of_refused([one.file for one in model.log], _card_of(model, card))

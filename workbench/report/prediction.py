@@ -6,6 +6,7 @@ import numpy as np
 
 from workbench.cards.readable import force, length, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
+from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes
 from workbench.steps.predict import Predicted, prediction_csv
 
@@ -62,7 +63,7 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
         {"prediction.csv": lambda: prediction_csv(found.runs)},
         sections,
         lambda: prediction_chart(found, rotary),
-        command="`workbench trace LOG --card CARD`, where that is more than noise",
+        step=after_predict("LOG", "CARD"),
         has_page=False,
         lead=first.rstrip(".") + ".",
     )

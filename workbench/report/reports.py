@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
@@ -33,11 +34,11 @@ from workbench.report.model_tables import (
     fit_lines,
     logs_of,
     model_parts,
-    next_of_model,
     parameter_rows,
     plant_lines,
     summary,
 )
+from workbench.report.next_steps import after_design, after_identify
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
@@ -47,14 +48,6 @@ from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.predict import fitted_run
 from workbench.steps.predicted_force import missing_force
-
-THEN = (
-    "`workbench validate MODEL design.json` checks it in simulation, then `workbench export"
-    " design.json --to c` writes it as code"
-)
-THEN_WITHOUT = (
-    "`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and identify again"
-)
 
 
 def identified_view(found: Identified) -> View:
@@ -85,7 +78,7 @@ def identified_view(found: Identified) -> View:
         {"model.json": lambda: model_document(model)},
         sections,
         lambda: fit_chart(model, sources, runs()),
-        command=next_of_model(model),
+        step=after_identify(model, [one.file for one in model.log], "CARD", Path()),
     )
 
 
@@ -115,7 +108,7 @@ def design_view(found: Design, rotary: bool = False) -> View:
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
-        command=THEN_WITHOUT if found.recommended == "none" else THEN,
+        step=after_design(found, Path("MODEL"), False, (), Path()),
     )
 
 

@@ -275,15 +275,3 @@ def advice(traced: Traced) -> list[str]:
             " FOLDER`, then `workbench trace ... --effects FOLDER`"
         )
     return out
-
-
-def next_of_trace(traced: Traced) -> str:
-    """The command that follows a verdict; "" where more has to be logged or known first."""
-    found = traced.trace
-    if found.verdict == "drift":
-        return "`workbench identify` the newer logs: a model of the machine as it is now"
-    design = "`workbench design model.json` makes a controller"
-    if found.effects:
-        them = "the effect" if len(found.effects) == 1 else "the effects"
-        return f"{design} on the model with {them} in it"
-    return design if found.verdict == "none" else ""

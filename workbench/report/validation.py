@@ -1,6 +1,7 @@
 """A validation: verdict and figures, steps and smooth reference in the simulated loop."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -9,9 +10,11 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, units_of
+from workbench.ending import step
 from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
 from workbench.report.design_tables import of_the_model
+from workbench.report.next_steps import as_code
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
@@ -59,9 +62,9 @@ def validation_view(
         {"validation.json": lambda: validation_document(found)},
         sections,
         lambda: _step_chart(found, traces, "model", rotary),
-        command="`workbench export DESIGN --to c` writes it as code for the drive"
+        step=as_code(Path("DESIGN"))
         if found.passed
-        else "`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again",
+        else step("slower poles, to validate again", "design", "MODEL", "--poles", "W_N,ZETA"),
     )
 
 

@@ -105,7 +105,7 @@ class View:
     parts: tables, lines and notes in their order. sections, chart: of the page, and the main
     picture, drawn when they are asked for. content: the document by which other programs read it;
     files: what the command writes, by name, a text or a document, and the page where it has_page.
-    command: what to type next, in words; where the names of the files are known, `Step` says it.
+    step: what to type next, which its command says with the names of the files at hand.
     lead: of the page, where that is another sentence.
     """
 
@@ -117,7 +117,7 @@ class View:
     sections: Callable[[], Sequence[Section]] = tuple
     chart: Callable[[], Chart] | None = None
     then: Sequence[str] = ()
-    command: str = ""
+    step: Step | None = None
     has_page: bool = True
     lead: str = ""
 
@@ -175,8 +175,8 @@ class View:
             folder.write_text(page_name, self.page())
 
     @property
-    def _then(self) -> tuple[str, ...]:
-        return (*self.then, self.command) if self.command else tuple(self.then)
+    def _then(self) -> list[str]:
+        return [*self.then, *([f"`{self.step.command}` ({self.step.why})"] if self.step else ())]
 
 
 def show(view: View, folder: Path, then: Step | None = None, **more: object) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.ending import step
 from workbench.output import OutputFolder
 from workbench.report.chart import Chart, Line, Panel
 from workbench.report.view import Section, View, notes
@@ -24,7 +25,7 @@ def view() -> View:
         lambda: [Section("Sizes", TABLE, ["a line"]), Section("More", "<p>more</p>")],
         lambda: Chart("x", "a line", [Panel("t [s]", "y [m]", [Line("y", X, X)])]),
         ["log more"],
-        "`workbench design x.json` goes on",
+        step("goes on", "design", "x.json"),
     )
 
 
@@ -41,12 +42,12 @@ def test_a_terminal_has_the_short_table_and_the_rest_with_verbose() -> None:
 def test_without_files_nothing_was_written_and_the_next_command_is_in_words() -> None:
     text = view().screen().text()
     assert "written" not in text
-    assert "next: log more\nnext: workbench design x.json goes on\n" in text
+    assert "next: log more\nnext: workbench design x.json (goes on)\n" in text
 
 
 def test_a_notebook_shows_all_of_it() -> None:
     html = view().html()
-    said = "Next: log more. Next: <code>workbench design x.json</code> goes on."
+    said = "Next: log more. Next: <code>workbench design x.json</code> (goes on)."
     assert html.startswith(f"<p><b>It is so. {said}")
     for words in ('<td class="short">b</td>', "at length", "beside", "note: two"):
         assert words in html
