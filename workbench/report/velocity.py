@@ -1,6 +1,7 @@
 """Results of a rig whose velocity follows the command: one screen each, and a report."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -73,12 +74,11 @@ def _summary(model: VelocityModel) -> str:
 
 
 def _valve(model: VelocityModel) -> Part:
-    """The numbers: value, unit, 95 % interval (or why there is none), and what each is."""
+    """The numbers: value, unit, 95 % interval (or why there is none), at length what each is."""
     every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
-    rows = (
-        (name, *estimate_cells(one), VALVE_MEANING.get(name, "")) for name, one in every.items()
-    )
-    return tabled((*MODEL_HEAD, "meaning"), rows)
+    rows = [(key, *estimate_cells(one), VALVE_MEANING.get(key, "")) for key, one in every.items()]
+    short = tabled(MODEL_HEAD, [row[:4] for row in rows], whole=rows)
+    return replace(short, whole_head=(*MODEL_HEAD, "meaning"))
 
 
 def velocity_view(
