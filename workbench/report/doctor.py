@@ -1,6 +1,5 @@
 """A log before any fit on one screen, and as charts: position, drive, clock, force over speed."""
 
-import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -27,16 +26,13 @@ MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 END_IN_ADVICE = ("next", "note", "refused")  # kinds whose texts end in what to do
 
 
-def doctor_view(found: Examined, out: Path | None, card: str = "CARD") -> Screen:
-    """What the log shows; of each kind a few lines, all of them with --verbose.
-
-    card: as it was given, for the command to type next.
-    """
-    few, every = (_lines(found, out, card, most) for most in (MOST_OF_A_KIND, None))
+def doctor_view(found: Examined, out: Path | None) -> Screen:
+    """What the log shows; of each kind a few lines, all of them with --verbose."""
+    few, every = (_lines(found, out, most) for most in (MOST_OF_A_KIND, None))
     return screen(instead(few, every))
 
 
-def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> list[str]:
+def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     """The lines, of which each kind has at most so many."""
     bad, remarks = [one.line for one in found.bad], [*found.remarks]
     if most is not None:
@@ -61,7 +57,7 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
                  f"would not: {', '.join(hidden) or 'none'}"]  # fmt: skip
     # Each kind: its label, its texts, and of how many a screen has room at least.
     kinds: list[tuple[str, Sequence[str], int]] = [
-        ("next", [_then(found, card)], 1),
+        ("next", [first] if (first := advice(found)) else [], 1),
         ("clock", [_clock(found.clock)], 1),
         ("signal", [_sensor(found, one) for one in found.sensors], 8),
         ("samples", [_plain(found, one) for one in bad], 1),
@@ -102,8 +98,8 @@ def _verdict(found: Examined) -> str:
     return f"{many} the {what} are identifiable from it"
 
 
-def _then(found: Examined, card: str) -> str:
-    """What to do next."""
+def advice(found: Examined) -> str:
+    """What to do before the log is identified; "" where nothing."""
     if found.refused:
         return "mend the log or its card (see refused), then ask again"
     if found.exchanged:
@@ -114,8 +110,7 @@ def _then(found: Examined, card: str) -> str:
         return "log again, with the motion that 'add' names"
     if found.rig.kind == "motor" and found.rig.force_per_command is None:
         return "write force_per_command under the card's [rig], then ask again"
-    first = f"workbench identify {found.file} --card {shlex.quote(card)}"
-    return f"{first}; for the rest, log what 'add' names" if found.add else first
+    return ""
 
 
 def labelled(

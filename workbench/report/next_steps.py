@@ -177,8 +177,11 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
 
 def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
     """Another card where the log is refused, a picture where nothing is identifiable from it."""
+    from workbench.report.doctor import advice
+
     if found.verdict not in ("refused", "nothing"):
-        return None
+        ready = not advice(found)
+        return step("what can be known of it", "identify", log, "--card", card) if ready else None
     if found.verdict == "nothing" and out is None:
         return step("see the log", "doctor", log, "--card", card, "--out", CHECK_FOLDER)
     if found.verdict == "nothing":

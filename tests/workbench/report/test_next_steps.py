@@ -209,9 +209,7 @@ def test_a_log_that_tells_nothing(verdict: str, out: Path | None, words: str) ->
     assert taken(after_doctor(found, "a.csv", "c/card.toml", out)) == f"workbench {words}"
 
 
-def test_a_log_that_tells_something_asks_for_nothing() -> None:
-    part: Any = SimpleNamespace(verdict="in part")
-    assert after_doctor(part, "a.csv", "emps", None) is None
+def test_another_card_goes_beside_the_one_at_hand() -> None:
     refused: Any = SimpleNamespace(verdict="refused")
     assert taken(after_doctor(refused, "a.csv", "emps", None)).endswith("--out card.toml")
 
