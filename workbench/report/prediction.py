@@ -8,7 +8,7 @@ from workbench.cards.readable import force, length, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes
-from workbench.steps.predict import Predicted, prediction_csv
+from workbench.steps.predict import Predicted, prediction_frame
 
 Columns = tuple[tuple[str, Colour, str], ...]
 POSITION_COLUMNS: Columns = (
@@ -60,7 +60,11 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
         first,
         [*more, notes(remarks, (Path(log).name,))],
         lambda: found.summary,
-        {"prediction.csv": lambda: prediction_csv(found.runs)},
+        {
+            "prediction.csv": lambda: prediction_frame(found.runs).to_csv(
+                index=False, float_format="%.10g"
+            )
+        },
         sections,
         lambda: prediction_chart(found, rotary),
         step=after_predict("LOG", "CARD"),

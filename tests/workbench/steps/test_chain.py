@@ -37,7 +37,7 @@ from workbench.steps.identify import (
 )
 from workbench.steps.linear_loop import corners, linear_of
 from workbench.steps.loop_figures import Limits
-from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_csv
+from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_frame
 from workbench.steps.simulate import record, truth
 from workbench.steps.validate import validate, validation_document
 
@@ -225,7 +225,7 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     assert found.refused is None and found.remarks == ()
     assert found.position_rms is not None and found.position_rms < 2e-4
     assert found.force_simulated_rms is not None and found.force_simulated_rms < 0.03
-    header, first, *_ = prediction_csv([found]).splitlines()
+    header, first, *_ = prediction_frame([found]).to_csv(index=False).splitlines()
     assert header == ",".join(PREDICTION_COLUMNS)
     assert len(first.split(",")) == len(PREDICTION_COLUMNS)
     assert card.recipe is not None
@@ -258,7 +258,7 @@ def test_a_prediction_without_a_command_leaves_its_column_empty() -> None:
     found = predict(identified().model, bare)
     assert found.drive == "force"
     assert found.force_simulated_rms is None
-    assert prediction_csv([found]).splitlines()[1].split(",")[3] == ""
+    assert prediction_frame([found]).to_csv(index=False).splitlines()[1].split(",")[3] == ""
     with pytest.raises(BadLog, match="no command u"):
         predict(identified().model, bare, drive="command")
 
@@ -275,7 +275,7 @@ def test_without_what_a_run_needs_the_force_alone_is_predicted(name: str) -> Non
     assert found.position_rms is None and found.force_simulated_rms is None
     assert found.force_predicted_rms == predict(model, log).force_predicted_rms
     assert found.remarks == (f"force by assumed values of what is not identifiable: {name}",)
-    assert prediction_csv([found]).splitlines()[1].endswith(",")
+    assert prediction_frame([found]).to_csv(index=False).splitlines()[1].endswith(",")
 
 
 def test_a_friction_that_is_surely_small_keeps_no_run_back() -> None:
