@@ -153,7 +153,7 @@ def not_identified(why: str) -> str:
 def summary(model: Model, missing: LatentForces | None) -> str:
     """What was found, in a few sentences; missing: the force that the model lacks on its logs."""
     share = None if missing is None else missing.share(max(model.karnopp.F_cp, model.karnopp.F_cn))
-    if missing is None or share is None:
+    if missing is None or share is None or model.coulomb_unknown:
         return _found(model, None)
     said = share_of_friction(share, missing)
     known = None if missing.is_a_bound else share

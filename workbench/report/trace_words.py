@@ -45,7 +45,7 @@ def trace_sentence(traced: Traced) -> str:
             " That is by the measured force; between it and the command something is missing"
             + (f", which acts like {like}." if like else ": the actuator is not linear.")
         )
-    if found.missing is not None:
+    if found.missing is not None and not traced.model.coulomb_unknown:
         said += f" Force missing: {before_and_after(found)}."
     if found.not_tried:
         said += f" Ended early, so this is for now; not tried: {'; '.join(found.not_tried)}."
