@@ -93,12 +93,9 @@ def _any(found: Validation) -> LoopFigures:
 
 def _shown(name: str) -> str:
     """A loop's name as a narrow column takes it."""
-    alone = name.removesuffix(COMPENSATED)
-    if alone == PRESENT:
-        return PRESENT
-    if name.endswith(SCHEDULED):
-        return f"{name.removesuffix(SCHEDULED).upper()}+table"
-    return alone.upper() if alone == name else f"{alone.upper()}+comp"
+    alone, _, beside = name.partition(" + ")
+    shown = {"": "", "compensator": "+comp", "schedule": "+table"}[beside]
+    return PRESENT if alone == PRESENT else alone.upper() + shown
 
 
 def _row(one: LoopFigures, units: Shown) -> Row:
@@ -283,10 +280,10 @@ def _runs(
 
 def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
     """A line of a loop, called and coloured by its controller."""
-    alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
+    alone, _, beside = name.partition(" + ")
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
-    beside: LineStyle = "dotted" if name.endswith(SCHEDULED) else "dashed"
-    style: LineStyle = "line" if alone == name else beside
+    styles: dict[str, LineStyle] = {"": "line", "compensator": "dashed", "schedule": "dotted"}
+    style = styles[beside]
     return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], style)
 
 
