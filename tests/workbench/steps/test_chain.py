@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from workbench.steps import loop_figures
 from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.design import effort_limit
 from workbench.steps.identify import (
+    _actuator,
     _force_error,
     arx_plant,
     closed_loop_remarks,
@@ -339,6 +341,13 @@ def test_a_loop_that_runs_away_is_no_log() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("asked", "why"), [(True, "as asked"), (False, "only a part of the")])
+def test_an_actuator_of_a_run_by_force_is_not_blamed(asked: bool, why: str) -> None:
+    fit: Any = SimpleNamespace(actuator=ACTUATOR, estimates={})
+    found = _actuator(fit, Rig("force"), asked)
+    assert found and all(why in str(one.reason) for one in found.values())
+
+
 def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
     model = replace(model_of(EMPS), rig=Rig("force"))
     found = designed(model)
