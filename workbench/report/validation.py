@@ -72,7 +72,7 @@ def validation_table(found: Validation, rotary: bool = False) -> Part:
     """A row a controller and plant."""
     alone = len(found.figures[found.judged]) == 1
     rows = [
-        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        (loop_name(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
@@ -91,7 +91,7 @@ def _any(found: Validation) -> LoopFigures:
     return next(iter(found.figures[found.judged].values()))
 
 
-def _shown(name: str) -> str:
+def loop_name(name: str) -> str:
     """A loop's name as a narrow column takes it."""
     alone, _, beside = name.partition(" + ")
     shown = {"": "", "compensator": "+comp", "schedule": "+table"}[beside]
