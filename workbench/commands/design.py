@@ -212,5 +212,4 @@ def _repeated_options(given: DesignOptions) -> tuple[str, ...]:
         *(("--from", given.source) if given.source else ()),
         *(("--design-period", f"{period:g}") if period else ()),
         *(("--card", given.card) if given.card else ()),
-        *(word for folder in given.effects for word in ("--effects", str(folder))),
     )

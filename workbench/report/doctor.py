@@ -12,7 +12,6 @@ from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.readable import number
 from workbench.cards.units import si_unit
-from workbench.documents.model import Identifiable
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel
 from workbench.report.chart_figure import chart_figure, evenly_spread
@@ -48,7 +47,9 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
                 ("direction -", _way(found, own.negative)),
                 ("motion", rests)]  # fmt: skip
     if found.identifiability:
-        can = [", ".join(_within(one) for one in found.identifiability if one.can) or "nothing"]
+        within = {one.name: one.within for one in found.identifiability if one.can}
+        named = (n if x is None else f"{n} {100.0 * x:.2g} %" for n, x in within.items())
+        can = [", ".join(named) or "nothing"]
     shows = list[str]()
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
@@ -80,11 +81,6 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
     return lines
-
-
-def _within(one: Identifiable) -> str:
-    """A parameter, and within what share of its value it can be identified."""
-    return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
 
 def _verdict(found: Examined) -> str:
