@@ -14,6 +14,7 @@ DONE = "done"
 REFUSAL = "done, and the answer is a refusal or an alarm; it ends with the next command"
 BAD_INPUT = "bad input: one line says what was found, where, what is needed, what to do"
 FAULT = "a fault of ours; --debug shows where"
+TAKES_EFFECTS = ("trace", "predict", "design", "validate", "experiment", "drift", "response")
 
 
 class StatusCommand(click.Command):
@@ -80,9 +81,16 @@ def _continued(lines: list[str]) -> list[str]:
     return [line if line.startswith("next (") else f"{line} \\" for line in lines]
 
 
-def step(why: str, *words: str | PathLike[str] | None) -> Step:
-    """The step of these words after `workbench`, quoted for a shell; those that are None fall."""
-    every = ["workbench", *(str(word) for word in words if word is not None)]
+def step(why: str, command: str | None, *words: str | PathLike[str] | None) -> Step:
+    """The step of these words after `workbench`, quoted for a shell; those that are None fall.
+
+    The folders of effects go on to a command that takes them, since a model may need them.
+    """
+    every = ["workbench", *(str(word) for word in (command, *words) if word is not None)]
+    running = click.get_current_context(silent=True)
+    if running is not None and command in TAKES_EFFECTS:
+        given = running.params.get("effects") or ()
+        every += [word for one in given for word in ("--effects", str(one))]
     return Step(why, shlex.join(every))
 
 

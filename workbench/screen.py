@@ -15,6 +15,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 SCREEN_LINES, SCREEN_WIDTH = 40, 100
 VERBOSE, JSON = "--verbose", "--json"
+CELL_LINE = 40  # characters of a table's cell for each line that a text may have
 # How a screen that is too full is made to fit, step by step: the lines that a text may have, the
 # entries to which a list is cut at most, and whether only lists that yield are cut.
 TIGHTER = ((8, 1, True), (8, 3, False), (4, 2, False), (2, 1, False), (1, 0, False))
@@ -218,7 +219,8 @@ def _lines(
     if not entries:
         return []
     if head:
-        rows = [one for one in entries if isinstance(one, tuple)]
+        most = None if tall is None else CELL_LINE * tall
+        rows = [tuple(_short(cell, most) for cell in one) for one in entries]
         return _stripped(as_text(table(head, rows, right), width))
     out = list[str]()
     for one in (text for text in entries if isinstance(text, str)):
@@ -228,6 +230,10 @@ def _lines(
             lines = [*lines[: tall - 1], f"{lines[tall - 1][: (width or SCREEN_WIDTH) - 4]} ..."]
         out += lines
     return out
+
+
+def _short(cell: str, most: int | None) -> str:
+    return cell if most is None or len(cell) <= most else f"{cell[: most - 4]} ..."
 
 
 def _stripped(text: str) -> list[str]:

@@ -229,6 +229,7 @@ def test_effects_go_from_the_recipe_to_the_log_and_from_the_model_to_the_predict
     assert "model.json: [effects] unknown effect 'coil'" in said and "--effects FOLDER" in said
     plain = as_json(capsys, ["predict", str(shop / "id/model.json"), *log])
     whole = as_json(capsys, ["predict", str(tmp_path / "model.json"), *log, *own])
+    assert whole["next"].endswith(f" --effects {own[1]}") and "--effects" not in plain["next"]
     assert whole["position_rms"] < 0.05 * plain["position_rms"]
     assert whole["force_predicted_rms"] < 0.5 * plain["force_predicted_rms"]
 

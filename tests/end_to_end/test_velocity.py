@@ -76,8 +76,10 @@ def test_identify(folder: Path) -> None:
 
 def test_trace(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(folder, "trace", "curved.csv", "--card", "card.toml", "--out", "t") == 0
-    assert "effect: the gain changes with the size of the command" in capsys.readouterr().out
+    assert "Missing: the gain changes with the size of the command" in capsys.readouterr().out
     assert read(folder / "t" / "trace.json")["effects"][0]["key"] == "curved_gain"
+    page = (folder / "t" / "report.html").read_text("utf-8")
+    assert page.count('<th scope="col">rival</th>') == 1 and "───" not in page
     model = read(folder / "t" / "model.json")
     assert model["effects"]["curved_gain"]["curve_p"]["value"] == pytest.approx(0.25, abs=0.05)
     words = ("t/model.json", "curved.csv", "--card", "card.toml", "--window", "2", "--out", "p")

@@ -166,7 +166,9 @@ def demo() -> Iterator[Screen]:
         taken = Recommendation("rst", bool(keys), "RST: good")
         chosen = designed(identified().model, SLOW)
         chosen = replace(chosen, recommended="rst", recommendation=taken)
-        made = Demonstration(found, chosen, validation(passed), {}, truth)
+        judged = "rst + compensator" if keys else "rst"
+        checked = replace(validation(passed), judged=judged)
+        made = Demonstration(found, chosen, checked, {}, truth)
         yield demo_view(made, OUT)
 
 
@@ -207,7 +209,7 @@ def predict() -> Iterator[Screen]:
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
-    yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml").screen(OUT)
+    yield prediction_view(Predicted((), summary), False, LOGS[0]).screen(OUT)
 
 
 def response() -> Iterator[Screen]:
@@ -314,7 +316,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
 
 def test_the_demo_sets_the_controllers_side_by_side() -> None:
     text = words_of(next(demo()).text())
-    assert "Recommended: RST with the friction compensator, which meets all limits" in text
+    assert "Recommended: RST with the compensator, which meets all limits" in text
     assert "before: present" in text and "after: RST+comp" in text
     assert "stribeck F_s 3.50 N 3.43 to 3.57 3.5 " in text
     assert "workbench init LOG" in text and "report.html" in text

@@ -116,3 +116,12 @@ def every_command() -> list[tuple[str, click.Command]]:
 @pytest.mark.parametrize(("name", "command"), every_command())
 def test_every_command_takes_verbose(name: str, command: click.Command) -> None:
     assert any("--verbose" in one.opts for one in command.params), name
+
+
+def test_a_long_reason_in_a_table_leaves_room_for_other_rows() -> None:
+    rows = [(str(n), "because " * 100) for n in range(9)]
+    shown = screen(tabled(("log", "reason"), rows, latest=True))
+    lines = shown.text().splitlines()
+    assert len(lines) <= 40 and sum(line[:1].isdigit() for line in lines) >= 3
+    assert lines[-1].endswith(" ...")
+    assert shown.text(verbose=True).count("because") == 900

@@ -53,13 +53,18 @@ def command(
 
 def after_axis_test(test: "AxisTest", log: str, card: str, where: str | None) -> Step | None:
     """What to type where the light is not green."""
+    from workbench.registry.database import location
+
     if test.light == "green":
         return None
     if test.of("explained").light in ("yellow", "red") or test.of("explained").light == "":
         return step("what else acts", "trace", log, "--card", card)
-    if test.untested and where is None:
-        return step("limits of its own logs", "axis-test", log, "--card", card,
-                    "--registry", "registry.db")  # fmt: skip
     if where is None:
-        return step("what has changed", "identify", log, "--card", card)
+        own = location(None)
+        if test.untested and ("://" in own or Path(own).exists()):
+            return step("limits of its own logs", "axis-test", log, "--card", card,
+                        "--registry", own)  # fmt: skip
+        first = "a first version for a registry, whose logs give limits"
+        why = first if test.untested else "what has changed"
+        return step(why, "identify", log, "--card", card)
     return step("what its logs have shown", "registry", "show", test.machine, "--registry", where)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from workbench import options
-from workbench.ending import step
 from workbench.output import results
 from workbench.signature import option
 from workbench.steps.asked import RobustAsked
@@ -121,8 +120,9 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
             found = found.scheduled(given.over, poles, goals)
         found.view.write(folder)
     options_kept = _repeated_options(given)
-    then = after_design(found.design, given.model_file, given.poles is not None, options_kept)
-    show(found.view, folder.final, then)
+    asked_poles, out = given.poles is not None, folder.final
+    then = after_design(found.design, given.model_file, asked_poles, options_kept, out)
+    show(found.view, out, then)
     return 1 if found.recommended == "none" else 0
 
 
@@ -140,7 +140,7 @@ def _asked(given: DesignOptions) -> dict[str, Any]:
 def _velocity(given: DesignOptions) -> int:
     """The same of a rig whose velocity follows the command."""
     from workbench.documents.velocity import read_velocity_model
-    from workbench.report.next_steps import without_design
+    from workbench.report.next_steps import in_simulation, without_design
     from workbench.report.velocity import velocity_view
     from workbench.report.view import show
     from workbench.steps.velocity_loop import design_velocity
@@ -152,9 +152,7 @@ def _velocity(given: DesignOptions) -> int:
         )
         view = velocity_view(found)
         view.write(folder)
-    design_file = folder.final / "design.json"
-    then = step("the loop in simulation", "validate", given.model_file, design_file)
-    show(view, folder.final, then)
+    show(view, folder.final, in_simulation(given.model_file, folder.final))
     return 0
 
 
@@ -181,8 +179,8 @@ def _robust(given: DesignOptions, model: "Model") -> int:
     with results("design", given.out, without_design(model, None)) as folder:
         found = robust_design(model, wanted, **_asked(given))
         found.view.write(folder)
-    design, then = design_document(found.found.design), after_robust(found.found, given.model_file)
-    show(found.view, folder.final, then, design=design)
+    then = after_robust(found.found, given.model_file, folder.final)
+    show(found.view, folder.final, then, design=design_document(found.found.design))
     return 0 if found.passed else 1
 
 
@@ -214,5 +212,4 @@ def _repeated_options(given: DesignOptions) -> tuple[str, ...]:
         *(("--from", given.source) if given.source else ()),
         *(("--design-period", f"{period:g}") if period else ()),
         *(("--card", given.card) if given.card else ()),
-        *(word for folder in given.effects for word in ("--effects", str(folder))),
     )

@@ -69,8 +69,8 @@ def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
     then = after_doctor(found, name, card_name, out)
-    emit({**document, "out": out}, lambda: doctor_view(found, out, card_name), then)
-    return 0 if then is None else 1
+    emit({**document, "out": out}, lambda: doctor_view(found, out), then)
+    return 1 if found.verdict in ("refused", "nothing") else 0
 
 
 def _installation(where: str | None) -> int:

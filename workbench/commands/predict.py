@@ -37,6 +37,7 @@ def command(
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.logs import predict
     from workbench.interface.models import load_model
+    from workbench.report.next_steps import after_predict
     from workbench.report.prediction import prediction_view
     from workbench.report.view import show
 
@@ -47,9 +48,9 @@ def command(
         else:
             model = load_model(model_file, effects)
             found = predict(model, log, card, drive=drive, window=window)
-            view = prediction_view(found.found, found.rotary, log, card)
+            view = prediction_view(found.found, found.rotary, log)
         view.write(folder)
-    show(view, folder.final)
+    show(view, folder.final, after_predict(log, card))
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":

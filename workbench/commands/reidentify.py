@@ -8,7 +8,7 @@ import click
 from workbench import options
 from workbench.ending import Step, step
 from workbench.jobs.options import JobOptions
-from workbench.output import emit, next_step
+from workbench.output import emit
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery
@@ -77,20 +77,13 @@ def undelivered(alarms: "Delivery") -> str:
 
 def pass_view(done: "PassReport") -> "Screen":
     """What a pass did, for a terminal: alarms first."""
-    from workbench.registry.values import ALARMING
     from workbench.registry.views import outcomes_table
     from workbench.screen import listed, screen
 
     judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) tested"
-    alarming = dict.fromkeys(o.machine for o in done.outcomes if o.verdict in ALARMING)
-    then = (
-        next_step(f"`workbench registry show {machine}` says what has changed, and what was done")
-        for machine in alarming
-    )
     return screen(
         judged,
         listed(remarks(done), MOST_LINES),
-        listed(then, MOST_LINES),
         outcomes_table(done.outcomes, alarms_first=True),
     )
 

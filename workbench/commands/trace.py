@@ -39,25 +39,26 @@ def command(
     """
     from workbench.interface.models import trace
     from workbench.logs.sources import card_of_velocity
-    from workbench.report.next_steps import check_of_refused
+    from workbench.report.next_steps import after_trace, check_of_refused
     from workbench.report.view import show
     from workbench.steps.trace import named_logs
 
     with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
+        names, held_out = named_logs(logs, tests, card)
         if card_of_velocity(card):
             options.refuse_for_velocity("effects", "seed")
-            view = _of_velocity(*named_logs(logs, tests, card), card, budget)
+            view, verdict, named = _of_velocity(names, held_out, card, budget)
         else:
-            names, held_out = named_logs(logs, tests, card)
             found = trace(names, held_out or None, card, effects=effects, budget=budget, seed=seed)
-            view = found.view
+            view, verdict, named = found.view, found.verdict, found.effects
         view.write(folder)
-    show(view, folder.final)
+    newer = held_out or names
+    show(view, folder.final, after_trace(verdict, named, newer, card, folder.final))
 
 
 def _of_velocity(
     names: tuple[str, ...], held_out: tuple[str, ...], card: str, budget: float
-) -> "View":
+) -> tuple["View", str, tuple[str, ...]]:
     """The same of a rig whose velocity follows the command."""
     from workbench.logs.sources import read_sources
     from workbench.report.velocity import velocity_view
@@ -66,4 +67,5 @@ def _of_velocity(
     train = read_sources(names, card, velocity=True)
     test = read_sources(held_out, card, velocity=True) if held_out else None
     with running("trace", TRACE_STAGES, budget) as course:
-        return velocity_view(trace_velocity(train, test, keep_going=course.keep_going))
+        found = trace_velocity(train, test, keep_going=course.keep_going)
+        return velocity_view(found), found.left.verdict, tuple(found.model.effects)

@@ -34,7 +34,7 @@ def command(
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
-    from workbench.report.next_steps import after_validate
+    from workbench.report.next_steps import after_validate, as_code
     from workbench.report.view import show
     from workbench.steps.present import with_card
 
@@ -50,7 +50,7 @@ def command(
         found = validate(model, design, plant=plant, limits=limits, seed=seed)
         found.view.write(folder)
     then = after_validate(found.found, design, model, model_file, plant_file, card)
-    show(found.view, folder.final, then)
+    show(found.view, folder.final, then or as_code(design_file))
     return 0 if found.passed else 1
 
 

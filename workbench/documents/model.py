@@ -301,6 +301,11 @@ class Model:
         return tuple(name for name in NAMES if not self.friction[name].known)
 
     @property
+    def coulomb_unknown(self) -> bool:
+        """Whether no level is known of which a force could be a share."""
+        return {"F_cp", "F_cn"} <= set(self.assumed)
+
+    @property
     def travel(self) -> tuple[float, float]:
         """Lowest and highest position in the logs [m]."""
         return (min(e.travel[0] for e in self.log), max(e.travel[1] for e in self.log))

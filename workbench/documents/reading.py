@@ -3,6 +3,7 @@ them; and read back: strict JSON into frozen dataclasses, one line where it does
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -50,7 +51,8 @@ def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
             f" {OFFERED_FOR_VELOCITY}"
         )
     said = "no 'schema'" if found is None else f"schema {_shown(found)}"
-    raise BadModel(f"{path}: {said}, {schema!r} needed; give the file that command writes")
+    kind = re.sub("[-_]", " ", schema.partition("/")[0])
+    raise BadModel(f"{path}: {said}, {schema!r} needed; give the {kind} that this version writes")
 
 
 def validated(

@@ -178,7 +178,8 @@ def _loop_of(found: Design, chosen: str) -> DrivenLoop:
         return DrivenLoop(now.law, now.force, now.rate, limit, None, k_a, direct)
     one = found.controllers.get(chosen)
     if one is None:
-        reason = found.refused.get(chosen, "it is not there")
+        again = f"workbench design MODEL --structure {chosen} makes one"
+        reason = found.refused.get(chosen, again)
         raise BadModel(f"the design has no controller {chosen!r}: {reason}")
     return DrivenLoop(
         one.law(found.command), found.force, one.rate, limit, one.feed_forward, k_a,

@@ -109,7 +109,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
-    form = _c_number if language == "C" else st_syntax("double").number
+    form = (lambda value: repr(float(value))) if language == "C" else st_syntax("double").number
     return {
         "card": model.card,
         "name": what.name,
@@ -134,7 +134,3 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
         "command": model.rig.command_unit,
         "zero": form(0.0),
     }
-
-
-def _c_number(value: float) -> str:
-    return repr(float(value))

@@ -1,13 +1,11 @@
 """The library of effects and checks of one's own, as `workbench effects` shows them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from identification.effects._base import Effect
 from workbench.cards.effect_values import known_effect
-from workbench.cards.own_effects import library
-from workbench.interface.inputs import PathLike
+from workbench.interface.inputs import PathLike, effects_of
 
 
 def effects(*keys: str, folders: Iterable[PathLike] = ()) -> Sequence[Mapping[str, Any]]:
@@ -16,7 +14,7 @@ def effects(*keys: str, folders: Iterable[PathLike] = ()) -> Sequence[Mapping[st
     As `workbench effects list --json`. folders: of your own effects, whose Python is run. Raises
     BadModel where a key is unknown, or a file declares none.
     """
-    known = library([Path(one) for one in folders])
+    known = effects_of(folders)
     return [described(known_effect(key, known)) for key in keys or known]
 
 
@@ -43,7 +41,7 @@ def check_effects(
     from identification.effects._library import built_in
     from workbench.cards.effect_runs import CHECKS, failures
 
-    own = {key: one for key, one in library([Path(folder)]).items() if key not in built_in()}
+    own = {key: one for key, one in effects_of(folder).items() if key not in built_in()}
     found = {}
     for key, one in own.items():
         broken = dict(failures(one))

@@ -18,16 +18,18 @@ are `UserError`, a line that says what to do.
 import hashlib
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
 
+from identification.effects._library import Library
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, card_from, load_card
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
+from workbench.cards.own_effects import library
 from workbench.cards.units import conversion, parse_gain, si_unit
 from workbench.logs.sources import Recorded, Sources, card_path, sources_of
 from workbench.logs.table import RawColumn, Table
@@ -83,6 +85,12 @@ def sources(
     return sources_of(found, _card(rig, signals, table.names))
 
 
+def effects_of(folders: Iterable[PathLike] | PathLike) -> Library:
+    """The library with the effects in these folders, or in this one."""
+    several = [folders] if isinstance(folders, str | os.PathLike) else folders
+    return library([Path(one) for one in several])
+
+
 def read_card(card: CardLike) -> Card:
     """A card by its path or the name of a shipped one; one that is read already as it is."""
     if isinstance(card, Card):
@@ -94,6 +102,8 @@ def _recorded(log: Any, number: int) -> Recorded:
     """A DataFrame, or what makes one, as a log; an index that is no count is a column too."""
     import pandas as pd
 
+    if log is None or np.isscalar(log):
+        raise BadLog(f"{type(log).__name__} found, a log needed: a path, a DataFrame, an array")
     frame = log if isinstance(log, pd.DataFrame) else pd.DataFrame(log)
     if not isinstance(frame.index, pd.RangeIndex):
         frame = frame.reset_index()

@@ -12,7 +12,6 @@ import numpy as np
 from identification.errors import BadCard
 from identification.log import Log
 from workbench.cards.card import Card, load_card
-from workbench.cards.own_effects import library
 from workbench.course import running, working
 from workbench.documents.model import Model
 from workbench.interface.inputs import (
@@ -22,6 +21,7 @@ from workbench.interface.inputs import (
     PathLike,
     RigLike,
     Signals,
+    effects_of,
     read_card,
     sources,
 )  # fmt: skip
@@ -275,7 +275,7 @@ def simulate(
     import pandas as pd
 
     if not isinstance(card, Card):
-        card = load_card(card_path(os.fspath(card)), library([Path(one) for one in effects]))
+        card = load_card(card_path(os.fspath(card)), effects_of(effects))
     card.refuse_velocity()
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")

@@ -257,7 +257,10 @@ def experiment(
 
 def _design(given: DesignLike) -> Design:
     made = read_design(Path(given)) if isinstance(given, str | os.PathLike) else given
-    return made.design if isinstance(made, DesignResult) else made
+    found = made.design if isinstance(made, DesignResult) else made
+    if not isinstance(found, Design):
+        raise BadModel(f"{type(given).__name__} found, a design needed: its path, or a design's")
+    return found
 
 
 def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:

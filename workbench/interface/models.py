@@ -13,11 +13,18 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from identification.errors import BadCard, BadModel, UserError
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
-from workbench.cards.own_effects import library
 from workbench.course import running
 from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
-from workbench.interface.inputs import CardLike, Logs, PathLike, RigLike, Signals, sources
+from workbench.interface.inputs import (
+    CardLike,
+    Logs,
+    PathLike,
+    RigLike,
+    Signals,
+    effects_of,
+    sources,
+)
 from workbench.interface.result import Result
 from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
@@ -187,7 +194,7 @@ def trace(
     does. Raises NotIdentifiable where too little slides.
     """
     begun = time.monotonic()
-    known = library([Path(one) for one in effects])
+    known = effects_of(effects)
     if train is None:
         if card is None or isinstance(card, Card):
             raise BadCard("no log given; give train, or the path or name of a card with a [split]")
@@ -205,7 +212,7 @@ def trace(
 
 def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:
     """The model in the file, its effects also of your own folders, whose Python is run."""
-    return read_model(Path(path), library([Path(one) for one in effects]))
+    return read_model(Path(path), effects_of(effects))
 
 
 def model_of(given: ModelLike) -> Model:

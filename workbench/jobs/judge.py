@@ -22,7 +22,7 @@ from workbench.registry.values import Candidate, Judgement
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.moved_scale import moved_between, other_mass, slip_of_scale
+from workbench.steps.moved_scale import moved_between, no_wear
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate, validation_document
 
@@ -112,7 +112,7 @@ class Chain:
         reason = _then(said, contest.reason)
         moved = moved_between(champion.model.friction, challenger.model.friction)
         rotary = champion.model.rotary
-        by_hand = slip_of_scale(moved, rotary) or other_mass(moved, rotary)
+        by_hand = no_wear(moved, rotary)
         if by_hand and (contest.won or contest.model_won):
             reason = f"{by_hand}: nothing is replaced by itself, a person decides; {reason}"
             return Judgement("refused", reason, candidate, evidence)

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from workbench.cards.readable import number
+from identification.model.estimates import NORMAL_95
+from workbench.cards.readable import in_digits, number
 from workbench.registry.difference import Line, Number, as_read
 from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled
@@ -93,14 +94,14 @@ def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
     rows = [
         (
             line.name,
-            _value(line.before),
+            value,
             line.unit,
-            _interval(line.before),
-            _value(line.after),
-            _interval(line.after),
+            interval,
+            *_cells(line.after),
             _change(line),
         )
         for line in shown
+        for value, interval in [_cells(line.before)]
     ]
     return screen(tabled(head, rows), *([said] if said else ()))
 
@@ -115,16 +116,15 @@ def short(digest: str | None) -> str:
     return "-" if digest is None else digest[:SHORT]
 
 
-def _value(found: Number | str | None) -> str:
-    if isinstance(found, Number):
-        return "-" if found.value is None else f"{found.value:.5g}"
-    return "-" if found is None else found
-
-
-def _interval(found: Number | str | None) -> str:
-    if not isinstance(found, Number) or found.low is None or found.high is None:
-        return ""
-    return f"{found.low:.5g} to {found.high:.5g}"
+def _cells(found: Number | str | None) -> tuple[str, str]:
+    """Value and interval, with as many digits as the interval leaves meaning to."""
+    if not isinstance(found, Number):
+        return found or "-", ""
+    if found.value is None or found.low is None or found.high is None:
+        return "-" if found.value is None else f"{found.value:.5g}", ""
+    sd = (found.high - found.low) / (2.0 * NORMAL_95)
+    value, low, high = in_digits((found.value, found.low, found.high), found.value, sd)
+    return value, f"{low} to {high}"
 
 
 def _change(line: Line) -> str:

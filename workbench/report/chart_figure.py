@@ -22,6 +22,7 @@ GREY = "#7a7a7a"
 BEFORE = "#8a8a8a"
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
+FEW_DOTS = 200  # that are drawn larger
 SHOWN_SHARE = 0.995  # of the points that axes hold; the rarest would flatten the rest
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -157,8 +158,8 @@ def _line(axes: "Axes", one: Line) -> None:
     if one.style == "dots":
         chosen = evenly_spread(len(one.x))
         axes.plot(
-            one.x[chosen], one.y[chosen], ".", ms=3, mew=0, color=colour, alpha=0.6,
-            rasterized=True, label=one.name,
+            one.x[chosen], one.y[chosen], ".", ms=3 if len(one.x) > FEW_DOTS else 7, mew=0,
+            color=colour, alpha=0.6, rasterized=True, label=one.name,
         )  # fmt: skip
     else:
         line(axes, one.x, one.y, color=colour, label=one.name, **LINE_STYLES[one.style])

@@ -7,7 +7,6 @@ from typing import Any
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, number, shown_unit
-from workbench.documents.design import Design
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import not_identified
@@ -15,6 +14,7 @@ from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation import (
     error_cells,
+    loop_name,
     validation_lines,
     validation_sentence,
     validation_table,
@@ -22,7 +22,8 @@ from workbench.report.validation import (
 from workbench.report.view import notes
 from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
-from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
+from workbench.steps.loop_figures import PRESENT, LoopFigures
+from workbench.steps.recommend import called
 from workbench.steps.trace import effect_estimates
 
 SIMULATED = (
@@ -61,34 +62,25 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
     return screen(*parts)
 
 
-def _compensated(design: Design) -> bool:
-    """Whether the design recommends its controller with the compensator."""
-    return design.recommendation is not None and design.recommendation.compensator
-
-
 def controller_sentence(found: Demonstration) -> str:
     """The controller that is recommended, and whether it keeps its limits in simulation."""
     if found.design.recommended == "none":
         return "No controller meets every goal; design.html says what each misses."
-    called = found.design.recommended.upper()
-    if _compensated(found.design):
-        called += " with the friction compensator"
+    named = called(found.validation.judged)
     verdict = "meets all limits in simulation" if found.validation.passed else "misses a limit"
-    return f"Recommended: {called}, which {verdict}; errors in % of the step or the amplitude:"
+    return f"Recommended: {named}, which {verdict}; errors in % of the step or the amplitude:"
 
 
 def controller_table(found: Demonstration) -> Part:
     """The present controller and the recommended one, side by side."""
-    units, name = shown(found.traced.model.rotary), found.design.recommended
-    after, beside = name.upper(), _compensated(found.design)
+    units, judged = shown(found.traced.model.rotary), found.validation.judged
     head = ("controller", "static error", "overshoot", "settling", "tracking error",
             f"peak force [{units.force}]", "modulus margin")  # fmt: skip
     figures = {key: places["model"] for key, places in found.validation.figures.items()}
-    named = (
-        (PRESENT, "before: present"),
-        (name + COMPENSATED, f"after: {after}+comp") if beside else (name, f"after: {after}"),
-    )
-    rows = [(said, *_figures(figures[key])) for key, said in named if key in figures]
+    named = {PRESENT: "before: present"}
+    if found.design.recommended != "none":
+        named[judged] = f"after: {loop_name(judged)}"
+    rows = [(said, *_figures(figures[key])) for key, said in named.items() if key in figures]
     return tabled(head, rows, right=())
 
 

@@ -200,11 +200,6 @@ def _unit_over(over: str, rotary: bool) -> str:
     return {"place": f" {units.position}", "load": f" {units.force}"}.get(over, "")
 
 
-def refused_lines(found: Design) -> list[str]:
-    """Controllers that there are not, and why."""
-    return [f"no {name.upper()}: {why}" for name, why in found.refused.items()]
-
-
 def missed_lines(found: Design) -> list[str]:
     """The goals that each controller misses."""
     return [
@@ -212,11 +207,6 @@ def missed_lines(found: Design) -> list[str]:
         for name, one in found.controllers.items()
         for missed in one.missed
     ]
-
-
-def set_point_lines(found: Design) -> list[str]:
-    """How each controller follows a reference, and how fast that may move."""
-    return [f"{name.upper()}: {one.note}" for name, one in found.controllers.items() if one.note]
 
 
 def design_sentence(found: Design) -> str:
@@ -275,7 +265,7 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
     """The margins, what the design rests on, and remarks; behind --verbose also the plant and the
     other controllers' ramps."""
     chosen = None if found.recommended == "none" else found.recommended
-    ramps = set_point_lines(found)
+    ramps = [f"{name.upper()}: {one.note}" for name, one in found.controllers.items() if one.note]
     return [
         margins_table(found),
         MARGINS_SAID,
@@ -287,7 +277,7 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         listed(loop_lines(found, rotary)),
         listed(schedule_lines(found, rotary)),
         *map(more, schedule_rows(found, rotary)),
-        listed(refused_lines(found)),
+        listed(f"no {name.upper()}: {why}" for name, why in found.refused.items()),
         listed(missed_lines(found)),
         instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),
         notes(found.remarks),

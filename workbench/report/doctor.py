@@ -1,6 +1,5 @@
 """A log before any fit on one screen, and as charts: position, drive, clock, force over speed."""
 
-import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,7 +12,6 @@ from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.readable import number
 from workbench.cards.units import si_unit
-from workbench.documents.model import Identifiable
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel
 from workbench.report.chart_figure import chart_figure, evenly_spread
@@ -27,16 +25,13 @@ MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 END_IN_ADVICE = ("next", "note", "refused")  # kinds whose texts end in what to do
 
 
-def doctor_view(found: Examined, out: Path | None, card: str = "CARD") -> Screen:
-    """What the log shows; of each kind a few lines, all of them with --verbose.
-
-    card: as it was given, for the command to type next.
-    """
-    few, every = (_lines(found, out, card, most) for most in (MOST_OF_A_KIND, None))
+def doctor_view(found: Examined, out: Path | None) -> Screen:
+    """What the log shows; of each kind a few lines, all of them with --verbose."""
+    few, every = (_lines(found, out, most) for most in (MOST_OF_A_KIND, None))
     return screen(instead(few, every))
 
 
-def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> list[str]:
+def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     """The lines, of which each kind has at most so many."""
     bad, remarks = [one.line for one in found.bad], [*found.remarks]
     if most is not None:
@@ -52,7 +47,9 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
                 ("direction -", _way(found, own.negative)),
                 ("motion", rests)]  # fmt: skip
     if found.identifiability:
-        can = [", ".join(_within(one) for one in found.identifiability if one.can) or "nothing"]
+        within = {one.name: one.within for one in found.identifiability if one.can}
+        named = (n if x is None else f"{n} {100.0 * x:.2g} %" for n, x in within.items())
+        can = [", ".join(named) or "nothing"]
     shows = list[str]()
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
@@ -61,7 +58,7 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
                  f"would not: {', '.join(hidden) or 'none'}"]  # fmt: skip
     # Each kind: its label, its texts, and of how many a screen has room at least.
     kinds: list[tuple[str, Sequence[str], int]] = [
-        ("next", [_then(found, card)], 1),
+        ("next", [first] if (first := advice(found)) else [], 1),
         ("clock", [_clock(found.clock)], 1),
         ("signal", [_sensor(found, one) for one in found.sensors], 8),
         ("samples", [_plain(found, one) for one in bad], 1),
@@ -86,11 +83,6 @@ def _lines(found: Examined, out: Path | None, card: str, most: int | None) -> li
     return lines
 
 
-def _within(one: Identifiable) -> str:
-    """A parameter, and within what share of its value it can be identified."""
-    return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
-
-
 def _verdict(found: Examined) -> str:
     if found.refused:
         return "cannot be identified as it is (see refused)"
@@ -102,8 +94,8 @@ def _verdict(found: Examined) -> str:
     return f"{many} the {what} are identifiable from it"
 
 
-def _then(found: Examined, card: str) -> str:
-    """What to do next."""
+def advice(found: Examined) -> str:
+    """What to do before the log is identified; "" where nothing."""
     if found.refused:
         return "mend the log or its card (see refused), then ask again"
     if found.exchanged:
@@ -114,8 +106,7 @@ def _then(found: Examined, card: str) -> str:
         return "log again, with the motion that 'add' names"
     if found.rig.kind == "motor" and found.rig.force_per_command is None:
         return "write force_per_command under the card's [rig], then ask again"
-    first = f"workbench identify {found.file} --card {shlex.quote(card)}"
-    return f"{first}; for the rest, log what 'add' names" if found.add else first
+    return ""
 
 
 def labelled(

@@ -13,6 +13,7 @@ from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
 from workbench.report.model_tables import reasons_once
+from workbench.report.next_steps import after_drift
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
@@ -48,8 +49,8 @@ def drift_view(found: Drifted, model_name: str) -> View:
         {"drift.json": lambda: drift_document(found, model_name)},
         lambda: _sections(found),
         lambda: drift_chart(found, (_judged(found) or found.tests)[-1]),
-        then_of_drift(found),
-        then_by_command=found.verdict not in ("none", "not_judged"),
+        advice(found),
+        after_drift(found, [one.source.file for one in found.tests], "CARD"),
     )
 
 
@@ -270,24 +271,17 @@ def _shift_row(shift: Shift) -> Row:
     return (shift.name, before, after, unit, signed_percent(shift.change), interval)
 
 
-def then_of_drift(found: Drifted) -> list[str]:
-    """What to do next after a drift test."""
-    match found.verdict:
-        case "drift" if found.slip:
-            return ["correct the unit in the card, or the logger, and test the log again"]
-        case "drift":
-            logs = _files(found, "drift").replace(", ", " ")
-            return [f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and"
-                    " a controller of the machine as it is now"]  # fmt: skip
-        case "structure":
-            logs = _files(found, "structure").replace(", ", " ")
-            return [f"`workbench trace {logs} --card CARD` finds the effect that joined"]
-        case "not_judged":
-            return ["log longer, with more speeds, reversals and rests; the notes give the minimum"
-                    " detectable change"]  # fmt: skip
-        case _:
-            return ["nothing to change; test the next log with the same `--state FILE`, which finds"
-                    " slow changes too"]  # fmt: skip
+def advice(found: Drifted) -> list[str]:
+    """What to do next after a drift test, beside a command."""
+    if found.slip:
+        return ["where a unit is wrong, correct it in the card or the logger, and test again"]
+    if found.verdict == "not_judged":
+        return ["log longer, with more speeds, reversals and rests; the notes give the minimum"
+                " detectable change"]  # fmt: skip
+    if found.verdict == "none":
+        return ["nothing to change; test the next log with the same `--state FILE`, which finds"
+                " slow changes too"]  # fmt: skip
+    return []
 
 
 def what_the_columns_say(found: Drifted) -> list[str]:

@@ -12,7 +12,6 @@ from identification.tracing.result import MissingForce, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE
-from workbench.report.trace_words import before_and_after
 from workbench.report.view import Section
 
 Which = Literal["training", "test"]
@@ -42,8 +41,6 @@ def missing_chart(
         " band. Where the body rests or turns, friction takes whatever is applied: the band is"
         " wide there."
     )
-    if found.missing is not None:
-        caption += f" Root mean square while it slides: {before_and_after(found)}."
     drawn: list[tuple[LatentForces, str, Colour]] = [(force.after, "model", "model")]
     if force.lessened:
         drawn = [(force.before, "before", "before"), (force.after, "after", "model")]

@@ -153,7 +153,7 @@ def not_identified(why: str) -> str:
 def summary(model: Model, missing: LatentForces | None) -> str:
     """What was found, in a few sentences; missing: the force that the model lacks on its logs."""
     share = None if missing is None else missing.share(max(model.karnopp.F_cp, model.karnopp.F_cn))
-    if missing is None or share is None:
+    if missing is None or share is None or model.coulomb_unknown:
         return _found(model, None)
     said = share_of_friction(share, missing)
     known = None if missing.is_a_bound else share
@@ -216,14 +216,6 @@ def to_the_noise_by_equation(model: Model) -> bool:
     return all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE
 
 
-def next_of_model(model: Model) -> str:
-    """What to do with a model, and the command that does it."""
-    if not model.fit.adequate and model.resonance is None:
-        logs = " ".join(dict.fromkeys(e.file for e in model.log))
-        return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks, if any"
-    return "`workbench design model.json` makes a controller for this machine"
-
-
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
     from workbench.steps.predict import FORCE_WINDOW, in_windows
@@ -243,7 +235,10 @@ def fit_lines(model: Model) -> list[str]:
         lines.append("the equation of motion was fitted, not a free run")
     if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative
-        lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
+        lines.append(
+            f"force while sliding: {share:.2f} % unexplained from sample to sample, the noise of"
+            " the acceleration in it"
+        )
     runs = runs_to_add(model)
     if runs:
         lines.append(f"to identify the rest: {'; '.join(runs)}")

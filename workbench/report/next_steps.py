@@ -44,6 +44,25 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
     return step("a controller for it", "design", folder / "model.json")
 
 
+def after_trace(
+    verdict: str, effects: Iterable[object], logs: Sequence[str], card: str, folder: Path
+) -> Step | None:
+    """The newer logs' own model after drift, a controller where the model is as good as it gets.
+
+    logs: the newer ones. None where more has to be logged or known first.
+    """
+    if verdict == "drift":
+        return step("the machine as it is now", "identify", *logs, "--card", card)
+    if verdict == "none" or list(effects):
+        return step("a controller for it", "design", folder / "model.json")
+    return None
+
+
+def after_predict(log: str, card: str) -> Step:
+    """What a model lacks on a log."""
+    return step("what is missing, where that is more than noise", "trace", log, "--card", card)
+
+
 def without_design(model: "Model | VelocityModel", card: str | None) -> Callable[[str], Step]:
     """After a refusal to design: look over the log that the model is of."""
     return check_of_refused([one.file for one in model.log], _card_of(model, card))
@@ -58,14 +77,14 @@ def _card_of(model: "Model | VelocityModel", card: str | None) -> str:
 
 
 def after_design(
-    found: "Design", model_file: Path, asked_poles: bool, options: Iterable[str]
-) -> Step | None:
-    """Where no controller keeps the goals: what the best of them does keep.
+    found: "Design", model_file: Path, asked_poles: bool, options: Iterable[str], folder: Path
+) -> Step:
+    """A check in simulation; where no controller keeps the goals, what the best of them does keep.
 
-    options: the other options of the command. None where one is recommended.
+    options: the other options of the command.
     """
     if found.recommended != "none":
-        return None
+        return in_simulation(model_file, folder)
     words = ("design", str(model_file), *options)
     if asked_poles:
         return step("poles that meet the goals are searched", *words)
@@ -79,11 +98,21 @@ def after_design(
     return step("a slower loop", *words, "--poles", _poles(best, SLOWER))
 
 
-def after_robust(found: "Robust", model_file: Path) -> Step | None:
+def after_robust(found: "Robust", model_file: Path, folder: Path) -> Step:
     """Where no loop keeps the limits often enough: the run that reduces the uncertainty."""
     if found.passed:
-        return None
+        return in_simulation(model_file, folder)
     return step("the run that reduces the uncertainty", "experiment", model_file)
+
+
+def in_simulation(model_file: Path, folder: Path) -> Step:
+    """After any design: its loops in time."""
+    return step("the loop in simulation", "validate", model_file, folder / "design.json")
+
+
+def as_code(design_file: Path) -> Step:
+    """After a validation that a design has passed."""
+    return step("as code for the drive", "export", design_file, "--to", "c")
 
 
 def _worst(one: "Controller") -> float:
@@ -148,8 +177,11 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
 
 def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
     """Another card where the log is refused, a picture where nothing is identifiable from it."""
+    from workbench.report.doctor import advice
+
     if found.verdict not in ("refused", "nothing"):
-        return None
+        ready = not advice(found)
+        return step("what can be known of it", "identify", log, "--card", card) if ready else None
     if found.verdict == "nothing" and out is None:
         return step("see the log", "doctor", log, "--card", card, "--out", CHECK_FOLDER)
     if found.verdict == "nothing":

@@ -6,8 +6,9 @@ import numpy as np
 
 from workbench.cards.readable import force, length, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
+from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes
-from workbench.steps.predict import Predicted, prediction_csv
+from workbench.steps.predict import Predicted, prediction_frame
 
 Columns = tuple[tuple[str, Colour, str], ...]
 POSITION_COLUMNS: Columns = (
@@ -35,15 +36,17 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
         lines.append(f"position: {summary['run_refused']}")
     if summary["force_predicted_rms"] is not None:
         rms = force(summary["force_predicted_rms"], rotary)
-        lines.append(f"force, inverse model: error {rms} rms while sliding, outside the stick band")
+        lines.append(
+            f"force, inverse model: error {rms} rms while sliding, the acceleration's noise in it"
+        )
     if summary["force_simulated_rms"] is not None:
         rms = force(summary["force_simulated_rms"], rotary)
         lines.append(f"force, simulated: error {rms} rms")
     return lines
 
 
-def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str = "CARD") -> View:
-    """How far a model lies from a log; log, card: as the command to type next names them."""
+def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
+    """How far a model lies from a log."""
     first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
     remarks = found.summary["remarks"]
 
@@ -57,13 +60,16 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str 
         first,
         [*more, notes(remarks, (Path(log).name,))],
         lambda: found.summary,
-        {"prediction.csv": lambda: prediction_csv(found.runs)},
+        {
+            "prediction.csv": lambda: prediction_frame(found.runs).to_csv(
+                index=False, float_format="%.10g"
+            )
+        },
         sections,
         lambda: prediction_chart(found, rotary),
-        [f"`workbench trace {log} --card {card}`, where that is more than noise"],
+        step=after_predict("LOG", "CARD"),
         has_page=False,
         lead=first.rstrip(".") + ".",
-        then_below=len(more),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
@@ -33,28 +34,20 @@ from workbench.report.model_tables import (
     fit_lines,
     logs_of,
     model_parts,
-    next_of_model,
     parameter_rows,
     plant_lines,
     summary,
 )
+from workbench.report.next_steps import after_design, after_identify
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
-from workbench.report.view import OUT, Section, View, report_notes, table
+from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.predict import fitted_run
 from workbench.steps.predicted_force import missing_force
-
-THEN = (
-    f"`workbench validate MODEL {OUT}design.json` checks it in simulation, then `workbench export"
-    f" {OUT}design.json --to c` writes it as code"
-)
-THEN_WITHOUT = (
-    "`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and identify again"
-)
 
 
 def identified_view(found: Identified) -> View:
@@ -85,8 +78,7 @@ def identified_view(found: Identified) -> View:
         {"model.json": lambda: model_document(model)},
         sections,
         lambda: fit_chart(model, sources, runs()),
-        [next_of_model(model)],
-        then_by_command=True,
+        step=after_identify(model, [one.file for one in model.log], "CARD", Path()),
     )
 
 
@@ -116,8 +108,7 @@ def design_view(found: Design, rotary: bool = False) -> View:
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
-        [THEN_WITHOUT if found.recommended == "none" else THEN],
-        then_by_command=found.recommended == "none",
+        step=after_design(found, Path("MODEL"), False, (), Path()),
     )
 
 
@@ -215,7 +206,7 @@ def bode_chart(found: Design) -> Chart:
     if one is None or one.cascade is None or one.series is None:
         raise ValueError("a design without a filter has no Bode plot before and after it")
     A, B = np.array(found.plant.A), np.array(found.plant.B)
-    f = 0.5 / one.h * np.geomspace(LOWEST_DRAWN, 1.0, POINTS_OF_BODE)
+    f = 0.5 / one.h * np.geomspace(LOWEST_DRAWN, 1.0, POINTS_OF_BODE)[:-1]  # at the last it is real
     before, after = one.cascade.rst(one.h), one.rst
     pairs: tuple[tuple[str, RST, Colour], ...] = (
         ("without the filter", before, "before"), (f"with the {one.series.kind}", after, "model"),

@@ -25,8 +25,8 @@ from workbench.steps.response import (
     degrees,
     ranges,
     respond,
-    response_csv,
     response_document,
+    response_frame,
     sure_share,
 )
 
@@ -159,7 +159,7 @@ def response_view(found: Responded) -> View:
         lambda: response_document(found),
         {
             "response.json": lambda: response_document(found),
-            "response.csv": lambda: response_csv(found),
+            "response.csv": lambda: response_frame(found).to_csv(index=False, float_format="%.7g"),
         },
         lambda: _sections(found, logs),
         lambda: plant_chart(found),

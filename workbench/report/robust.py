@@ -1,6 +1,7 @@
 """A robust design as a table for a terminal and as a page: shares of machines, and their curves."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
-from workbench.report.design_tables import design_lines
+from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, tabled
@@ -146,8 +147,7 @@ def robust_view(found: Robust, rotary: bool) -> View:
         },
         lambda: _sections(found, rotary),
         lambda: robust_chart(found, rotary),
-        _then(found),
-        then_by_command=True,
+        step=after_robust(found, Path("MODEL"), Path()),
     )
 
 
@@ -164,16 +164,7 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
         ),
         controllers(design, rotary),
         *program_sections(design),
-        Section("Notes", design_lines(design, rotary)),
     ]  # fmt: skip
-
-
-def _then(found: Robust) -> list[str]:
-    if not found.passed:
-        return ["`workbench experiment MODEL` finds the run that reduces the uncertainty, then"
-                " identify and design again"]  # fmt: skip
-    return ["`workbench validate MODEL design.json` shows its loops in time, `workbench export"
-            " design.json --to c` writes the code"]  # fmt: skip
 
 
 def robust_chart(found: Robust, rotary: bool) -> Chart:

@@ -34,7 +34,7 @@ SYMBOLS = {
     "T_i": "integral time",
     "T_d": "derivative time",
     "eps": "time constant of the derivative's filter",
-    "k_i": "gain of the force loop",
+    "k_i": "gain of the force loop; behind a valve, of the error's integral",
     "ARX": "linear model: the next output from past outputs and inputs",
     "RST": "polynomial controller S u = T r − R y, by pole placement",
     "PID": "proportional, integral and derivative controller",

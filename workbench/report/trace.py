@@ -1,9 +1,12 @@
 """The report of a trace: verdict, residual before and after, what explains it, rivals."""
 
+from pathlib import Path
+
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
 from workbench.report.friction import trace_friction_chart
 from workbench.report.missing_force import Which, missing_chart, missing_over_time
+from workbench.report.next_steps import after_trace
 from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import (
     against_signal,
@@ -23,7 +26,7 @@ from workbench.report.trace_tables import (
     rivals_table,
     trace_parts,
 )
-from workbench.report.trace_words import then_of, trace_sentence, words
+from workbench.report.trace_words import advice, trace_sentence, words
 from workbench.report.view import Section, View, report_notes
 from workbench.steps.trace import Traced, trace_document
 
@@ -35,6 +38,7 @@ HIDDEN = (
 
 def traced_view(traced: Traced) -> View:
     """What is missing, how it shows, and the errors before and after."""
+    found, newer = traced.trace, [one.file for one in traced.test or traced.train]
     return View(
         f"Trace of {traced.model.card}",
         trace_sentence(traced),
@@ -46,7 +50,8 @@ def traced_view(traced: Traced) -> View:
         },
         lambda: _sections(traced),
         lambda: _main_chart(traced),
-        then_of(traced),
+        advice(traced),
+        after_trace(found.verdict, found.effects, newer, "CARD", Path()),
     )
 
 

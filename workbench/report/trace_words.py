@@ -10,7 +10,6 @@ from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
 from identification.tracing.verdict import listed
 from workbench.cards.readable import force, length, number, shown_unit
-from workbench.report.view import OUT
 from workbench.steps.trace import Traced
 
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
@@ -46,7 +45,7 @@ def trace_sentence(traced: Traced) -> str:
             " That is by the measured force; between it and the command something is missing"
             + (f", which acts like {like}." if like else ": the actuator is not linear.")
         )
-    if found.missing is not None:
+    if found.missing is not None and not traced.model.coulomb_unknown:
         said += f" Force missing: {before_and_after(found)}."
     if found.not_tried:
         said += f" Ended early, so this is for now; not tried: {'; '.join(found.not_tried)}."
@@ -63,7 +62,10 @@ def before_and_after(found: Trace) -> str:
 
 
 def share_of_friction(part: float, of: LatentForces) -> str:
-    """A part of the Coulomb level as text [%]; a bound where the log does not show the force."""
+    """A part of the Coulomb level as text [%]; a bound where the log does not show the force, and
+    nothing where that is more than friction itself."""
+    if of.is_a_bound and part >= 1.0:
+        return "an unknown share"
     said = f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
     return f"at most {said}" if of.is_a_bound else said
 
@@ -257,28 +259,16 @@ def _changed(change: Change) -> str:
     return f"{change.name} from {before} to {after} {unit}{f' ({by})' if by else ''}"
 
 
-def then_of(traced: Traced) -> list[str]:
-    """What to do next, and the command that does it."""
-    found = traced.trace
-    design = f"`workbench design {OUT}model.json` makes a controller"
-    out = []
+def advice(traced: Traced) -> list[str]:
+    """What to do next, beside a command."""
+    found, out = traced.trace, []
     if found.not_tried:
         out.append("trace again with a larger `--budget`, to try what was left out")
     if found.next_experiment:
         out.append(f"record more, {found.next_experiment.rstrip('.')}; then trace with it too")
-    if found.verdict == "drift":
-        out.append("`workbench identify` the newer logs: a model of the machine as it is now")
-    elif found.effects:
-        them = "the effect" if len(found.effects) == 1 else "the effects"
-        out.append(f"{design} on the model with {them} in it")
-    elif found.verdict == "none":
-        left = found.after["test"].force_rms
-        good = left is not None and left <= NOISE * found.noise_force
-        out.append(
-            f"{design}; the model is as good as these logs can make it"
-            if good
-            else f"{design}; what is left is more than noise, so check it on the machine with care"
-        )
+    left = found.after["test"].force_rms
+    if found.verdict == "none" and (left is None or left > NOISE * found.noise_force):
+        out.append("what is left is more than noise: check a controller on the machine with care")
     if found.verdict == "unknown" and found.unknown.depends_on:
         out.append(
             "if you know what it is, write it as an effect of your own: `workbench effects check"

@@ -1,6 +1,7 @@
 """A validation: verdict and figures, steps and smooth reference in the simulated loop."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -9,9 +10,11 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, units_of
+from workbench.ending import step
 from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
 from workbench.report.design_tables import of_the_model
+from workbench.report.next_steps import as_code
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
@@ -59,12 +62,9 @@ def validation_view(
         {"validation.json": lambda: validation_document(found)},
         sections,
         lambda: _step_chart(found, traces, "model", rotary),
-        [
-            "`workbench export DESIGN --to c` writes it as code for the drive"
-            if found.passed
-            else "`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"
-        ],
-        then_by_command=not found.passed,
+        step=as_code(Path("DESIGN"))
+        if found.passed
+        else step("slower poles, to validate again", "design", "MODEL", "--poles", "W_N,ZETA"),
     )
 
 
@@ -72,7 +72,7 @@ def validation_table(found: Validation, rotary: bool = False) -> Part:
     """A row a controller and plant."""
     alone = len(found.figures[found.judged]) == 1
     rows = [
-        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        (loop_name(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
@@ -91,14 +91,11 @@ def _any(found: Validation) -> LoopFigures:
     return next(iter(found.figures[found.judged].values()))
 
 
-def _shown(name: str) -> str:
+def loop_name(name: str) -> str:
     """A loop's name as a narrow column takes it."""
-    alone = name.removesuffix(COMPENSATED)
-    if alone == PRESENT:
-        return PRESENT
-    if name.endswith(SCHEDULED):
-        return f"{name.removesuffix(SCHEDULED).upper()}+table"
-    return alone.upper() if alone == name else f"{alone.upper()}+comp"
+    alone, _, beside = name.partition(" + ")
+    shown = {"": "", "compensator": "+comp", "schedule": "+table"}[beside]
+    return PRESENT if alone == PRESENT else alone.upper() + shown
 
 
 def _row(one: LoopFigures, units: Shown) -> Row:
@@ -163,7 +160,7 @@ def missed(found: Validation) -> str | None:
 
 def _missed(found: Validation, name: str) -> list[str]:
     return [
-        f"{name if name == PRESENT else called(name)} on the {place}: {limit}"
+        f"{called(name)} on the {place}: {limit}"
         for place, one in found.figures[name].items()
         for limit in one.missed
     ]
@@ -283,10 +280,10 @@ def _runs(
 
 def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
     """A line of a loop, called and coloured by its controller."""
-    alone = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
+    alone, _, beside = name.partition(" + ")
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
-    beside: LineStyle = "dotted" if name.endswith(SCHEDULED) else "dashed"
-    style: LineStyle = "line" if alone == name else beside
+    styles: dict[str, LineStyle] = {"": "line", "compensator": "dashed", "schedule": "dotted"}
+    style = styles[beside]
     return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], style)
 
 

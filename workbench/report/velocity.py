@@ -1,6 +1,7 @@
 """Results of a rig whose velocity follows the command: one screen each, and a report."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from workbench.ending import Step, step
 from workbench.output import Row
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.view import Section, View, notes
-from workbench.screen import Part, screen, tabled
+from workbench.screen import Part, tabled
 from workbench.steps.velocity import (
     VelocityPrediction,
     VelocityTraced,
@@ -72,15 +73,12 @@ def _summary(model: VelocityModel) -> str:
     return f"{said} Not identifiable: {', '.join(lost)}." if lost else said
 
 
-def _valve(model: VelocityModel, *, with_meaning: bool) -> Part:
-    """The numbers: value, unit, 95 % interval (or why there is none), and what each is."""
+def _valve(model: VelocityModel) -> Part:
+    """The numbers: value, unit, 95 % interval (or why there is none), at length what each is."""
     every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
-    rows: list[Row] = [
-        (name, *estimate_cells(one), VALVE_MEANING.get(name, "")) for name, one in every.items()
-    ]
-    if with_meaning:
-        return tabled((*MODEL_HEAD, "meaning"), rows)
-    return tabled(MODEL_HEAD, [row[:4] for row in rows])
+    rows = [(key, *estimate_cells(one), VALVE_MEANING.get(key, "")) for key, one in every.items()]
+    short = tabled(MODEL_HEAD, [row[:4] for row in rows], whole=rows)
+    return replace(short, whole_head=(*MODEL_HEAD, "meaning"))
 
 
 def velocity_view(
@@ -93,24 +91,20 @@ def velocity_view(
     match found:
         case VelocityModel():
             what, sentence, errors = "Identification of", _summary(found), _errors(found)
+            valve = _valve(found)
             files = {"model.json": partial(velocity_document, found)}
-            parts = [_valve(found, with_meaning=False), errors,
-                     notes(found.remarks, logs_of(found))]  # fmt: skip
-            sections = [Section("The valve", _valve(found, with_meaning=True)),
-                        Section("In words", [errors, *found.remarks])]  # fmt: skip
+            parts = [valve, errors, notes(found.remarks, logs_of(found))]
+            sections = [Section("The valve", valve), Section("In words", [errors, *found.remarks])]
         case VelocityTraced():
             what, sentence = "Trace of", _verdict(found)
             files = {"trace.json": partial(velocity_trace_document, found),
                      "model.json": partial(velocity_document, found.model)}  # fmt: skip
-            valve = _valve(found.model, with_meaning=False)
-            remarks = notes(found.model.remarks, logs_of(found.model))
-            left_out = ", ".join(found.left.not_tried)
-            untried = notes([f"not tried: {left_out}"] if left_out else [])
-            parts = [_rivals(found), valve, untried, remarks]
-            said = screen(sentence, *parts).text(verbose=True).splitlines()
-            lines = [line for line in said if line.strip()]
-            sections = [Section("The valve", _valve(found.model, with_meaning=True)),
-                        Section("In words", lines)]  # fmt: skip
+            untried = [f"not tried: {', '.join(found.left.not_tried)}"] * bool(found.left.not_tried)
+            remarks, rivals = [*untried, *found.model.remarks], _rivals(found)
+            valve = _valve(found.model)
+            parts = [rivals, valve, notes(remarks, logs_of(found.model))]
+            sections = [Section("The valve", valve),
+                        Section("What else was tried", rivals, remarks)]  # fmt: skip
         case VelocityDesign():
             what, (sentence, *rest) = "Design for", design_lines(found)
             files = {"design.json": partial(velocity_document, found)}
@@ -142,19 +136,19 @@ def _verdict(found: VelocityTraced) -> str:
     over = f"{length(left.held.rms[0], rotary)} rms of held-out position over 2 s"
     match left.verdict:
         case "none":
-            return f"none: the valve leaves {over}, which is no more than the sensor's noise"
+            return f"Nothing is missing: the valve leaves {over}, no more than the sensor's noise"
         case "effect":
             best = next(one for one in left.rivals if one.key == left.named)
             whole = "what is left is noise" if left.complete else "more than noise is left"
             return (
-                f"effect: {STRUCTURES[best.key].words} ({best.key}): {over} ->"
+                f"Missing: {STRUCTURES[best.key].words} ({best.key}): {over} ->"
                 f" {length(best.left.rms[0], rotary)}; {whole}"
             )
         case "inseparable":
             able = ", ".join(one.key for one in left.rivals if one.better)
-            return f"inseparable: {able} explain the residual equally; before, {over}"
+            return f"Inseparable: {able} explain the residual equally; before, {over}"
         case _:
-            return f"unknown: {over}, and no richer structure predicts it clearly better"
+            return f"Unknown: {over}, and no richer structure predicts it clearly better"
 
 
 def _rivals(found: VelocityTraced) -> Part:

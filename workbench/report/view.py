@@ -98,18 +98,15 @@ def _noted(lines: Iterable[str]) -> list[str]:
     return [f"note: {line}" for line in lines]
 
 
-OUT = "\0"  # in what to do next: the folder of the files, where they are written
-
-
 @dataclass(frozen=True, eq=False)
 class View:
-    """A result: what was found in a sentence, what to do next, and what stands below.
+    """A result: what was found in a sentence, what is advised next, and what stands below.
 
     parts: tables, lines and notes in their order. sections, chart: of the page, and the main
     picture, drawn when they are asked for. content: the document by which other programs read it;
     files: what the command writes, by name, a text or a document, and the page where it has_page.
-    then_by_command: its command ends with the step to type, so that its screen leaves `then` out.
-    lead: of the page, where that is another sentence. then_below: so many parts stand above `then`.
+    step: what to type next, which its command says with the names of the files at hand.
+    lead: of the page, where that is another sentence.
     """
 
     title: str
@@ -120,10 +117,9 @@ class View:
     sections: Callable[[], Sequence[Section]] = tuple
     chart: Callable[[], Chart] | None = None
     then: Sequence[str] = ()
-    then_by_command: bool = False
+    step: Step | None = None
     has_page: bool = True
     lead: str = ""
-    then_below: int = 0
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
@@ -137,10 +133,9 @@ class View:
 
     def screen(self, folder: Path | None = None) -> Screen:
         """The result for a terminal; folder: where its command has written the files."""
-        then = () if folder is not None and self.then_by_command else self._then(folder)
+        then = self._then if folder is None else self.then
         where = () if folder is None else (written(folder, *self.names),)
-        first, rest = self.parts[: self.then_below], self.parts[self.then_below :]
-        return screen(self.sentence, *first, *map(next_step, then), *rest, *where)
+        return screen(self.sentence, *map(next_step, then), *self.parts, *where)
 
     @cached_property
     def drawn(self) -> Sequence[Section]:
@@ -149,11 +144,11 @@ class View:
 
     def page(self) -> str:
         """The result as a page of HTML that needs no network."""
-        return page(self.title, self.lead or self.sentence, self.drawn, self._then(None))
+        return page(self.title, self.lead or self.sentence, self.drawn, self._then)
 
     def html(self) -> str:
         """The result for a notebook: all that a terminal shows, uncut."""
-        then = "".join(f" Next: {line}." for line in self._then(None))
+        then = "".join(f" Next: {line}." for line in self._then)
         shown = [render("lead", sentence=self.sentence + then)]
         for part in self.parts:
             if isinstance(part, str):
@@ -179,9 +174,9 @@ class View:
         if self.has_page:
             folder.write_text(page_name, self.page())
 
-    def _then(self, folder: Path | None) -> list[str]:
-        where = "" if folder is None else f"{folder}/"
-        return [line.replace(OUT, where) for line in self.then]
+    @property
+    def _then(self) -> list[str]:
+        return [*self.then, *([f"`{self.step.command}` ({self.step.why})"] if self.step else ())]
 
 
 def show(view: View, folder: Path, then: Step | None = None, **more: object) -> None:

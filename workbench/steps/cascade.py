@@ -91,8 +91,6 @@ def cascade_controller(
     ahead = feed_forward(model, force)
     rate, acceleration = reference_limits(model, force, ahead)
     notes = [f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"]
-    if tuned.series is not None:
-        notes.append(filter_words(tuned.series))
     at = loop_frequencies(plant.A, plant.B, rst)
     return Controller(
         R=tuple(rst.R.tolist()),
@@ -161,7 +159,7 @@ def filter_words(one: SeriesFilter) -> str:
         )
     return (
         f"notch at {number(one.frequency, 4)} Hz, {number(one.width)} Hz wide at -3 dB,"
-        f" {number(one.depth_db or 0.0, 3)} dB deep (dampings {number(one.numerator, 2)} and"
+        f" {number(abs(one.depth_db or 0.0), 3)} dB deep (dampings {number(one.numerator, 2)} and"
         f" {number(one.denominator, 2)})"
     )
 

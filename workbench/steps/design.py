@@ -17,6 +17,7 @@ from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design import (
+    DESIGNED_STRUCTURES,
     Controller,
     Design,
     From,
@@ -75,6 +76,8 @@ def design(
     Raises BadSpecification where no controller meets what was asked, NotIdentifiable where the
     model carries no design.
     """
+    for one in set(structures or ()) - set(DESIGNED_STRUCTURES):
+        raise BadSpecification(f"structure {one!r}: {', '.join(DESIGNED_STRUCTURES)} are designed")
     usual = usual_structures(model, asked)
     first = placed_design(
         model, asked, goals=goals, source=source, period=period, structures=structures or usual

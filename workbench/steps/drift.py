@@ -24,7 +24,7 @@ from workbench.documents.plausible import refuse_other_machine, refuse_other_uni
 from workbench.documents.reading import as_number, plain, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
-from workbench.steps.moved_scale import Moved, slip_of_scale
+from workbench.steps.moved_scale import Moved, no_wear
 
 DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 
@@ -86,11 +86,11 @@ class Drifted:
 
     @property
     def slip(self) -> str:
-        """That the newest log with drift has moved by a slip of unit or scale; "" where not."""
+        """What else than wear has moved the newest log with drift; "" where wear may have."""
         found = [one.test.shifts for one in self.tests if one.test.verdict == "drift"]
         nine = {n: one for n, one in (found[-1] if found else {}).items() if n in NAMES}
         moved = {name: Moved(one.before, one.after, one.sd) for name, one in nine.items()}
-        return slip_of_scale(moved, self.model.rotary)
+        return no_wear(moved, self.model.rotary)
 
     @property
     def tested(self) -> bool:

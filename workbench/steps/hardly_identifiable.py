@@ -65,7 +65,8 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
         return
     up = float(np.mean(v > 0.0))
     one_way = min(up, 1.0 - up) < NEARLY_ONE_WAY
-    if one_way and not any(_goes_back(one["y"], up) for one in others):
+    ends = (one["y"][-1] - one["y"][0] for one in others)
+    if one_way and not any(end * (0.5 - up) > 0.0 for end in ends):  # none goes back
         yield _said_of_one_way(up)
     of_command = rig.kind in ("motor", "velocity") and "u" in log
     name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
@@ -159,11 +160,6 @@ def _said_of_coasting(name: str, speed: Array) -> str:
         f"the body {how}: the {name} correlates with neither its speed nor its acceleration,"
         " so the driving force is not identifiable; log a run that is driven"
     )
-
-
-def _goes_back(y: Array, up: float) -> bool:
-    """Whether a run's positions (n,) end up against the way that goes up by this share."""
-    return bool((y[-1] - y[0]) * (0.5 - up) > 0.0)
 
 
 def _is_idle(drive: Array, v: Array, a: Array) -> bool:

@@ -54,6 +54,7 @@ FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
+PART_OF_FORCE = "a linear actuator explains only a part of the force; the value is a regression's"
 
 
 def identify(
@@ -90,7 +91,7 @@ def identify(
         card=card,
         rig=rig,
         friction=_nine(fit, rig),
-        actuator=_actuator(fit, rig),
+        actuator=_actuator(fit, rig, options.drive == "force"),
         plant=plant,
         plant_reason=reason,
         fit=_summary(
@@ -169,8 +170,8 @@ def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     }
 
 
-def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
-    """k1 and k2, or k_a; None where no command is logged."""
+def _actuator(fit: KarnoppFit, rig: Rig, by_force: bool) -> Mapping[str, Estimate] | None:
+    """k1 and k2, or k_a; None where no command is logged. by_force: was asked for."""
     units = actuator_units(rig.motion, rig.command_unit)
     match fit.actuator:
         case Motor(k_a):
@@ -178,7 +179,7 @@ def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
         case Actuator(k1, k2):
             if "k1" in fit.estimates:
                 return {name: fit.estimates[name] for name in ("k1", "k2")}
-            why = "a linear actuator explains only a part of the force; the value is a regression's"
+            why = "the run is by the force, as asked" if by_force else PART_OF_FORCE
             values = {"k1": k1, "k2": k2}
             return {n: Estimate(None, units[n], reason=why, assumed=v) for n, v in values.items()}
         case _:

@@ -223,21 +223,22 @@ def _viscous(model: Model) -> Estimate:
 
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
     found = model.plant
-    why_not = model.friction["m"].reason or "mass identified"
+    unknown, advice = model.friction["m"].reason, "the mass is identified: design on it, physical"
+    if unknown:
+        advice = f"m: {unknown}; log a run in which the drive moves the body freely"
     if model.prescribed_motion:
         raise NotIdentifiable(
             "no plant to design on: the logged motion was prescribed; log a run in which the drive"
             " moves the body freely"
         )
     if found is None:
-        raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); m: {why_not}")
+        raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); {advice}")
     if found.simulation_relative is None or found.simulation_relative > FOLLOWS:
         error = found.simulation_relative
         said = "runs away" if error is None else f"leaves {100 * error:.0f} % of the motion"
         raise NotIdentifiable(
             f"the ARX plant, run freely on held-out samples, {said} (at most {100 * FOLLOWS:.0f} %"
-            f" needed), so it carries no design; m: {why_not}; log a run in which the drive moves"
-            " the body freely"
+            f" needed), so it carries no design; {advice}"
         )
     if period is not None and abs(period - found.h) > 1e-6 * period:
         raise BadSpecification(

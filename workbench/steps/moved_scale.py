@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.thresholds import OF_ACCOUNT, TWICE
+from workbench.cards.readable import number
 
 QUANTITIES = ("length", "force", "time")
 # By which power of a factor in length, force and time each kind of the nine parameters moves.
@@ -47,8 +48,8 @@ def slip_of_scale(moved: Mapping[str, Moved], rotary: bool) -> str:
     """That all moved as if every length, every force or the time had changed by one factor of two
     at least, in words; "" where that is not so."""
     found = [
-        f"every {'angle' if rotary and what == 'length' else what} by the factor {factor:.3g}"
-        f" (the unit of {_COLUMNS[k]} 1/{factor:.3g} of what the card says)"
+        f"every {'angle' if rotary and what == 'length' else what} by the factor {number(factor)}"
+        f" (the unit of {_COLUMNS[k]} 1/{number(factor)} of what the card says)"
         for k, what in enumerate(QUANTITIES)
         for factor in [_common_factor(moved, k)]
         if factor is not None
@@ -59,6 +60,11 @@ def slip_of_scale(moved: Mapping[str, Moved], rotary: bool) -> str:
         f"no wear but a slip of unit or scale, as if one thing alone had changed:"
         f" {', or '.join(found)}; correct the unit in the card, or the logger"
     )
+
+
+def no_wear(moved: Mapping[str, Moved], rotary: bool) -> str:
+    """What else than wear has moved the parameters, in words; "" where wear may have."""
+    return slip_of_scale(moved, rotary) or other_mass(moved, rotary)
 
 
 def other_mass(moved: Mapping[str, Moved], rotary: bool) -> str:

@@ -287,8 +287,3 @@ def prediction_frame(found: Sequence[Prediction]) -> "pd.DataFrame":
         pd.DataFrame({name: getattr(one, name) for name in PREDICTION_COLUMNS}) for one in found
     ]
     return pd.concat(frames, ignore_index=True)
-
-
-def prediction_csv(found: Sequence[Prediction]) -> str:
-    """prediction.csv of the runs of one log; a cell is empty where there is no value."""
-    return str(prediction_frame(found).to_csv(index=False, float_format="%.10g"))

@@ -81,7 +81,8 @@ def recommended(model: Model, found: Design) -> Recommendation:
         stays = True
         present_said = f"; {unclear}: no clear win over the present controller, keep it"
     decisive = _decisive(alone, found, figures)
-    why = f"{said}{f': {decisive}' if decisive else ''}{present_said}"
+    missed = "".join(f"; it misses a limit, {one}" for one in figures[taken].missed[:1])
+    why = f"{said}{f': {decisive}' if decisive else ''}{missed}{present_said}"
     return Recommendation(alone, better, why, stays)
 
 
@@ -143,7 +144,7 @@ def own_figures(why: str) -> str:
 def other_figures(why: str) -> str:
     """The figures of the other controllers in a reason, in the order of its own; "" of none."""
     found = OTHERS.search(why)
-    return f"the others, in the same order: {found[1]}" if found else ""
+    return f"the same five numbers of the others: {found[1]}" if found else ""
 
 
 def settling_words(one: LoopFigures) -> str:
@@ -184,8 +185,8 @@ def _decisive(name: Structure, found: Design, figures: Mapping[str, LoopFigures]
         return f"the {called} does not come to rest"
     ahead = _cost(other, (name, other), figures) - _cost(name, (name, other), figures)
     if ahead >= EQUAL:
-        return f"better by {100 * (np.exp(ahead) - 1):.0f} % in the mean of the first four"
-    return f"as good as the {called} in the mean of the first four, and the larger margin"
+        return f"the first four are {100 * (np.exp(ahead) - 1):.0f} % larger with the {called}"
+    return f"the {called} is as good in the first four, and has the smaller margin"
 
 
 def _present_as_good(taken: str, figures: Mapping[str, LoopFigures]) -> bool:
@@ -225,10 +226,10 @@ def _modulus(one: LoopFigures) -> float:
 
 def called(name: str) -> str:
     """A loop's name in a sentence."""
-    alone = name.removesuffix(COMPENSATED)
     if name == PRESENT:
         return "the present controller"
-    return alone.upper() + (" with the compensator" if alone != name else "")
+    alone, *beside = name.split(" + ")
+    return " with the ".join((alone.upper(), *beside))
 
 
 def _rest(one: LoopFigures, units: Shown) -> str:

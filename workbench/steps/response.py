@@ -383,8 +383,3 @@ def degrees(H: ComplexArray) -> Array:
         phase = np.degrees(np.unwrap(np.angle(H[known])))
         out[known] = phase - 360.0 * math.ceil((float(np.median(phase)) - 90.0) / 360.0)
     return out
-
-
-def response_csv(found: Responded) -> str:
-    """response.csv; a cell is empty where nothing is seen."""
-    return str(response_frame(found).to_csv(index=False, float_format="%.7g"))

@@ -28,6 +28,8 @@ from workbench.steps.local_friction import (
     local,
     range_over,
 )
+from workbench.steps.loop_figures import Limits, tried_loop
+from workbench.steps.recommend import USUAL_SEED
 
 SCHEDULED_STRUCTURES: tuple[Structure, ...] = ("pid", "p-pi")
 MOST_POINTS, FEWEST_POINTS = 17, 3  # of a table
@@ -107,10 +109,14 @@ def _judged(model: Model, found: Design, name: Structure) -> ScheduledController
     one = found.schedule.controllers[name]
     loop = scheduled_loop(model, found, name)
     fixed = driven_loop(model, found, found.controllers[name])
-    against = contest(model, found.force, loop, fixed)
     missed = next((each.missed[0] for each in one.points if each.missed), None)
     if missed is not None:
         return replace(one, why=f"leave it: a point misses a goal, {missed}")
+    rng, limits = np.random.default_rng(USUAL_SEED), Limits()
+    ours, its = (tried_loop(model, model, found, it, limits, rng)[0] for it in (loop, fixed))
+    if its.passed and not ours.passed:
+        return replace(one, why=f"leave it: with it the loop misses a limit, {ours.missed[0]}")
+    against = contest(model, found.force, loop, fixed)
     if not against.clear:
         return replace(one, why=f"leave it, no clear win over the fixed one: {against.words}")
     return replace(one, recommended=True, why=f"clearly better than the fixed one: {against.words}")

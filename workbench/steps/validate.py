@@ -30,7 +30,7 @@ from workbench.steps.loop_figures import (
     tested_of,
     tried_loop,
 )
-from workbench.steps.recommend import cycle_words, reasons
+from workbench.steps.recommend import called, cycle_words, reasons
 
 
 @dataclass(frozen=True)
@@ -163,10 +163,8 @@ def _remarks(
     unit = shown(found.motion == "rotary")
     for name, places in figures.items():
         for place, one in places.items():
-            other = name.removesuffix(COMPENSATED).removesuffix(SCHEDULED)
-            called = name if name == PRESENT else name.replace(other, other.upper(), 1)
             seen = _seen(one, unit, missed=name == judged or not name.endswith(COMPENSATED))
-            lines = (f"{called} on the {place}: {line}" for line in seen)
+            lines = (f"{called(name)} on the {place}: {line}" for line in seen)
             # What the table of the loops shows of those that nobody takes is an aside.
             out += lines if name in (judged, alone) else map(MinorRemark, lines)
     if found.compensator.assumed:

@@ -139,7 +139,7 @@ def test_a_known_parameter_has_the_keys_of_the_contract(document: dict[str, Any]
     ("change", "needed"),
     [
         ({"frictions": {}}, "unknown key 'frictions'; did you mean 'friction'?"),
-        ({"schema": "model/2"}, "schema 'model/2', 'model/1' needed"),
+        ({"schema": "model/2"}, "schema 'model/2', 'model/1' needed; give the model that"),
         ({"schema": None}, "no 'schema'"),
         ({"card": 3}, "[card] 3"),
         ({"effects": {"spring": {"k": "stiff"}}}, "effects.spring.k"),

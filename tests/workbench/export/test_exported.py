@@ -52,6 +52,8 @@ def test_what_is_not_there_is_refused() -> None:
     found = case("limited").design
     with pytest.raises(BadModel, match="too slow"):
         exported(replace(found, pid=None, refused={"pid": "too slow"}), "pid")
+    with pytest.raises(BadModel, match="'pid': workbench design MODEL --structure pid makes one"):
+        exported(replace(found, pid=None), "pid")
     with pytest.raises(BadModel, match="no present controller"):
         exported(found, "present")
     with pytest.raises(BadModel, match="run 'workbench design' again"):

@@ -315,6 +315,10 @@ UNFIT: list[tuple[Callable[[Any], object], str]] = [
     (lambda m: wb.identify([], rig="force"), "no log given"),
     (lambda m: wb.trace(), "no log given"),
     (lambda m: wb.design(3), "int found, a model needed"),  # type: ignore[arg-type]
+    (lambda m: wb.identify(3, rig="force"), "int found, a log needed"),  # type: ignore[arg-type]
+    (lambda m: wb.design(m, structures=["lqr"]), "structure 'lqr': rst, pid, p-pi"),  # type: ignore[list-item]
+    (lambda m: wb.validate(m, m), "IdentifyResult found, a design needed"),
+    (lambda m: wb.simulate("demo", effects="my_own"), "my_own: no such folder"),
     (lambda m: wb.validate(m, "nowhere.json"), "nowhere.json"),
     (lambda m: wb.design(m).to_control("lqr"), "no controller 'lqr'"),
     (lambda m: wb.simulate("emps"), r"has no \[recipe\]"),

@@ -28,6 +28,15 @@ def test_people_read_millimetres_and_documents_hold_metres() -> None:
     assert one.before.value == 40.004 and one.change == 1.0
 
 
+def test_an_interval_has_digits_enough_to_have_a_width() -> None:
+    sharp = {"value": 300.0, "unit": "N", "low": 299.997, "high": 300.004}
+    lines = difference({"model": {"friction": {"F": sharp}}}, {"model": {"friction": {"F": sharp}}})
+    row = difference_view(lines, NAMES).text().strip().splitlines()[2].split("  ")
+    assert [cell.strip() for cell in row if cell][1:] == [
+        "300.000", "N", "299.997 to 300.004", "300.000", "299.997 to 300.004"
+    ]  # fmt: skip
+
+
 def test_a_version_without_a_design_is_said_once() -> None:
     lines = difference(version(0.04), version(0.04, design=False))
     shown, said = as_read(lines, NAMES)

@@ -14,6 +14,7 @@ from design.tune import Asked
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of
 from workbench import cli
+from workbench.commands.axis_test import after_axis_test
 from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
 from workbench.documents.design import Design
@@ -25,6 +26,7 @@ from workbench.report.next_steps import (
     after_doctor,
     after_drift,
     after_identify,
+    after_trace,
     after_validate,
     check_of_refused,
     without_design,
@@ -34,6 +36,7 @@ from workbench.steps.validate import validate
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODEL = Path("my model/model.json")
+OUT = Path("out")
 FAST = Asked((300.0, 0.7))
 
 
@@ -105,17 +108,36 @@ def test_margins_that_are_missed_become_those_that_are_kept(too_fast: Design) ->
     near = replace(too_fast, rst=replace(too_fast.rst, margins=kept, missed=missed), pid=None)
     start = f"workbench design '{MODEL}' --from physical"
     asked = ("--from", "physical")
-    then = taken(after_design(near, MODEL, False, asked))
+    then = taken(after_design(near, MODEL, False, asked, OUT))
     assert then == f"{start} --modulus 0.41 --delay 1.23"
     slow = replace(near, rst=replace(too_fast.rst, missed=("a step overshoots by 9 %",)))
     w_n, zeta = too_fast.rst.dominant
-    then = taken(after_design(slow, MODEL, False, asked))
+    then = taken(after_design(slow, MODEL, False, asked, OUT))
     assert then == f"{start} --poles {0.7 * w_n:.3g},{zeta:.3g}"
 
 
 def test_poles_that_miss_the_goals_are_searched(found: Design, too_fast: Design) -> None:
-    assert taken(after_design(too_fast, MODEL, True, ())) == f"workbench design '{MODEL}'"
-    assert after_design(found, MODEL, False, ()) is None
+    assert taken(after_design(too_fast, MODEL, True, (), OUT)) == f"workbench design '{MODEL}'"
+
+
+def test_a_controller_is_tried_in_simulation_by_the_files_at_hand(found: Design) -> None:
+    then = taken(after_design(found, MODEL, False, (), OUT))
+    assert then == f"workbench validate '{MODEL}' out/design.json"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "command"),
+    [
+        ("none", (), "workbench design out/model.json"),
+        ("effect", ("spring",), "workbench design out/model.json"),
+        ("inseparable", ("spring",), "workbench design out/model.json"),
+        ("drift", (), "workbench identify new.csv --card emps"),
+        ("unknown", (), None),
+    ],
+)
+def test_after_trace(verdict: str, effects: tuple[str, ...], command: str | None) -> None:
+    then = after_trace(verdict, effects, ["new.csv"], "emps", OUT)
+    assert (then and taken(then)) == command
 
 
 @pytest.mark.slow
@@ -187,9 +209,7 @@ def test_a_log_that_tells_nothing(verdict: str, out: Path | None, words: str) ->
     assert taken(after_doctor(found, "a.csv", "c/card.toml", out)) == f"workbench {words}"
 
 
-def test_a_log_that_tells_something_asks_for_nothing() -> None:
-    part: Any = SimpleNamespace(verdict="in part")
-    assert after_doctor(part, "a.csv", "emps", None) is None
+def test_another_card_goes_beside_the_one_at_hand() -> None:
     refused: Any = SimpleNamespace(verdict="refused")
     assert taken(after_doctor(refused, "a.csv", "emps", None)).endswith("--out card.toml")
 
@@ -228,3 +248,17 @@ def test_logs_of_a_fleet_to_look_at() -> None:
     look = "workbench doctor /logs/m1/a.parquet --card emps"
     assert taken(then(report("set_aside", "promoted"))) == look
     assert taken(then(report("promoted"), in_registry=False)) == look
+
+
+def test_limits_of_a_registry_are_asked_for_only_where_one_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("WORKBENCH_REGISTRY", raising=False)
+    explained = SimpleNamespace(light="green")
+    test: Any = SimpleNamespace(light="yellow", untested=True, of=lambda _: explained)
+    then = after_axis_test(test, "a.csv", "card.toml", None)
+    assert taken(then) == "workbench identify a.csv --card card.toml"
+    Path("registry.db").touch()
+    then = after_axis_test(test, "a.csv", "card.toml", None)
+    assert taken(then).endswith("axis-test a.csv --card card.toml --registry registry.db")

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.ending import step
 from workbench.output import OutputFolder
 from workbench.report.chart import Chart, Line, Panel
-from workbench.report.view import OUT, Section, View, notes
+from workbench.report.view import Section, View, notes
 from workbench.screen import instead, more, tabled
 
 TABLE = tabled(("what", "size"), [("a", "1")], whole=[("a", "1"), ("b", "2")])
@@ -23,39 +24,31 @@ def view() -> View:
         {"x.json": lambda: {"schema": "x/1", "size": 1.0}, "x.csv": lambda: "t\n0\n"},
         lambda: [Section("Sizes", TABLE, ["a line"]), Section("More", "<p>more</p>")],
         lambda: Chart("x", "a line", [Panel("t [s]", "y [m]", [Line("y", X, X)])]),
-        [f"`workbench design {OUT}x.json` goes on"],
+        ["log more"],
+        step("goes on", "design", "x.json"),
     )
 
 
 def test_a_terminal_has_the_short_table_and_the_rest_with_verbose() -> None:
     shown = view().screen(Path("there"))
     short, whole = shown.text(), shown.text(verbose=True)
-    assert short.startswith("It is so.\nnext: workbench design there/x.json goes on\n")
+    assert short.startswith("It is so.\nnext: log more\n\nwhat  size\n")
     assert short.endswith("written: there/x.json, there/x.csv, there/report.html\n")
     assert "in short" in short and "at length" not in short and "beside" not in short
     assert "b" not in short.split("written")[0].split("size")[1]
     assert "at length" in whole and "beside" in whole and "b        2" in whole
 
 
-def test_without_files_nothing_was_written_and_the_next_step_names_no_folder() -> None:
+def test_without_files_nothing_was_written_and_the_next_command_is_in_words() -> None:
     text = view().screen().text()
-    assert "written" not in text and "next: workbench design x.json goes on" in text
-
-
-def test_a_command_that_ends_with_the_next_step_does_not_say_it_twice() -> None:
-    made = replace(view(), then_by_command=True)
-    assert "next:" not in made.screen(Path("there")).text()
-    assert "next:" in made.screen().text()
-
-
-def test_the_next_step_may_stand_below_the_first_parts() -> None:
-    lines = replace(view(), then_below=1).screen().text().splitlines()
-    assert lines.index("next: workbench design x.json goes on") > lines.index("a        1")
+    assert "written" not in text
+    assert "next: log more\nnext: workbench design x.json (goes on)\n" in text
 
 
 def test_a_notebook_shows_all_of_it() -> None:
     html = view().html()
-    assert html.startswith("<p><b>It is so. Next: <code>workbench design x.json</code> goes on.")
+    said = "Next: log more. Next: <code>workbench design x.json</code> (goes on)."
+    assert html.startswith(f"<p><b>It is so. {said}")
     for words in ('<td class="short">b</td>', "at length", "beside", "note: two"):
         assert words in html
     assert "in short" not in html and "&lt;" not in html

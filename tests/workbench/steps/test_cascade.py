@@ -1,6 +1,7 @@
 """P-PI cascades for models: with a notch on two masses, validated, exported, written and read."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -18,9 +19,9 @@ from workbench.documents.model import Model, used
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps
-from workbench.report.design_tables import cascade_lines, design_sentence
+from workbench.report.design_tables import cascade_lines, design_lines, design_sentence
 from workbench.report.reports import bode_chart
-from workbench.steps.cascade import beside_resonance, unseen_lag
+from workbench.steps.cascade import beside_resonance, filter_words, unseen_lag
 from workbench.steps.closed_loop import driven_loop, load_of, run_driven
 from workbench.steps.design import design, usual_structures
 from workbench.steps.elastic import beyond_response, with_resonance, with_response
@@ -202,3 +203,12 @@ def test_a_response_without_such_a_pair_is_refused_in_a_line(tmp_path: Path) -> 
     file.write_text(json.dumps({"schema": "model/1"}))
     with pytest.raises(BadModel, match="'response/1' needed"):
         with_response(plain(), file)
+
+
+@pytest.mark.slow
+def test_a_notch_is_so_many_decibels_deep_and_said_once() -> None:
+    found = made()
+    assert found.p_pi is not None and found.p_pi.series is not None
+    assert re.search(r" Hz wide at -3 dB, \d[\d.]* dB deep", filter_words(found.p_pi.series))
+    said = [line for line in design_lines(found) if line.startswith("P-PI:") and " dB deep" in line]
+    assert len(said) == 1

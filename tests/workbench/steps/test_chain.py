@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from workbench.steps import loop_figures
 from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.design import effort_limit
 from workbench.steps.identify import (
+    _actuator,
     _force_error,
     arx_plant,
     closed_loop_remarks,
@@ -37,7 +39,7 @@ from workbench.steps.identify import (
 )
 from workbench.steps.linear_loop import corners, linear_of
 from workbench.steps.loop_figures import Limits
-from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_csv
+from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_frame
 from workbench.steps.simulate import record, truth
 from workbench.steps.validate import validate, validation_document
 
@@ -176,8 +178,11 @@ def test_a_model_that_carries_no_design_is_refused() -> None:
     plant = identified().model.plant
     assert plant is not None
     wild = replace(plant, simulation_relative=0.9)
-    with pytest.raises(NotIdentifiable, match="leaves 90 % of the motion"):
+    with pytest.raises(NotIdentifiable, match=r"leaves 90 % of the motion.* moves the body freely"):
         designed(replace(model, plant=wild))
+    heavy = replace(model_of(TABLES["paper_table1"], ACTUATOR), plant=wild)
+    with pytest.raises(NotIdentifiable, match="design; the mass is identified: design on it"):
+        designed(heavy, source="arx")
     imposed = replace(model.log[0], position_rms=None)
     with pytest.raises(NotIdentifiable, match="prescribed"):
         designed(replace(model, log=(imposed,), actuator=None))
@@ -222,7 +227,7 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     assert found.refused is None and found.remarks == ()
     assert found.position_rms is not None and found.position_rms < 2e-4
     assert found.force_simulated_rms is not None and found.force_simulated_rms < 0.03
-    header, first, *_ = prediction_csv([found]).splitlines()
+    header, first, *_ = prediction_frame([found]).to_csv(index=False).splitlines()
     assert header == ",".join(PREDICTION_COLUMNS)
     assert len(first.split(",")) == len(PREDICTION_COLUMNS)
     assert card.recipe is not None
@@ -255,7 +260,7 @@ def test_a_prediction_without_a_command_leaves_its_column_empty() -> None:
     found = predict(identified().model, bare)
     assert found.drive == "force"
     assert found.force_simulated_rms is None
-    assert prediction_csv([found]).splitlines()[1].split(",")[3] == ""
+    assert prediction_frame([found]).to_csv(index=False).splitlines()[1].split(",")[3] == ""
     with pytest.raises(BadLog, match="no command u"):
         predict(identified().model, bare, drive="command")
 
@@ -272,7 +277,7 @@ def test_without_what_a_run_needs_the_force_alone_is_predicted(name: str) -> Non
     assert found.position_rms is None and found.force_simulated_rms is None
     assert found.force_predicted_rms == predict(model, log).force_predicted_rms
     assert found.remarks == (f"force by assumed values of what is not identifiable: {name}",)
-    assert prediction_csv([found]).splitlines()[1].endswith(",")
+    assert prediction_frame([found]).to_csv(index=False).splitlines()[1].endswith(",")
 
 
 def test_a_friction_that_is_surely_small_keeps_no_run_back() -> None:
@@ -336,6 +341,13 @@ def test_a_loop_that_runs_away_is_no_log() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("asked", "why"), [(True, "as asked"), (False, "only a part of the")])
+def test_an_actuator_of_a_run_by_force_is_not_blamed(asked: bool, why: str) -> None:
+    fit: Any = SimpleNamespace(actuator=ACTUATOR, estimates={})
+    found = _actuator(fit, Rig("force"), asked)
+    assert found and all(why in str(one.reason) for one in found.values())
+
+
 def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
     model = replace(model_of(EMPS), rig=Rig("force"))
     found = designed(model)

@@ -15,6 +15,7 @@ from tests.screens import one_screen
 from workbench.cards.card import Card, load_card
 from workbench.logs.sources import read_sources
 from workbench.report.doctor import doctor_picture, doctor_view
+from workbench.report.next_steps import after_doctor
 from workbench.steps.doctor import Examined, doctor_document, examine
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.simulate import record
@@ -165,6 +166,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
     card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
     found = look(load_card(card.path), table)
     text = doctor_view(found, None).text().splitlines()
+    assert after_doctor(found, "run.csv", "card.toml", None) is None
     assert text[1].split(maxsplit=1) == [
         "next", "check the units in the card (see note), then ask again"
     ]  # fmt: skip
@@ -173,8 +175,8 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
 
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    text = doctor_view(look(card, table), None, "my card.toml").text()
-    assert "workbench identify run.csv --card 'my card.toml'" in " ".join(text.split())
+    then = after_doctor(look(card, table), "logs/run.csv", "my card.toml", None)
+    assert then and then.command == "workbench identify logs/run.csv --card 'my card.toml'"
     found = look(card, {**table, "u": -table["u"]})
     shown = " ".join(doctor_view(found, None).text().split())
     assert "give the column of y gain = -1" in shown and "..." not in shown

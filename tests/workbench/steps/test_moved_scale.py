@@ -3,7 +3,7 @@
 import pytest
 
 from tests.chain import TABLES
-from workbench.steps.moved_scale import Moved, other_mass, slip_of_scale
+from workbench.steps.moved_scale import Moved, no_wear, other_mass, slip_of_scale
 
 NINE = {
     name: getattr(TABLES["paper_table1"], name) for name in ("m", "F_cp", "F_vn", "dv_p", "F_sn")
@@ -18,8 +18,8 @@ def moved(sd: float = 0.01, **by: float) -> dict[str, Moved]:
     ("by", "said"),
     [
         ({"m": 0.1, "F_vn": 0.1, "dv_p": 10.0}, "every length by the factor 10 "),
-        ({"m": 1e3, "F_cp": 1e3, "F_vn": 1e3, "F_sn": 1e3}, "every force by the factor 1e+03 "),
-        ({"m": 1e6, "F_vn": 1e3, "dv_p": 1e-3}, "every time by the factor 1e+03 "),
+        ({"m": 1e3, "F_cp": 1e3, "F_vn": 1e3, "F_sn": 1e3}, "every force by the factor 1000 "),
+        ({"m": 1e6, "F_vn": 1e3, "dv_p": 1e-3}, "every time by the factor 1000 "),
     ],
 )
 def test_one_factor_that_moves_all_is_a_slip_of_scale(by: dict[str, float], said: str) -> None:
@@ -56,5 +56,6 @@ def test_without_a_mass_or_with_two_parameters_nothing_is_said() -> None:
 def test_a_mass_of_more_than_twice_is_another_load() -> None:
     assert other_mass(moved(m=1.9), rotary=False) == ""
     assert other_mass(moved(m=2.5), rotary=False).startswith("m 1 -> 2.5 kg, which no wear does")
+    assert no_wear(moved(m=2.5, F_cp=1.2), rotary=False).startswith("m 1 -> 2.5 kg, which no")
     assert "kg m^2" in other_mass(moved(m=0.3), rotary=True)
     assert other_mass(moved(m=2.5, sd=1.0), rotary=False) == ""  # hardly identified

@@ -73,7 +73,7 @@ def test_the_better_loop_is_taken_and_said_with_numbers(monkeypatch: pytest.Monk
     assert (name, compensator) == ("pid", False)
     assert why.startswith("PID: static error 0.2 % of the step")
     assert "RST: 1.1 %" in why and "the present controller: 1.1 %" in why
-    assert f"of {one.force_limit:.3g} N" in why and "better by" in why
+    assert f"of {one.force_limit:.3g} N" in why and " % larger with the " in why
 
 
 def test_of_equal_loops_the_larger_margin_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +83,7 @@ def test_of_equal_loops_the_larger_margin_is_taken(monkeypatch: pytest.MonkeyPat
     for name in ("rst", "pid"):
         with monkeypatch.context() as patch:
             found, _, why = choose(patch, **{name: safer})
-        assert found == name and "the larger margin" in why
+        assert found == name and "the smaller margin" in why
 
 
 def test_a_loop_that_does_not_come_to_rest_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,6 +95,14 @@ def test_a_loop_that_does_not_come_to_rest_is_not_taken(monkeypatch: pytest.Monk
     failing = replace(plain(), settling=1e-2, missed=("overshoot",))
     name, _, why = choose(monkeypatch, pid=failing)
     assert name == "rst" and "misses a limit, overshoot" in why
+
+
+def test_the_best_of_loops_that_all_miss_a_limit_is_said_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failing = replace(plain(), missed=("overshoot 30 %", "force"))
+    why = choose(monkeypatch, rst=failing, pid=failing)[2]
+    assert "; it misses a limit, overshoot 30 %; " in why and "force;" not in why
 
 
 def test_the_compensator_only_where_it_is_clearly_better(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +130,10 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     # A PD against Coulomb friction stays off by up to F_c/(k_a k_d).
     off = result.figures[PRESENT]["model"].standstill
     assert 0.0 < off < 1.2 * 25.0 / (35.15 * 150.0)
-    assert any("present on the model" in line for line in result.remarks) or row["limit cycle"]
+    assert (
+        any("present controller on the model" in line for line in result.remarks)
+        or row["limit cycle"]
+    )
     assert result.why.startswith(found.recommended.upper())
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import schedule_lines, schedule_rows
 from workbench.report.validation import validation_view
+from workbench.steps import schedule
 from workbench.steps.clear_win import Contest, contest, strokes, that_may_be
 from workbench.steps.closed_loop import driven_loop, scheduled_loop
 from workbench.steps.local_friction import asked_for, local
@@ -79,6 +82,17 @@ def test_a_p_pi_feeds_the_friction_of_the_place_forward_and_wins() -> None:
     lines = schedule_lines(found)
     assert lines[1].startswith("P-PI over place, ") and "clearly better" in lines[1]
     assert len(schedule_rows(found)) == 2 * len(table.at)
+
+
+def test_a_schedule_that_loses_a_limit_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    def tried(*given: Any) -> tuple[Any, None]:
+        missed = ("overshoot 13 %",) if given[3].schedule is not None else ()
+        return SimpleNamespace(passed=not missed, missed=missed), None
+
+    monkeypatch.setattr(schedule, "tried_loop", tried)
+    model, found = case("schedule").model, case("schedule").design
+    one = schedule._judged(model, found, "p-pi")
+    assert one.why == "leave it: with it the loop misses a limit, overshoot 13 %"
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.estimation.estimates import HELD, of_effect
 from identification.log import Rig
+from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.tracing.result import (
     Change,
@@ -260,6 +261,17 @@ def test_nothing_is_not_said_of_a_force_that_could_not_have_been_seen() -> None:
     hidden: Any = SimpleNamespace(before=bound, after=bound, lessened=False)
     text = trace_sentence(traced(replace(trace_of("none", ()), missing_force=hidden)))
     assert text.startswith("Open: a force of 35 % of friction would not show in these logs")
+
+
+def test_a_force_that_might_be_larger_than_friction_is_no_share_of_it() -> None:
+    bound: Any = SimpleNamespace(share=lambda level: 74.0, is_a_bound=True)
+    hidden: Any = SimpleNamespace(before=bound, after=bound, lessened=False)
+    text = trace_sentence(traced(replace(trace_of("unknown", ()), missing_force=hidden)))
+    assert text.endswith("Force missing: an unknown share of friction.")
+    blind = traced(replace(trace_of("unknown", ()), missing_force=hidden))
+    unknown = {name: Estimate(None, "N", reason="x", assumed=1.0) for name in ("F_cp", "F_cn")}
+    model = replace(blind.model, friction={**blind.model.friction, **unknown})
+    assert "Force missing" not in trace_sentence(replace(blind, model=model))
 
 
 def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:

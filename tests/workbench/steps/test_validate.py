@@ -156,6 +156,8 @@ def test_the_smooth_reference_does_not_depend_on_the_design() -> None:
     [
         ({}, ""),
         ({"adequate": False, "chi_square": 9.0}, "the model lacks a force, it leaves more of its"),
+        ({"adequate": False, "chi_square": 1.1, "force_relative": 0.002}, ""),
+        ({"adequate": False, "chi_square": 1.1, "force_relative": 0.3}, "the model lacks a force"),
     ],
 )
 def test_what_a_model_lacks_comes_first(changes: dict[str, Any], words: str) -> None:

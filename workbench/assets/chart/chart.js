@@ -32,7 +32,7 @@ const servoCharts = (() => {
     return value.toFixed(Math.min(Math.max(digits, 0), 9));
   }
 
-  function seriesOf(panel) {
+  function seriesOf(panel, rows) {
     const list = [{label: panel.x, value: (u, v) => shown(v), class: panel.x ? "chart-x" : "chart-unseen"}];
     const fills = [];
     const kind = (line) => {
@@ -49,7 +49,7 @@ const servoCharts = (() => {
         dash: {dashed: [7, 4], dotted: [2, 3]}[line.look],
         paths: dots ? () => null : undefined,
         points: dots
-          ? {show: true, size: 3, width: 0, fill: () => colour(line.colour, "90"), stroke: "transparent"}
+          ? {show: true, size: rows > 200 ? 3 : 7, width: 0, fill: () => colour(line.colour, "90"), stroke: "transparent"}
           : {show: false},
       });
       if (edge && line.upper) fills.push([list.length - 1, line]);
@@ -123,7 +123,7 @@ const servoCharts = (() => {
   }
 
   function optionsOf(panel, width, data, sync, onZoom) {
-    const [series, bands] = seriesOf(panel);
+    const [series, bands] = seriesOf(panel, data[0].length);
     const first = data[0][0], last = data[0][data[0].length - 1];
     const whole = panel.x_range || [first, last];
     const xRange = (u, low, high) => (low === null || (low === first && high === last) ? whole : [low, high]);
