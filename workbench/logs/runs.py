@@ -31,6 +31,7 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
+from workbench.logs.summed import summed
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
@@ -144,6 +145,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
             groups[name] = table.groups[number]
     if not groups:
         whole = _same_length(signals, path)
+        if card.signals["t"].summed:
+            whole["t"] = summed(whole["t"])
         cells = ((repr(key), np.asarray(table.fetch(k))) for k, key in enumerate(table.names))
         if in_turn := several_axes(whole["t"], cells):
             raise BadLog(f"{path}: {in_turn}")
@@ -152,7 +155,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole["t"], late = late_stamps(whole["t"])
         said = (*said, late) if late else said
         told = tuple(f"{called}: {one}" for one in (*remarks, *said))
-        return Log(called, whole), table.first_row, told
+        return Log(called, _summed(whole, card)), table.first_row, told
 
     def clock(group: str) -> Array:
         number = table.clocks.get(group)
@@ -162,9 +165,18 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         return _signal(table, number, "t", card, path)[0]
 
     found = on_one_clock(signals, groups, clock, called)
-    log = Log(called, _same_length(found.signals, path))
+    log = Log(called, _summed(_same_length(found.signals, path), card))
     told = tuple(f"{called}: {one}" for one in remarks)
     return log, table.first_row + found.first, (*told, *found.remarks)
+
+
+def _summed(signals: Mapping[str, Array], card: Card) -> dict[str, Array]:
+    """The signals, those positions summed of which the log has the speed."""
+    speeds = [name for name, spec in card.signals.items() if spec.summed and name != "t"]
+    if not speeds:
+        return dict(signals)
+    step = np.diff(signals["t"], prepend=signals["t"][:1])
+    return {**signals, **{name: summed(signals[name], step) for name in speeds}}
 
 
 def _signal(

@@ -28,6 +28,7 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
+from workbench.logs.summed import summed
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
 from workbench.steps.first_card.registers import Register, read_register
@@ -57,7 +58,8 @@ MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 class Column:
     """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
     as its register means them; axis: which of several machines of the log it is of ("": of all);
-    renewed: samples of `x` from one new value to the next of a column that is held, else 1."""
+    renewed: samples of `x` from one new value to the next of a column that is held, else 1;
+    summed: whether `values` or `x` are the sum of what the file has."""
 
     raw: RawColumn
     header: Header
@@ -66,6 +68,7 @@ class Column:
     register: Register | None = None
     axis: str = ""
     renewed: float = 1.0
+    summed: bool = False
 
     @property
     def bits(self) -> int | None:
@@ -175,7 +178,12 @@ def columns_of(log: UnknownLog) -> Columns:
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
-    clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
+    steady = [one for one in read if one.raw.number in left_out and "time" in one.header.means]
+    clock = _of_steps(usable, steady) or _clock(
+        log.path, usable, [one for one in read if one.raw.unusable]
+    )
+    left_out.pop(clock.raw.number, None)
+    usable = [one for one in usable if one.raw.number != clock.raw.number] + [clock]
     if (piece := _longest_piece(clock.values)) is not None:
         usable = [replace(one, values=one.values[piece]) for one in usable]
         most = float(np.max(np.diff(clock.values)))
@@ -340,6 +348,31 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
         )
 
     return max(ticking, key=likely)
+
+
+def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | None:
+    """The clock of a log that has the time since the row before, summed, where no column is called
+    a time and goes up: of columns called a time the one that may hold that, of a log without any
+    names and clock the only one; None where none may. steady: columns of one value called a time."""
+    ticking = [one for one in columns if _ticks(one)]
+    if any("time" in one.header.means for one in ticking):
+        return None
+    named = [one for one in (*columns, *steady) if "time" in one.header.means]
+    nameless = [one for one in columns if not one.raw.header and one.noisy]
+    found = [one for one in (named or ([] if ticking else nameless)) if _are_steps(one.values)]
+    if len(found) != 1 or len(found[0].values) != len(columns[0].values):
+        return None
+    whole = summed(found[0].values)
+    return replace(found[0], values=whole, x=whole, summed=True)
+
+
+def _are_steps(x: Array) -> bool:
+    """Whether values (n,) may be the times from row to row: above 0, and none but gaps far from
+    their middle, about which they go up and down."""
+    step = np.diff(x)
+    far = np.mean(x > LONGEST_GAP * np.median(x))
+    level = TWICE * np.sum(step < 0.0) >= np.sum(step > 0.0)
+    return bool(np.all(np.isfinite(x)) and np.all(x > 0.0) and level and far < MOST_UNEVEN)
 
 
 def _wrong_with_clock(t: Array) -> str:

@@ -1,0 +1,20 @@
+"""Signals of which a log has what they go by from row to row: a clock's steps, a position's speed."""
+
+import numpy as np
+
+from identification.arrays import Array, frozen
+
+
+def summed(x: Array, step: Array | None = None) -> Array:
+    """The sum of x (n,) up to each row, from 0 on: of steps, or of a speed by the rule of trapezia
+    where `step` (n,) is the time since the row before. Where either is missing, it is taken from
+    its neighbours, and a time that goes back counts as none."""
+    known = np.isfinite(x)
+    if not np.any(known):
+        return x
+    rows = np.arange(len(x))
+    whole = np.interp(rows, rows[known], x[known])
+    if step is not None:
+        forward = np.where(np.isfinite(step), np.maximum(step, 0.0), 0.0)
+        whole = forward * 0.5 * (whole + np.concatenate([whole[:1], whole[:-1]]))
+    return frozen(np.cumsum(whole) - whole[0])
