@@ -154,7 +154,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole = whole if np.all(rows) else at_rows(whole, rows)
         whole["t"], late = late_stamps(whole["t"])
         said = (*said, late) if late else said
-        told = tuple(f"{called}: {one}" for one in (*remarks, *said))
+        told = tuple(f"{called}: {one}" for one in (*remarks, *said, *_of_speeds(card)))
         return Log(called, _summed(whole, card)), table.first_row, told
 
     def clock(group: str) -> Array:
@@ -166,7 +166,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
 
     found = on_one_clock(signals, groups, clock, called)
     log = Log(called, _summed(_same_length(found.signals, path), card))
-    told = tuple(f"{called}: {one}" for one in remarks)
+    told = tuple(f"{called}: {one}" for one in (*remarks, *_of_speeds(card)))
     return log, table.first_row + found.first, (*told, *found.remarks)
 
 
@@ -177,6 +177,16 @@ def _summed(signals: Mapping[str, Array], card: Card) -> dict[str, Array]:
         return dict(signals)
     step = np.diff(signals["t"], prepend=signals["t"][:1])
     return {**signals, **{name: summed(signals[name], step) for name in speeds}}
+
+
+def _of_speeds(card: Card) -> list[str]:
+    """What is said of a position that is the sum of a speed."""
+    return [
+        f"{name!r} is the speed {spec.column!r} summed over time: so is its noise, which makes part"
+        " of what a run leaves of the position, and of what seems missing"
+        for name, spec in card.signals.items()
+        if spec.summed and name == "y"
+    ]
 
 
 def _signal(

@@ -1,4 +1,4 @@
-"""Signals of which a log has what they go by from row to row: a clock's steps, a position's speed."""
+"""Signals of which a log has what they go by: of a clock its steps, of a position its speed."""
 
 import numpy as np
 

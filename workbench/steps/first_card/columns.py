@@ -30,7 +30,13 @@ from workbench.logs.faulty_rows import (
 )
 from workbench.logs.summed import summed
 from workbench.logs.unknown import RawColumn, UnknownLog
-from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
+from workbench.steps.first_card.axes import (
+    as_position,
+    axes_of,
+    correlation,
+    is_position,
+    without_blocks,
+)
 from workbench.steps.first_card.registers import Register, read_register
 
 COLUMN = "column"
@@ -40,7 +46,7 @@ WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
-AMPERES = ("A", "mA")
+AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
@@ -206,8 +212,16 @@ def columns_of(log: UnknownLog) -> Columns:
     phases = _phases(signals)
     left_out |= {one.raw.number: PHASE_CURRENT for one in phases}
     distinct, twice = _without_doubles([one for one in signals if one not in phases])
-    own = tuple(_with_axes(distinct))
+    own = tuple(_with_axes(_of_a_scope(distinct)))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
+    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one."""
+    units = [one.header.unit for one in columns]
+    if not all(unit is not None and unit.card in VOLTS for unit in units):
+        return columns
+    return [replace(one, header=replace(one.header, doubtful=True)) for one in columns]
 
 
 def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
@@ -353,7 +367,7 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
 def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | None:
     """The clock of a log that has the time since the row before, summed, where no column is called
     a time and goes up: of columns called a time the one that may hold that, of a log without any
-    names and clock the only one; None where none may. steady: columns of one value called a time."""
+    names and clock the only one; None where none may. steady: columns of one value called so."""
     ticking = [one for one in columns if _ticks(one)]
     if any("time" in one.header.means for one in ticking):
         return None
@@ -463,7 +477,11 @@ def _with_axes(columns: Sequence[Column]) -> list[Column]:
     if len(columns) < FEWEST_OF_AXES:
         return list(columns)
     alike = correlation(np.column_stack([one.x for one in columns]))
-    named = axes_of([(one.header, one.raw.number) for one in columns], alike)
+    heads = [one.header for one in columns]
+    if not any(map(is_position, heads)):  # speeds, of which a position is made
+        heads = [as_position(one) if one.speed else one for one in heads]
+    numbers = [one.raw.number for one in columns]
+    named = axes_of(list(zip(heads, numbers, strict=True)), alike)
     return [replace(one, axis=named.get(one.raw.number, "")) for one in columns]
 
 

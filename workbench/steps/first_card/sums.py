@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.signals.even_clock import LONGEST_GAP
-from workbench.cards.headers import WrittenUnit
 from workbench.logs.summed import summed
+from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.columns import Column, Columns
 from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 
-OF_TURNS = {"rpm": ("turn", 60.0)}  # what a speed sums up to, and in how many seconds by one of it
-A_MINUTE = 60.0
+BY_THE_MINUTE = ("rpm", "m/min", "mm/min")  # units of speeds
+A_MINUTE = 60.0  # s
 
 
 def with_position(
@@ -39,11 +38,6 @@ def with_position(
 
 def _summed(one: Column, h: float) -> Column:
     """The sum of a speed over rows that are h [s] apart, as a position."""
-    unit, seconds = one.header.unit, 1.0
-    if unit is not None and unit.quantity == "velocity":
-        card, _, per = unit.card.partition("/")
-        card, seconds = OF_TURNS.get(card, (card, A_MINUTE if per == "min" else 1.0))
-        unit = WrittenUnit(card, "position", unit.rotary)
-    header = replace(one.header, unit=unit, means={"position": one.header.means["velocity"]}
-                     if "velocity" in one.header.means else {"position": 1.0})  # fmt: skip
-    return replace(one, header=header, x=summed(one.x, np.full(len(one.x), h / seconds)), summed=True)
+    a_minute = one.header.unit is not None and one.header.unit.card in BY_THE_MINUTE
+    x = summed(one.x, np.full(len(one.x), h / (A_MINUTE if a_minute else 1.0)))
+    return replace(one, header=as_position(one.header), x=x, summed=True)
