@@ -267,6 +267,8 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         return " ".join(parts[:-2]), found, False
     if (suffix := _SUFFIX.match(text)) and (found := written_unit(suffix[2])):
         parted = any(sign in text for sign in ",;:")
+        if suffix[2] == "1" and not parted:  # "current_1", the first of several
+            return text, None, False
         letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
         return suffix[1], found, not parted and letter
     return text, None, False

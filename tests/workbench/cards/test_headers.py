@@ -63,7 +63,7 @@ def test_where_a_motor_stands_is_no_command(text: str, drives: bool) -> None:
     assert ("command" in read_header(text).means) == drives
 
 
-@pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x"])
+@pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x", "actual_current_1", "q 1"])
 def test_a_name_with_an_index_has_no_unit(text: str) -> None:
     assert read_header(text).unit is None
 

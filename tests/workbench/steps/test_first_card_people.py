@@ -274,6 +274,31 @@ def test_the_increment_of_a_scope_is_the_time_of_a_sample(
     assert not found.refused
 
 
+@pytest.mark.parametrize(("turn", "unit"), [(2.0 * np.pi, "rad"), (360.0, "deg"), (1.0, "turn")])
+def test_the_weight_of_an_arm_tells_an_angle_and_its_unit(
+    tmp_path: Path, turn: float, unit: str
+) -> None:
+    y = 1.2 * np.sin(1.3 * T) + 0.5 * np.sin(3.1 * T + 1.0)
+    v, a = np.gradient(y, T), np.gradient(np.gradient(y, T), T)
+    u = 0.1 * a + 0.3 * v + 0.8 * np.sign(v)
+    headers, of_turn = "t_s,pos,current", turn / (2.0 * np.pi)
+    found = propose(tmp_path, headers, T, of_turn * y, u + 3.0 * np.sin(y))
+    place = found.signal("y")
+    assert place is not None and (found.motion, place.unit) == ("rotary", unit)
+    assert propose(tmp_path, headers, T, of_turn * y, u + 2.0 * y).motion == "linear"  # a spring
+
+
+def test_a_position_in_percent_of_its_travel_is_one(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    share = 50.0 + 20.0 * joint["y"]
+    found = propose(tmp_path, "t_s,valve stem position [%],force_N", T, share, joint["F"])
+    y = found.signal("y")
+    assert y is not None and (y.column, y.unit) == ("valve stem position [%]", "%")
+    assert str(y.gain).partition(" ")[2].startswith("%/")
+    assert not checked_proposal(found).refused
+
+
 def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:
     """Of r, k (r - y) and y the first is the reference, though its header says u."""
     r = np.sin(2.0 * np.pi * (1.0 + 0.1 * T) * T)

@@ -72,6 +72,9 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     out = dict(given)
     if "y" not in out and (turn := unit_by_turn(roles.columns["y"])) and motion.motion == "rotary":
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
+    if "y" not in out and motion.angle:
+        why, rival = "by the weight of an arm in what drives", {"rad": "deg"}
+        out["y"] = UnitGuess(motion.angle, None, False, why, rival.get(motion.angle, "rad"))
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
     if "t" not in out and (ticking := _ticks(columns)):
@@ -310,7 +313,8 @@ def by_reference(
     y, r = roles.columns["y"], roles.columns.get("r")
     if not is_output(y):
         return None
-    unit = "V" if y.header.unit and y.header.unit.quantity == "command" else "count"
+    own = y.header.unit
+    unit = own.card if own and own.quantity == "command" else "count"
     per = "turn" if motion == "rotary" else "mm"
     turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
     if turn is not None and turn not in REGISTERS:
@@ -333,7 +337,7 @@ def by_reference(
     if turn is not None:
         return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
     why, width = "not in the log: see the sensor's data sheet", float(np.ptp(y.numbers))
-    if unit == "V":
+    if unit != "count":
         return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
     span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
     whole = width > NEARLY_A_TURN * span and float(np.min(y.numbers)) >= 0.0
