@@ -209,9 +209,7 @@ def _read(text: str, unit_below: str) -> Header:
     if unit_below.strip():
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
-    words = words_of(name)
-    if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
-        words = ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
+    words = _telling(words_of(name))
     means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
@@ -229,6 +227,13 @@ def _read(text: str, unit_below: str) -> Header:
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
     turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
     return Header(text, name, unit, means, purpose, angle, doubtful, turning)
+
+
+def _telling(words: list[str]) -> list[str]:
+    """The words without what two of them mean otherwise together."""
+    if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
+        return ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
+    return [one for one in words if one != "effort"] if "control" in words else words
 
 
 def written_unit(text: str) -> WrittenUnit | None:

@@ -57,7 +57,8 @@ def test_a_header_tells_unit_and_meaning(
 @pytest.mark.parametrize(
     ("text", "drives"),
     [("motor_angle", False), ("motorPosition", False), ("motor", True), ("motor_pos_cmd", True),
-     ("motor_current", True), ("valve_position", True)],
+     ("motor_current", True), ("valve_position", True), ("Control Effort", True),
+     ("joint_effort", False)],
 )  # fmt: skip
 def test_where_a_motor_stands_is_no_command(text: str, drives: bool) -> None:
     assert ("command" in read_header(text).means) == drives

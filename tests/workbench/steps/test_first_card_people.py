@@ -299,6 +299,19 @@ def test_a_position_in_percent_of_its_travel_is_one(
     assert not checked_proposal(found).refused
 
 
+def test_two_positions_that_move_as_one_have_two_drives(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    beside = joint["y"] + 1e-3 * np.sin(40.0 * joint["y"])
+    part = 0.6 + 0.05 * np.sin(T)
+    shares = part * joint["F"], (1.0 - part) * joint["F"]
+    headers = "t_s,X1.pos [rad],X2.pos [rad],X1.torque [Nm],X2.torque [Nm]"
+    found = propose(tmp_path, headers, T, joint["y"], beside, *shares)
+    assert any("two drives push one body" in one for one in found.remarks)
+    apart = propose(tmp_path, headers, T, joint["y"], np.roll(beside, 800), *shares)
+    assert not any("two drives" in one for one in apart.remarks)
+
+
 def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:
     """Of r, k (r - y) and y the first is the reference, though its header says u."""
     r = np.sin(2.0 * np.pi * (1.0 + 0.1 * T) * T)
