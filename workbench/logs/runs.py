@@ -272,11 +272,11 @@ def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if lengths and max(lengths) - min(lengths) == 1:  # vectors of a file, not rows
         signals = {k: v[: min(lengths)] if len(v) > 1 else v for k, v in signals.items()}
-    length = len(signals["t"])
+    length = len(signals["t"]) if len(signals["t"]) > 1 else max(lengths, default=1)
     for name, values in signals.items():
         if len(values) not in (1, length):
             raise BadLog(
-                f"{path}: signal {name!r} has {len(values)} values and t {length}; "
+                f"{path}: signal {name!r} has {len(values)} values, others {length}; "
                 "all signals of a run need one length"
             )
     return {k: v if len(v) == length else np.full(length, v[0]) for k, v in signals.items()}

@@ -19,7 +19,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.cards.headers import Header, read_header
+from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.faulty_rows import (
     MOST_STARTS,
     late_stamps,
@@ -49,13 +49,14 @@ MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
 AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
+PERIODS = {"ts", "dt", "timestep", "period", "tsample"}  # names of the time from row to row
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
 FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
-ANGLES_WRAP = (2.0 * np.pi, 360.0)
+ANGLES_WRAP = (2.0 * np.pi, 360.0, 2e3 * np.pi, 3600.0, 36000.0)  # rad, deg, and parts of them
 COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 
@@ -176,6 +177,7 @@ def columns_of(log: UnknownLog) -> Columns:
              for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
+    heads = _without_letters(heads)
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
@@ -184,7 +186,10 @@ def columns_of(log: UnknownLog) -> Columns:
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
+    rows = len(usable[0].values) if usable else 0
+    single = (_of_scalar(one, rows) for one in log.scalars if usable)
     steady = [one for one in read if one.raw.number in left_out and "time" in one.header.means]
+    steady += [one for one in single if PERIODS & set(words_of(one.header.name))]
     clock = _of_steps(usable, steady) or _clock(
         log.path, usable, [one for one in read if one.raw.unusable]
     )
@@ -214,6 +219,13 @@ def columns_of(log: UnknownLog) -> Columns:
     distinct, twice = _without_doubles([one for one in signals if one not in phases])
     own = tuple(_with_axes(_of_a_scope(distinct)))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _without_letters(heads: Sequence[Header]) -> list[Header]:
+    """The headers, without a unit that is the last of the letters by which several are told apart,
+    as the A of "adc_A" beside "adc_B"."""
+    apart = {one.text[:-1] for one in heads if one.text[-2:-1] in ("_", " ") and one.unit is None}
+    return [replace(one, unit=None) if one.text[:-1] in apart else one for one in heads]
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
@@ -371,13 +383,19 @@ def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | N
     ticking = [one for one in columns if _ticks(one)]
     if any("time" in one.header.means for one in ticking):
         return None
-    named = [one for one in (*columns, *steady) if "time" in one.header.means]
+    named = [*steady, *(one for one in columns if "time" in one.header.means)]
     nameless = [one for one in columns if not one.raw.header and one.noisy]
     found = [one for one in (named or ([] if ticking else nameless)) if _are_steps(one.values)]
     if len(found) != 1 or len(found[0].values) != len(columns[0].values):
         return None
     whole = summed(found[0].values)
     return replace(found[0], values=whole, x=whole, summed=True)
+
+
+def _of_scalar(one: RawColumn, rows: int) -> Column:
+    """A single value of a file as a column of so many rows."""
+    values = np.full(rows, one.values[0])
+    return Column(one, read_header(one.header), values, values)
 
 
 def _are_steps(x: Array) -> bool:
