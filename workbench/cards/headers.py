@@ -103,6 +103,7 @@ _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 _SURE_SUFFIX = 2
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
+_ADDRESS = re.compile(r"(?<!\w)0x[0-9a-f]+", re.I)
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
@@ -286,8 +287,9 @@ def _around(text: str, bracket: re.Match[str], inside: str) -> str:
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a name in small letters: at case, digits and signs it is parted."""
-    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    """The words of a name in small letters: at case, digits and signs it is parted; addresses, as
+    0x6064, are none."""
+    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", _ADDRESS.sub(" ", name))
     parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
     small = parted.casefold()
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):

@@ -98,3 +98,15 @@ def test_every_spelling_gives_a_unit_that_cards_know(text: str) -> None:
 def test_what_is_no_unit_is_none() -> None:
     assert written_unit("valve") is None
     assert written_unit("") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "means"),
+    [
+        ("Position actual value [0x6064]", {"position"}),
+        ("Current actual value (0x6078/00)", {"command"}),
+        ("0x606C:00 velocity actual value", {"velocity"}),
+    ],
+)
+def test_an_address_of_an_object_is_no_word(text: str, means: set[str]) -> None:
+    assert set(read_header(text).means) == means
