@@ -52,6 +52,8 @@ from identification.thresholds import (
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
+FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, as many times coarser, where the best is the last
+NEAR = 3.0  # samples around a lag that was found so, in which it is then sought
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
 FEWEST_WINDOWS = 40  # windows of sliding
@@ -133,15 +135,15 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     direct = held or chosen_drive(logs, rig, None) == "force"
     turns = direct and max(float(np.ptp(log["y"])) for log in logs) > TURNS
     turns = turns and rig.motion == "rotary"
-    found = _squares(moved, turns, held, known)
-    if found is None:
+    looked = _looked_far(moved, turns, held, known)
+    if looked is None:
         return NO_SURROUNDINGS
-    used = GRAVITY if turns and _has_gravity(found) else PLAIN
+    found, used = looked
     lag, sampled = _lag(found, used), False
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
-        current = _squares(moved, turns, False, known) or found
+        current = _squares(moved, found.lags, turns, False, known) or found
         other = _lag(current, used)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
@@ -165,6 +167,28 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
             force = replace(always, sd=float(np.hypot(always.sd, unequal)))
     lag = Size(lag.value * h, lag.sd * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled)
+
+
+def _looked_far(
+    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings
+) -> tuple[_Squares, Sequence[int]] | None:
+    """The equation's rows at lags that reach as far as the best of them, and the columns used; the
+    nearer ones where none of these is the best within its reach; None where there are too few."""
+    first = None
+    for farther in FARTHER:
+        lags = farther * np.arange(EARLIEST_LAG[moved[0].held], LAG + LAG_STEP / 2, LAG_STEP)
+        found = _squares(moved, lags, turns, held, known)
+        if found is None:
+            break
+        used = GRAVITY if turns and _has_gravity(found) else PLAIN
+        first = first or (found, used)
+        best = int(np.argmin(found.left(found.every, used)[0]))
+        if 0 < best < len(lags) - 1 and farther > 1.0:
+            near = lags[best] + np.arange(-NEAR, NEAR + LAG_STEP / 2, LAG_STEP)
+            return _squares(moved, np.union1d(near, 0.0), turns, held, known) or found, used
+        if 0 < best < len(lags) - 1:
+            break
+    return first
 
 
 def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
@@ -229,13 +253,13 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     """
     held = rig.kind == "motor" and not around.sampled
     moved = [motion_log(log, held=held, by_command=False) for log in logs]
-    found = _squares(moved, bool(around.sine.value or around.cosine.value), held)
+    lags = np.unique([0.0, around.lag.value / logs[0].h])
+    turns = bool(around.sine.value or around.cosine.value)
+    found = _squares(moved, lags, turns, held)
     if found is None:
         raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
-    used = GRAVITY if around.sine.value or around.cosine.value else PLAIN
-    left = found.left(found.every, used)[0]
-    at = (0.0, around.lag.value / logs[0].h)
-    without, with_it = (np.sqrt(np.interp(lag, found.lags, left) / found.rows) for lag in at)
+    left = np.sqrt(found.left(found.every, GRAVITY if turns else PLAIN)[0] / found.rows)
+    without, with_it = left[np.argmin(np.abs(lags))], left[np.argmax(np.abs(lags))]
     return float(without), float(with_it)
 
 
@@ -304,7 +328,8 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     )
     # By blocks, and by how sharp the minimum is: windows share samples, and with them their noise.
     i = int(np.clip(best, 1, len(left) - 2))
-    bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / LAG_STEP**2, 1e-300)
+    step = float(found.lags[i + 1] - found.lags[i])
+    bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / step**2, 1e-300)
     by_likelihood = float(np.sqrt(2.0 * left[best] / (bend * found.rows / OVERLAP)))
     sd = max(float(spread_of_left_out(each)), by_likelihood)
     return Size(lag, sd) if stands_out(lag, sd) else NOT_SHOWN
@@ -315,7 +340,8 @@ def _lowest(lags: Array, left: Array) -> float:
     i = int(np.clip(np.argmin(left), 1, len(left) - 2))
     low, middle, high = (float(x) for x in left[i - 1 : i + 2])
     bend = low - 2.0 * middle + high
-    return float(lags[i]) + (0.5 * LAG_STEP * (low - high) / bend if bend > 0.0 else 0.0)
+    half = 0.5 * float(lags[i + 1] - lags[i])
+    return float(lags[i]) + (half * (low - high) / bend if bend > 0.0 else 0.0)
 
 
 def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Array, Array]:
@@ -339,16 +365,15 @@ def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
 
 
 def _squares(
-    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings = NO_SURROUNDINGS
-) -> _Squares | None:
+    moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
+    known: Surroundings = NO_SURROUNDINGS,
+) -> _Squares | None:  # fmt: skip
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
-    held: the force's column is a zero-order hold.
+    lags: in samples, ascending; held: the force's column is a zero-order hold.
     """
     if not any(len(one.speed) for one in moved):
         return None
-    lead = EARLIEST_LAG[moved[0].held]
-    lags = np.arange(lead, LAG + LAG_STEP / 2, LAG_STEP)
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
     for one in moved:
@@ -363,7 +388,8 @@ def _squares(
         B = np.column_stack(
             [mean @ (np.interp(at - lag, at, F - place) + place) for lag in own_lags]
         )
-        inside = (w.start >= LAG) & (w.start + w.length < len(F) + lead) & (plain.speed >= slow)
+        inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
+        inside &= plain.speed >= slow
         block = _blocks_of_each_way(one.up, inside)
         for k in range(BLOCKS):
             in_block = inside & (block == k)

@@ -80,7 +80,7 @@ def test_a_linear_machine_has_no_gravity_by_angle() -> None:
     assert found.sine == found.cosine == Size()
 
 
-@pytest.mark.parametrize("samples", [-4.0, 4.0, 6.0])
+@pytest.mark.parametrize("samples", [-4.0, 4.0, 6.0, 20.0, -30.0])
 def test_columns_of_two_instants_are_found(samples: float) -> None:
     log = made(4)
     at = np.arange(len(log))
