@@ -53,6 +53,7 @@ from identification.thresholds import (
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
 FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, as many times coarser, where the best is the last
+OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
 NEAR = 3.0  # samples around a lag that was found so, in which it is then sought
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
@@ -175,18 +176,21 @@ def _looked_far(
     """The equation's rows at lags that reach as far as the best of them, and the columns used; the
     nearer ones where none of these is the best within its reach; None where there are too few."""
     first = None
-    for farther in FARTHER:
-        lags = farther * np.arange(EARLIEST_LAG[moved[0].held], LAG + LAG_STEP / 2, LAG_STEP)
+    strokes = sum(1 + int(np.sum(one.up[1:] != one.up[:-1])) for one in moved)
+    most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
+    for farther in (one for one in FARTHER if one == 1.0 or one * LAG < most):
+        earliest, step = EARLIEST_LAG[moved[0].held], farther * LAG_STEP
+        lags = np.arange(earliest, farther * LAG + step / 2, step)
         found = _squares(moved, lags, turns, held, known)
         if found is None:
             break
         used = GRAVITY if turns and _has_gravity(found) else PLAIN
         first = first or (found, used)
         best = int(np.argmin(found.left(found.every, used)[0]))
-        if 0 < best < len(lags) - 1 and farther > 1.0:
+        if 0 < best < len(lags) - 1 and lags[best] > LAG:
             near = lags[best] + np.arange(-NEAR, NEAR + LAG_STEP / 2, LAG_STEP)
             return _squares(moved, np.union1d(near, 0.0), turns, held, known) or found, used
-        if 0 < best < len(lags) - 1:
+        if best < len(lags) - 1:  # a force far behind its position is friction's own memory
             break
     return first
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from benchmarks.init_people import KINDS, make_file
 from benchmarks.init_real_tables import fewest_wrong, machine
@@ -310,6 +311,31 @@ def test_two_positions_that_move_as_one_have_two_drives(
     assert any("two drives push one body" in one for one in found.remarks)
     apart = propose(tmp_path, headers, T, joint["y"], np.roll(beside, 800), *shares)
     assert not any("two drives" in one for one in apart.remarks)
+
+
+def test_a_single_sampling_time_makes_the_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    savemat(path, {"Ts": 2e-3, "u": joint["F"][:, None], "y": joint["y"][:, None]})
+    found = checked_proposal(proposed(path))
+    t = found.signal("t")
+    assert t is not None and (t.column, t.unit, t.summed) == ("Ts", "s", True)
+    (tmp_path / "card.toml").write_text(written(found), "utf-8")
+    (run,) = read_runs(path, load_card(tmp_path / "card.toml")).runs
+    assert (len(run), run.h) == (len(T), pytest.approx(2e-3))
+
+
+def test_letters_that_tell_columns_apart_are_no_units(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    three = (2048.0 + 100.0 * joint["F"] * k for k in (1.0, -0.6, -0.4))
+    noisy = [np.round(one + np.random.default_rng(6).standard_normal(len(T))) for one in three]
+    headers = "t_s,angle_mrad,iq_mA,adc_a,adc_b,adc_c"
+    angle = np.round(1e3 * np.mod(40.0 * joint["y"], 2.0 * np.pi))
+    found = propose(tmp_path, headers, T, angle, 1e3 * joint["F"], *noisy)
+    assert {one.name: one.column for one in found.signals} == {
+        "t": "t_s", "y": "angle_mrad", "u": "iq_mA",
+    }  # fmt: skip
+    assert any("leaps by 6283" in one for one in found.remarks)
 
 
 def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:
