@@ -321,7 +321,7 @@ def test_a_single_sampling_time_makes_the_clock(joint: dict[str, Array], tmp_pat
     assert t is not None and (t.column, t.unit, t.summed) == ("Ts", "s", True)
     (tmp_path / "card.toml").write_text(written(found), "utf-8")
     (run,) = read_runs(path, load_card(tmp_path / "card.toml")).runs
-    assert (len(run), run.h) == (len(T), pytest.approx(2e-3))
+    assert len(run) == len(T) and run.h == pytest.approx(2e-3)
 
 
 def test_letters_that_tell_columns_apart_are_no_units(
