@@ -52,9 +52,8 @@ from identification.thresholds import (
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
-FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, as many times coarser, where the best is the last
+FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
 OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
-NEAR = 3.0  # samples around a lag that was found so, in which it is then sought
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
 FEWEST_WINDOWS = 40  # windows of sliding
@@ -174,24 +173,19 @@ def _looked_far(
     moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings
 ) -> tuple[_Squares, Sequence[int]] | None:
     """The equation's rows at lags that reach as far as the best of them, and the columns used; the
-    nearer ones where none of these is the best within its reach; None where there are too few."""
+    nearest ones where none of these is the best within its reach; None where there are too few."""
     first = None
     strokes = sum(1 + int(np.sum(one.up[1:] != one.up[:-1])) for one in moved)
     most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
-    for farther in (one for one in FARTHER if one == 1.0 or one * LAG < most):
-        earliest, step = EARLIEST_LAG[moved[0].held], farther * LAG_STEP
-        lags = np.arange(earliest, farther * LAG + step / 2, step)
+    for latest in (one * LAG for one in FARTHER if one == 1.0 or one * LAG < most):
+        lags = np.arange(EARLIEST_LAG[moved[0].held], latest + LAG_STEP / 2, LAG_STEP)
         found = _squares(moved, lags, turns, held, known)
         if found is None:
             break
         used = GRAVITY if turns and _has_gravity(found) else PLAIN
         first = first or (found, used)
-        best = int(np.argmin(found.left(found.every, used)[0]))
-        if 0 < best < len(lags) - 1 and lags[best] > LAG:
-            near = lags[best] + np.arange(-NEAR, NEAR + LAG_STEP / 2, LAG_STEP)
-            return _squares(moved, np.union1d(near, 0.0), turns, held, known) or found, used
-        if best < len(lags) - 1:  # a force far behind its position is friction's own memory
-            break
+        if int(np.argmin(found.left(found.every, used)[0])) < len(lags) - 1:
+            return found, used
     return first
 
 
@@ -332,8 +326,7 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     )
     # By blocks, and by how sharp the minimum is: windows share samples, and with them their noise.
     i = int(np.clip(best, 1, len(left) - 2))
-    step = float(found.lags[i + 1] - found.lags[i])
-    bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / step**2, 1e-300)
+    bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / LAG_STEP**2, 1e-300)
     by_likelihood = float(np.sqrt(2.0 * left[best] / (bend * found.rows / OVERLAP)))
     sd = max(float(spread_of_left_out(each)), by_likelihood)
     return Size(lag, sd) if stands_out(lag, sd) else NOT_SHOWN
@@ -344,8 +337,7 @@ def _lowest(lags: Array, left: Array) -> float:
     i = int(np.clip(np.argmin(left), 1, len(left) - 2))
     low, middle, high = (float(x) for x in left[i - 1 : i + 2])
     bend = low - 2.0 * middle + high
-    half = 0.5 * float(lags[i + 1] - lags[i])
-    return float(lags[i]) + (half * (low - high) / bend if bend > 0.0 else 0.0)
+    return float(lags[i]) + (0.5 * LAG_STEP * (low - high) / bend if bend > 0.0 else 0.0)
 
 
 def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Array, Array]:

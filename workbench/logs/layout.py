@@ -65,27 +65,11 @@ def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
     if scope is not None:
         return Layout(scope[0], first, scope[1])
     whole = [line for line in block if len(line) == width]
-    if len(whole) > 1 and (pairs := named_pairs(whole[-2], whole[-1])):
-        return Layout(pairs[0], first, pairs[1])
     if not whole or whole[-1] is not block[-1]:
         return None
     while len(whole) > 1 and (_is_units(whole[-1]) or is_mark(whole[-1], whole[-2])):
         whole.pop()
     return Layout(tuple(whole[-1]), first)
-
-
-def named_pairs(
-    over: Sequence[str], below: Sequence[str]
-) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
-    """Names and groups of columns by two lines, of which the one over the other names each pair
-    that the other calls alike, as X and Y; None where they are none such."""
-    names, pairs = [*over, ""][: len(below)], len(below) // 2
-    alike = len(set(below)) == 2 and [*below] == [*below[:2]] * pairs
-    if pairs < 2 or not alike or any(names[1::2]) or not all(names[::2]):
-        return None
-    return tuple(x for one in names[::2] for x in (_SCOPE_TIME, one)), tuple(
-        x for one in names[::2] for x in (one, one)
-    )
 
 
 def is_number(field: str) -> bool:

@@ -31,7 +31,7 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
-from workbench.logs.summed import summed
+from workbench.logs.summed import summed, with_sums
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
@@ -154,8 +154,9 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole = whole if np.all(rows) else at_rows(whole, rows)
         whole["t"], late = late_stamps(whole["t"])
         said = (*said, late) if late else said
-        told = tuple(f"{called}: {one}" for one in (*remarks, *said, *_of_speeds(card)))
-        return Log(called, _summed(whole, card)), table.first_row, told
+        whole, of_speeds = with_sums(whole, card.signals)
+        told = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))
+        return Log(called, whole), table.first_row, told
 
     def clock(group: str) -> Array:
         number = table.clocks.get(group)
@@ -165,28 +166,9 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         return _signal(table, number, "t", card, path)[0]
 
     found = on_one_clock(signals, groups, clock, called)
-    log = Log(called, _summed(_same_length(found.signals, path), card))
-    told = tuple(f"{called}: {one}" for one in (*remarks, *_of_speeds(card)))
-    return log, table.first_row + found.first, (*told, *found.remarks)
-
-
-def _summed(signals: Mapping[str, Array], card: Card) -> dict[str, Array]:
-    """The signals, those positions summed of which the log has the speed."""
-    speeds = [name for name, spec in card.signals.items() if spec.summed and name != "t"]
-    if not speeds:
-        return dict(signals)
-    step = np.diff(signals["t"], prepend=signals["t"][:1])
-    return {**signals, **{name: summed(signals[name], step) for name in speeds}}
-
-
-def _of_speeds(card: Card) -> list[str]:
-    """What is said of a position that is the sum of a speed."""
-    return [
-        f"{name!r} is the speed {spec.column!r} summed over time: so is its noise, which makes part"
-        " of what a run leaves of the position, and of what seems missing"
-        for name, spec in card.signals.items()
-        if spec.summed and name == "y"
-    ]
+    whole, of_speeds = with_sums(_same_length(found.signals, path), card.signals)
+    told = tuple(f"{called}: {one}" for one in (*remarks, *of_speeds))
+    return Log(called, whole), table.first_row + found.first, (*told, *found.remarks)
 
 
 def _signal(
@@ -276,7 +258,7 @@ def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
     for name, values in signals.items():
         if len(values) not in (1, length):
             raise BadLog(
-                f"{path}: signal {name!r} has {len(values)} values, others {length}; "
+                f"{path}: signal {name!r} has {len(values)} values and t {length}; "
                 "all signals of a run need one length"
             )
     return {k: v if len(v) == length else np.full(length, v[0]) for k, v in signals.items()}

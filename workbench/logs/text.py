@@ -25,7 +25,7 @@ from workbench.logs.table import Table, of_array
 from workbench.logs.times import with_whole_seconds
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-_APART = re.compile(r"\t|\s{2,}")  # between names of several words
+_BETWEEN_NAMES = re.compile(r"\t|\s{2,}")  # between names of several words
 _WHOLE = re.compile(r"[+-]?\d+")
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 _FEW_ROWS = 3
@@ -243,7 +243,7 @@ def _marks(lines: list[str], spec: FileSpec) -> _Marks:
 def _split(line: str, marks: _Marks) -> list[str]:
     if marks.delimiter == " ":
         words = line.removesuffix(";").split()
-        names = [one.strip() for one in _APART.split(line.strip())]
+        names = [one.strip() for one in _BETWEEN_NAMES.split(line.strip())]
         of_words = 1 < len(names) < len(words) and not any(map(is_number, names))
         return names if of_words else words  # "Encoder 1 Pos" is one name
     fields = next(csv.reader([line.rstrip("\r\n")], delimiter=marks.delimiter), [])

@@ -20,7 +20,7 @@ from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header, written_unit
 from workbench.files import refuse_larger
 from workbench.logs.faulty_rows import numbers_in
-from workbench.logs.layout import is_mark, is_number, named_pairs
+from workbench.logs.layout import is_mark, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
@@ -226,8 +226,6 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
     if at is None or not above:
         return spec, (), ()
     width = len(rows[at])
-    if len(above) > 1 and named_pairs(rows[above[-2]], rows[above[-1]]):
-        return spec, (), ()
     rows = [row if any(row[width:]) else row[:width] for row in rows]
     below = above[-1]
     units = _units(_uncommented(rows[below], spec), width)

@@ -175,13 +175,3 @@ def test_names_of_several_words_stand_apart(tmp_path: Path) -> None:
     names = [one.header for one in found.columns]
     assert names == ["[ Sample", "Time", "Commanded Pos", "Encoder 1 Pos", "Control Effort"]
     assert {len(one.values) for one in found.columns} == {120}
-
-
-def test_a_line_that_names_pairs_stands_over_their_own(tmp_path: Path) -> None:
-    path = tmp_path / "pairs.csv"
-    rows = [f"{k:8d},{3 * k % 50},{k:8d},{k % 7}" for k in range(120)]
-    path.write_text("\n".join(["Position [0x6064],,Current [0x6078],", "X,Y,X,Y", *rows]))
-    found = read_unknown(path)
-    names = ["Time", "Position [0x6064]", "Time", "Current [0x6078]"]
-    assert [one.header for one in found.columns] == names
-    assert [one.group for one in found.columns] == [names[1], names[1], names[3], names[3]]

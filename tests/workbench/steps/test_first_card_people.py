@@ -327,11 +327,13 @@ def test_a_single_sampling_time_makes_the_clock(joint: dict[str, Array], tmp_pat
 def test_letters_that_tell_columns_apart_are_no_units(
     joint: dict[str, Array], tmp_path: Path
 ) -> None:
-    three = (2048.0 + 100.0 * joint["F"] * k for k in (1.0, -0.6, -0.4))
-    noisy = [np.round(one + np.random.default_rng(6).standard_normal(len(T))) for one in three]
+    turn = 40.0 * joint["y"]
+    noise = np.random.default_rng(6).standard_normal((3, len(T)))
+    phases = [np.round(2048.0 + 100.0 * joint["F"] * np.cos(turn - k * 2.0944) + noise[k])
+              for k in range(3)]  # fmt: skip
     headers = "t_s,angle_mrad,iq_mA,adc_a,adc_b,adc_c"
-    angle = np.round(1e3 * np.mod(40.0 * joint["y"], 2.0 * np.pi))
-    found = propose(tmp_path, headers, T, angle, 1e3 * joint["F"], *noisy)
+    angle = np.round(1e3 * np.mod(turn, 2.0 * np.pi))
+    found = propose(tmp_path, headers, T, angle, 1e3 * joint["F"], *phases)
     assert {one.name: one.column for one in found.signals} == {
         "t": "t_s", "y": "angle_mrad", "u": "iq_mA",
     }  # fmt: skip

@@ -21,6 +21,8 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     several begin so. columns: headers and numbers; alike: correlation of the columns, (k, k).
     """
     heads = [head for head, _ in columns]
+    if not any(map(is_position, heads)):  # of speeds, of which a position is made
+        heads = [as_position(head) if head.speed else head for head in heads]
     words = [words_of(head.name) for head in heads]
     families: dict[tuple[str, ...], dict[str, int]] = {}
     for k, own in enumerate(words):

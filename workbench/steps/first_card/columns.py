@@ -30,13 +30,7 @@ from workbench.logs.faulty_rows import (
 )
 from workbench.logs.summed import summed
 from workbench.logs.unknown import RawColumn, UnknownLog
-from workbench.steps.first_card.axes import (
-    as_position,
-    axes_of,
-    correlation,
-    is_position,
-    without_blocks,
-)
+from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
 from workbench.steps.first_card.registers import Register, read_register
 
 COLUMN = "column"
@@ -186,10 +180,12 @@ def columns_of(log: UnknownLog) -> Columns:
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
-    rows = len(usable[0].values) if usable else 0
-    single = (_of_scalar(one, rows) for one in log.scalars if usable)
     steady = [one for one in read if one.raw.number in left_out and "time" in one.header.means]
-    steady += [one for one in single if PERIODS & set(words_of(one.header.name))]
+    rows = len(usable[0].values) if usable else 0
+    for one in (one for one in log.scalars if PERIODS & set(words_of(one.header))):
+        values = np.full(rows, one.values[0])
+        steady.append(Column(one, read_header(one.header), values, values))
+    steady = [one for one in steady if len(one.values) == rows]
     clock = _of_steps(usable, steady) or _clock(
         log.path, usable, [one for one in read if one.raw.unusable]
     )
@@ -381,29 +377,20 @@ def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | N
     a time and goes up: of columns called a time the one that may hold that, of a log without any
     names and clock the only one; None where none may. steady: columns of one value called so."""
     ticking = [one for one in columns if _ticks(one)]
-    if any("time" in one.header.means for one in ticking):
-        return None
     named = [*steady, *(one for one in columns if "time" in one.header.means)]
-    nameless = [one for one in columns if not one.raw.header and one.noisy]
-    found = [one for one in (named or ([] if ticking else nameless)) if _are_steps(one.values)]
-    if len(found) != 1 or len(found[0].values) != len(columns[0].values):
+    nameless = [one for one in columns if not (ticking or one.raw.header) and one.noisy]
+    found = [one for one in named or nameless if _are_steps(one.values)]
+    if len(found) != 1 or any("time" in one.header.means for one in ticking):
         return None
     whole = summed(found[0].values)
     return replace(found[0], values=whole, x=whole, summed=True)
 
 
-def _of_scalar(one: RawColumn, rows: int) -> Column:
-    """A single value of a file as a column of so many rows."""
-    values = np.full(rows, one.values[0])
-    return Column(one, read_header(one.header), values, values)
-
-
 def _are_steps(x: Array) -> bool:
-    """Whether values (n,) may be the times from row to row: above 0, and none but gaps far from
-    their middle, about which they go up and down."""
-    step = np.diff(x)
-    far = np.mean(x > LONGEST_GAP * np.median(x))
-    level = TWICE * np.sum(step < 0.0) >= np.sum(step > 0.0)
+    """Whether values (n,) may be times from row to row: above 0, few far from their middle, about
+    which they go up and down."""
+    rise, far = np.diff(x), np.mean(x > LONGEST_GAP * np.median(x))
+    level = TWICE * np.sum(rise < 0.0) >= np.sum(rise > 0.0)
     return bool(np.all(np.isfinite(x)) and np.all(x > 0.0) and level and far < MOST_UNEVEN)
 
 
@@ -495,11 +482,7 @@ def _with_axes(columns: Sequence[Column]) -> list[Column]:
     if len(columns) < FEWEST_OF_AXES:
         return list(columns)
     alike = correlation(np.column_stack([one.x for one in columns]))
-    heads = [one.header for one in columns]
-    if not any(map(is_position, heads)):  # speeds, of which a position is made
-        heads = [as_position(one) if one.speed else one for one in heads]
-    numbers = [one.raw.number for one in columns]
-    named = axes_of(list(zip(heads, numbers, strict=True)), alike)
+    named = axes_of([(one.header, one.raw.number) for one in columns], alike)
     return [replace(one, axis=named.get(one.raw.number, "")) for one in columns]
 
 

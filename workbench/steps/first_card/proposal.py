@@ -363,7 +363,10 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
             why = "the time from row to row, summed" if one.summed else "it goes up evenly"
         elif one.summed:
             why = f"the speed, summed over time, {why}"
-            unit = _of_speed(one, unit)
+            own = read_header(one.raw.header, one.raw.unit_below).unit
+            of_speed = own.card if own and own.quantity == "velocity" else f"{unit.unit}/s"
+            rival = f"{unit.rival}/s" if unit.rival and not unit.gain else ""
+            unit = replace(unit, unit=of_speed, rival=rival)
         if sign < 0.0:
             why += "" if name == "r" else f"; with this sign {sign_shown_by(roles.law)}"
         why += f"; unit {unit.why}"
@@ -376,14 +379,6 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
                         one.summed)
         )  # fmt: skip
     return out
-
-
-def _of_speed(one: Column, unit: UnitGuess) -> UnitGuess:
-    """The unit of a speed whose sum is in this unit."""
-    own = read_header(one.raw.header, one.raw.unit_below).unit
-    known = own.card if own and own.quantity == "velocity" else f"{unit.unit}/s"
-    rival = f"{unit.rival}/s" if unit.rival and not unit.gain else unit.rival
-    return replace(unit, unit=known, rival=rival)
 
 
 def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:

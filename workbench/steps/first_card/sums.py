@@ -1,5 +1,4 @@
-"""A clock of a log that has the time from row to row alone, and a position of one that has its
-speed: each the sum of that column, as a card's `summed` says."""
+"""A position of a log that has its speed alone: the sum of that, as a card's `summed` says."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,8 +11,7 @@ from workbench.steps.first_card.columns import Column, Columns
 from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 
-BY_THE_MINUTE = ("rpm", "m/min", "mm/min")  # units of speeds
-A_MINUTE = 60.0  # s
+BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
 
 def with_position(
@@ -28,16 +26,11 @@ def with_position(
     if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
         return None
     own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
-    unit = columns.clock.header.unit
-    usual = unit.card if unit and unit.quantity == "time" else ""
-    usual = usual or likeliest("period", columns.step, USUAL["t"], "linear")[0]
-    position = _summed(own, columns.step * columns.grid * factor(usual))
+    unit, clock = own.header.unit, columns.clock.header.unit
+    usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
+    second = factor(clock.card if clock and clock.quantity == "time" else usual)
+    h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.card if unit else "", 1.0)
+    x = summed(own.x, np.full(len(own.x), h))
+    position = replace(own, header=as_position(own.header), x=x, summed=True)
     kept = [one for one in signals if not one.header.speed]
     return replace(columns, signals=(*kept, position)), position
-
-
-def _summed(one: Column, h: float) -> Column:
-    """The sum of a speed over rows that are h [s] apart, as a position."""
-    a_minute = one.header.unit is not None and one.header.unit.card in BY_THE_MINUTE
-    x = summed(one.x, np.full(len(one.x), h / (A_MINUTE if a_minute else 1.0)))
-    return replace(one, header=as_position(one.header), x=x, summed=True)
