@@ -25,8 +25,10 @@ def with_sums(
 ) -> tuple[dict[str, Array], list[str]]:
     """The signals, of which positions are summed where the log has their speed, and what is said
     of that."""
-    said, step = list[str](), np.diff(signals["t"], prepend=signals["t"][:1])
+    said = list[str]()
     for name in (name for name, spec in specs.items() if spec.summed and name != "t"):
+        with np.errstate(invalid="ignore"):  # of times that are none, which are refused later
+            step = np.diff(signals["t"], prepend=signals["t"][:1])
         signals = {**signals, name: summed(signals[name], step)}
         said.append(
             f"{name!r} is the speed {specs[name].column!r} summed over time: so is its noise, which"

@@ -389,9 +389,10 @@ def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | N
 def _are_steps(x: Array) -> bool:
     """Whether values (n,) may be times from row to row: above 0, few far from their middle, about
     which they go up and down."""
+    if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
+        return False
     rise, far = np.diff(x), np.mean(x > LONGEST_GAP * np.median(x))
-    level = TWICE * np.sum(rise < 0.0) >= np.sum(rise > 0.0)
-    return bool(np.all(np.isfinite(x)) and np.all(x > 0.0) and level and far < MOST_UNEVEN)
+    return bool(TWICE * np.sum(rise < 0.0) >= np.sum(rise > 0.0) and far < MOST_UNEVEN)
 
 
 def _wrong_with_clock(t: Array) -> str:
