@@ -52,6 +52,8 @@ from identification.thresholds import (
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
+FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
+OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
 FEWEST_WINDOWS = 40  # windows of sliding
@@ -133,15 +135,15 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     direct = held or chosen_drive(logs, rig, None) == "force"
     turns = direct and max(float(np.ptp(log["y"])) for log in logs) > TURNS
     turns = turns and rig.motion == "rotary"
-    found = _squares(moved, turns, held, known)
-    if found is None:
+    looked = _looked_far(moved, turns, held, known)
+    if looked is None:
         return NO_SURROUNDINGS
-    used = GRAVITY if turns and _has_gravity(found) else PLAIN
+    found, used = looked
     lag, sampled = _lag(found, used), False
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
-        current = _squares(moved, turns, False, known) or found
+        current = _squares(moved, found.lags, turns, False, known) or found
         other = _lag(current, used)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
@@ -165,6 +167,26 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
             force = replace(always, sd=float(np.hypot(always.sd, unequal)))
     lag = Size(lag.value * h, lag.sd * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled)
+
+
+def _looked_far(
+    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings
+) -> tuple[_Squares, Sequence[int]] | None:
+    """The equation's rows at lags that reach as far as the best of them, and the columns used; the
+    nearest ones where none of these is the best within its reach; None where there are too few."""
+    first = None
+    strokes = sum(1 + int(np.sum(one.up[1:] != one.up[:-1])) for one in moved)
+    most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
+    for latest in (one * LAG for one in FARTHER if one == 1.0 or one * LAG < most):
+        lags = np.arange(EARLIEST_LAG[moved[0].held], latest + LAG_STEP / 2, LAG_STEP)
+        found = _squares(moved, lags, turns, held, known)
+        if found is None:
+            break
+        used = GRAVITY if turns and _has_gravity(found) else PLAIN
+        first = first or (found, used)
+        if int(np.argmin(found.left(found.every, used)[0])) < len(lags) - 1:
+            return found, used
+    return first
 
 
 def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
@@ -229,13 +251,13 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     """
     held = rig.kind == "motor" and not around.sampled
     moved = [motion_log(log, held=held, by_command=False) for log in logs]
-    found = _squares(moved, bool(around.sine.value or around.cosine.value), held)
+    lags = np.unique([0.0, around.lag.value / logs[0].h])
+    turns = bool(around.sine.value or around.cosine.value)
+    found = _squares(moved, lags, turns, held)
     if found is None:
         raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
-    used = GRAVITY if around.sine.value or around.cosine.value else PLAIN
-    left = found.left(found.every, used)[0]
-    at = (0.0, around.lag.value / logs[0].h)
-    without, with_it = (np.sqrt(np.interp(lag, found.lags, left) / found.rows) for lag in at)
+    left = np.sqrt(found.left(found.every, GRAVITY if turns else PLAIN)[0] / found.rows)
+    without, with_it = left[np.argmin(np.abs(lags))], left[np.argmax(np.abs(lags))]
     return float(without), float(with_it)
 
 
@@ -339,16 +361,15 @@ def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
 
 
 def _squares(
-    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings = NO_SURROUNDINGS
-) -> _Squares | None:
+    moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
+    known: Surroundings = NO_SURROUNDINGS,
+) -> _Squares | None:  # fmt: skip
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
-    held: the force's column is a zero-order hold.
+    lags: in samples, ascending; held: the force's column is a zero-order hold.
     """
     if not any(len(one.speed) for one in moved):
         return None
-    lead = EARLIEST_LAG[moved[0].held]
-    lags = np.arange(lead, LAG + LAG_STEP / 2, LAG_STEP)
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
     for one in moved:
@@ -363,7 +384,8 @@ def _squares(
         B = np.column_stack(
             [mean @ (np.interp(at - lag, at, F - place) + place) for lag in own_lags]
         )
-        inside = (w.start >= LAG) & (w.start + w.length < len(F) + lead) & (plain.speed >= slow)
+        inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
+        inside &= plain.speed >= slow
         block = _blocks_of_each_way(one.up, inside)
         for k in range(BLOCKS):
             in_block = inside & (block == k)

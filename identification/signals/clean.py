@@ -76,7 +76,7 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     runs = _moving(runs)
     lost = log.duration - sum(run.duration for run in runs)
     said = list[str]()
-    filled = [run.lost for run in runs if run.lost is not None]
+    filled = [run.lost for run in runs if run.lost is not None and np.any(run.lost)]
     if filled:
         share = float(np.mean(np.concatenate(filled)))
         said.append(f"{log.name}: {100 * share:.2g} % of its rows are lost, interpolated")

@@ -6,6 +6,7 @@ body and is eaten up by friction; a velocity is the position's derivative; a com
 or is one; a reference is ahead of the position.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from identification.signals.differentiate import (
     low_pass,
     spectrum,
 )
+from identification.thresholds import TWICE
 
 SURE_OF_MOTION = 4.0  # times the velocity's noise, from which a sample counts as moving
 LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
@@ -132,6 +134,27 @@ def force_laws(motion: Motion, y: Array, f: Array, smooth: Array) -> list[ForceL
              inertia[k])
         for k in range(f.shape[1])
     ]  # fmt: skip
+
+
+def of_a_weight(motion: Motion, y: Array, f: Array, turns: Mapping[str, float]) -> str | None:
+    """The unit in which a position (n,) is the angle of an arm whose weight is in the force f (n,),
+    of turns: units with what a turn is in them; None where none explains it clearly better than a
+    force that is a parabola of the place."""
+    sure = moving(motion)
+    if np.sum(sure) < FEWEST_MOVING:
+        return None
+    own = np.column_stack([motion.a, motion.v, np.sign(motion.v), np.ones(len(y))])
+    b = low_pass(f, 1.0, motion.cutoff)[sure]
+
+    def left(*place: Array) -> float:
+        return 1.0 - float(_explained(np.column_stack([own, *place])[sure], b)[0])
+
+    size = (y - y.mean()) / np.ptp(y)
+    rival = left(size, size**2)
+    angles = {unit: 2.0 * np.pi * y / turn for unit, turn in turns.items()}
+    lefts = {unit: left(np.sin(one), np.cos(one)) for unit, one in angles.items()}
+    best = min(lefts, key=lambda unit: lefts[unit])
+    return best if TWICE * lefts[best] < rival else None
 
 
 def _by_inertia(X: Array, b: Array) -> Array:

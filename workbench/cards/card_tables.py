@@ -26,6 +26,7 @@ from workbench.cards.units import (
     command_unit,
     force_unit,
     in_unit_of,
+    over_time,
     parse_gain,
 )
 
@@ -103,6 +104,9 @@ class SignalSpec(CardTable):
     """of a counter in two's complement"""
     signed: bool = False
     """whether an unsigned column is such a counter; needs `bits`"""
+    summed: bool = False
+    """whether the column is what the signal goes by: of `t` the time since the row before, of a
+    position its speed, in a unit of speed"""
 
     @model_validator(mode="after")
     def _invertible(self) -> "SignalSpec":
@@ -113,7 +117,8 @@ class SignalSpec(CardTable):
 
     def scale(self, signal: str, rig: Rig) -> Scale:
         """Signal in SI = factor * (column - offset) + shift; raises BadCard where it cannot be."""
-        return column_scale(self.unit, self.written_gain, signal, rig.motion, rig.command_unit)
+        unit = over_time(self.unit, signal) if self.summed else self.unit
+        return column_scale(unit, self.written_gain, signal, rig.motion, rig.command_unit)
 
     @property
     def written_gain(self) -> float | str | None:

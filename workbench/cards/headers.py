@@ -103,6 +103,7 @@ _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 _SURE_SUFFIX = 2
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
+_ADDRESS = re.compile(r"(?<!\w)0x[0-9a-f]+", re.I)
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
@@ -209,9 +210,7 @@ def _read(text: str, unit_below: str) -> Header:
     if unit_below.strip():
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
-    words = words_of(name)
-    if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
-        words = ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
+    words = _telling(words_of(name))
     means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
@@ -229,6 +228,13 @@ def _read(text: str, unit_below: str) -> Header:
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
     turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
     return Header(text, name, unit, means, purpose, angle, doubtful, turning)
+
+
+def _telling(words: list[str]) -> list[str]:
+    """The words without what two of them mean otherwise together."""
+    if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
+        return ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
+    return [one for one in words if one != "effort"] if "control" in words else words
 
 
 def written_unit(text: str) -> WrittenUnit | None:
@@ -267,6 +273,8 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         return " ".join(parts[:-2]), found, False
     if (suffix := _SUFFIX.match(text)) and (found := written_unit(suffix[2])):
         parted = any(sign in text for sign in ",;:")
+        if suffix[2] == "1" and not parted:  # "current_1", the first of several
+            return text, None, False
         letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
         return suffix[1], found, not parted and letter
     return text, None, False
@@ -279,8 +287,9 @@ def _around(text: str, bracket: re.Match[str], inside: str) -> str:
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a name in small letters: at case, digits and signs it is parted."""
-    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    """The words of a name in small letters: at case, digits and signs it is parted; addresses, as
+    0x6064, are none."""
+    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", _ADDRESS.sub(" ", name))
     parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
     small = parted.casefold()
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):

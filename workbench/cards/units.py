@@ -202,6 +202,12 @@ def command_unit(unit: str, gain: float | str | None, motion: Motion) -> str:
         return "V"
 
 
+def over_time(unit: str, signal: str) -> str:
+    """The unit of the sum of a column in `unit` over time: of a speed its length or angle; of the
+    clock's own steps theirs."""
+    return unit if signal == "t" else f"({unit}) s"
+
+
 def column_scale(
     unit: str,
     gain: float | str | None,

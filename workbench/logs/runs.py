@@ -31,6 +31,7 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
+from workbench.logs.summed import summed, with_sums
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import seconds
@@ -144,6 +145,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
             groups[name] = table.groups[number]
     if not groups:
         whole = _same_length(signals, path)
+        if card.signals["t"].summed:
+            whole["t"] = summed(whole["t"])
         cells = ((repr(key), np.asarray(table.fetch(k))) for k, key in enumerate(table.names))
         if in_turn := several_axes(whole["t"], cells):
             raise BadLog(f"{path}: {in_turn}")
@@ -151,7 +154,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole = whole if np.all(rows) else at_rows(whole, rows)
         whole["t"], late = late_stamps(whole["t"])
         said = (*said, late) if late else said
-        told = tuple(f"{called}: {one}" for one in (*remarks, *said))
+        whole, of_speeds = with_sums(whole, card.signals)
+        told = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))
         return Log(called, whole), table.first_row, told
 
     def clock(group: str) -> Array:
@@ -162,9 +166,9 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         return _signal(table, number, "t", card, path)[0]
 
     found = on_one_clock(signals, groups, clock, called)
-    log = Log(called, _same_length(found.signals, path))
-    told = tuple(f"{called}: {one}" for one in remarks)
-    return log, table.first_row + found.first, (*told, *found.remarks)
+    whole, of_speeds = with_sums(_same_length(found.signals, path), card.signals)
+    told = tuple(f"{called}: {one}" for one in (*remarks, *of_speeds))
+    return Log(called, whole), table.first_row + found.first, (*told, *found.remarks)
 
 
 def _signal(
@@ -250,7 +254,7 @@ def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if lengths and max(lengths) - min(lengths) == 1:  # vectors of a file, not rows
         signals = {k: v[: min(lengths)] if len(v) > 1 else v for k, v in signals.items()}
-    length = len(signals["t"])
+    length = len(signals["t"]) if len(signals["t"]) > 1 else max(lengths, default=1)
     for name, values in signals.items():
         if len(values) not in (1, length):
             raise BadLog(

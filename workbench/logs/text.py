@@ -25,6 +25,7 @@ from workbench.logs.table import Table, of_array
 from workbench.logs.times import with_whole_seconds
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_BETWEEN_NAMES = re.compile(r"\t|\s{2,}")  # between names of several words
 _WHOLE = re.compile(r"[+-]?\d+")
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 _FEW_ROWS = 3
@@ -241,7 +242,10 @@ def _marks(lines: list[str], spec: FileSpec) -> _Marks:
 
 def _split(line: str, marks: _Marks) -> list[str]:
     if marks.delimiter == " ":
-        return line.split()
+        words = line.removesuffix(";").split()
+        names = [one.strip() for one in _BETWEEN_NAMES.split(line.strip())]
+        of_words = 1 < len(names) < len(words) and not any(map(is_number, names))
+        return names if of_words else words  # "Encoder 1 Pos" is one name
     fields = next(csv.reader([line.rstrip("\r\n")], delimiter=marks.delimiter), [])
     return [field.strip() for field in fields]
 
@@ -262,7 +266,7 @@ def _body(text: str, start: int, spec: FileSpec, marks: _Marks) -> str:
         )
         body = "\n".join(remaining)
     if marks.delimiter == " ":
-        body = "\n".join(" ".join(line.split()) for line in body.splitlines())
+        body = "\n".join(" ".join(_split(line, marks)) for line in body.splitlines())
     return body
 
 

@@ -226,6 +226,7 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
     if at is None or not above:
         return spec, (), ()
     width = len(rows[at])
+    rows = [row if any(row[width:]) else row[:width] for row in rows]
     below = above[-1]
     units = _units(_uncommented(rows[below], spec), width)
     if len(above) < 2 or len(_uncommented(rows[above[-2]], spec)) != width:
@@ -272,7 +273,7 @@ def _units(row: Sequence[str], width: int) -> tuple[str, ...]:
         return ()
     plain = tuple(one.strip().strip("[](){}<>") for one in row)
     known = sum(written_unit(one) is not None for one in plain if one)
-    full = sum(bool(one) for one in plain)
+    full = sum(bool(one) and (one == "1" or not is_number(one)) for one in plain)
     return plain if full and known >= max(2, _MOSTLY * full) else ()
 
 

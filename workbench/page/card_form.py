@@ -117,6 +117,8 @@ class CardForm:
                 value["gain"] = gain
         if self[f"bits_{name}"].isdigit():
             value |= {"bits": int(self[f"bits_{name}"]), "signed": True}
+        if self[f"summed_{name}"]:
+            value["summed"] = True
         return Line(name, value, self._remark(f"column_{name}"))
 
     def _remark(self, name: str) -> str:
@@ -177,6 +179,7 @@ def _fields(of: "Proposal") -> dict[str, str]:
         fields[f"unit_{name}"] = signal.unit
         fields[f"gain_{name}"] = "" if signal.gain is None else _written(signal.gain)
         fields[f"bits_{name}"] = "" if signal.bits is None else str(signal.bits)
+        fields[f"summed_{name}"] = "summed" if signal.summed else ""
     return fields
 
 
@@ -211,7 +214,7 @@ def empty_form(columns: Sequence[tuple[str, str | int, str]], name: str) -> Card
 def _names() -> list[str]:
     """Every field of the form."""
     parts = [f"{part}_{name}" for name in FORM_SIGNALS for part in ("column", "unit", "gain",
-                                                                    "bits")]  # fmt: skip
+                                                                    "bits", "summed")]  # fmt: skip
     return ["name", "kind", "motion", *RIG_NUMBERS, *parts]
 
 

@@ -221,7 +221,8 @@ def identifiability_of_runs(
     if rig.kind == "velocity":
         return _identifiability_of_valve(runs, rig, motion)
     try:
-        if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
+        scaled = rig.kind != "motor" or bool(rig.force_per_command)
+        if not scaled:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
             rig = replace(rig, force_per_command=1.0)
         first = first_look(runs, rig, drive) if fit is None else FirstLook(fit)
@@ -236,7 +237,7 @@ def identifiability_of_runs(
     shown = None
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
-    said = surrounding_lines(around, rig)
+    said = surrounding_lines(around, rig, scaled=scaled)
     return RunsIdentifiability(motion, ways, seen, remarks=said, effects=shown, surroundings=around)
 
 

@@ -15,9 +15,12 @@ from workbench.cards.readable import number
 MS = 1e3
 
 
-def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
-    """A line on each that shows in the logs; all of them are in the model."""
-    unit, lines = units_of(rig.motion)["F_cp"], []
+def surrounding_lines(around: Surroundings, rig: Rig, *, scaled: bool = True) -> tuple[str, ...]:
+    """A line on each that shows in the logs; all of them are in the model.
+
+    scaled: whether it is known what force a unit of the command makes.
+    """
+    unit, lines = units_of(rig.motion)["F_cp"] if scaled else "units of u", list[str]()
     if around.sine.value or around.cosine.value:
         size = math.hypot(around.sine.value, around.cosine.value)
         rest = math.atan2(-around.cosine.value, around.sine.value)

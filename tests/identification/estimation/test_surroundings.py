@@ -80,7 +80,7 @@ def test_a_linear_machine_has_no_gravity_by_angle() -> None:
     assert found.sine == found.cosine == Size()
 
 
-@pytest.mark.parametrize("samples", [-4.0, 4.0, 6.0])
+@pytest.mark.parametrize("samples", [-4.0, 4.0, 6.0, 20.0, 50.0])
 def test_columns_of_two_instants_are_found(samples: float) -> None:
     log = made(4)
     at = np.arange(len(log))
@@ -92,6 +92,19 @@ def test_columns_of_two_instants_are_found(samples: float) -> None:
     told = lag_estimate(found)
     assert told is not None and told.low is not None and told.high is not None
     assert told.low < told.high
+
+
+def test_no_lag_is_sought_that_is_much_of_a_stroke() -> None:
+    """In a quick sine inertia and friction make good for any lag."""
+    t = 0.02 * np.arange(3000, dtype=np.float64)
+    w = 2.0 * np.pi / (78 * 0.02)
+    early = w * (t + 0.36)
+    F = 0.7 * np.clip(20.0 * np.cos(early), -1.0, 1.0) - 0.0015 * w**2 * np.sin(early)
+    y = 0.5 * np.sin(w * t) + 1e-4 * np.random.default_rng(1).standard_normal(len(t))
+    found = surroundings(
+        [Log("sine", {"t": t, "y": y, "F": F, "u": F})], replace(MOTOR, force_per_command=1.0)
+    )
+    assert abs(found.lag.value) <= 12.0 * 0.02
 
 
 def test_a_weight_is_found_where_one_stroke_alone_goes_up() -> None:

@@ -57,13 +57,14 @@ def test_a_header_tells_unit_and_meaning(
 @pytest.mark.parametrize(
     ("text", "drives"),
     [("motor_angle", False), ("motorPosition", False), ("motor", True), ("motor_pos_cmd", True),
-     ("motor_current", True), ("valve_position", True)],
+     ("motor_current", True), ("valve_position", True), ("Control Effort", True),
+     ("joint_effort", False)],
 )  # fmt: skip
 def test_where_a_motor_stands_is_no_command(text: str, drives: bool) -> None:
     assert ("command" in read_header(text).means) == drives
 
 
-@pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x"])
+@pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x", "actual_current_1", "q 1"])
 def test_a_name_with_an_index_has_no_unit(text: str) -> None:
     assert read_header(text).unit is None
 
@@ -97,3 +98,15 @@ def test_every_spelling_gives_a_unit_that_cards_know(text: str) -> None:
 def test_what_is_no_unit_is_none() -> None:
     assert written_unit("valve") is None
     assert written_unit("") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "means"),
+    [
+        ("Position actual value [0x6064]", {"position"}),
+        ("Current actual value (0x6078/00)", {"command"}),
+        ("0x606C:00 velocity actual value", {"velocity"}),
+    ],
+)
+def test_an_address_of_an_object_is_no_word(text: str, means: set[str]) -> None:
+    assert set(read_header(text).means) == means

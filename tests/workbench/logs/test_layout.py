@@ -161,3 +161,17 @@ def test_a_line_that_only_begins_the_values_is_no_header(tmp_path: Path) -> None
     found = read_unknown(path).columns
     assert [one.header for one in found] == ["X-Axis", "Angle [deg]", "Torque [Nm]"]
     assert len(found[0].values) == 120
+
+
+def test_names_of_several_words_stand_apart(tmp_path: Path) -> None:
+    """As ECP's program writes them, with a bracket around the rows and a sign behind each."""
+    path = tmp_path / "raw.txt"
+    rows = [
+        f"{k:6d}  {0.01 * k:8.3f}  {3 * k:8d}  {2 * k:8d}  {0.1 * k:9.4f} ;" for k in range(120)
+    ]
+    head = "[ Sample     Time    Commanded Pos    Encoder 1 Pos    Control Effort"
+    path.write_text("\n".join(["", head, "", *rows, "]"]))
+    found = read_unknown(path)
+    names = [one.header for one in found.columns]
+    assert names == ["[ Sample", "Time", "Commanded Pos", "Encoder 1 Pos", "Control Effort"]
+    assert {len(one.values) for one in found.columns} == {120}

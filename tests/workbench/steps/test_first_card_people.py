@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from benchmarks.init_people import KINDS, make_file
 from benchmarks.init_real_tables import fewest_wrong, machine
@@ -181,11 +182,162 @@ def test_a_proposal_keeps_its_other_through_answers(
     ],
 )
 def test_a_speed_is_no_position(joint: dict[str, Array], tmp_path: Path, headers: str) -> None:
-    with pytest.raises(BadLog, match="is a speed, and there is no position") as refused:
-        propose(tmp_path, headers, T, joint["v"], joint["F"])
-    assert ("1 rpm for 1 s is 6 deg" in str(refused.value)) == ("rpm" in headers)
+    """Beside a position it is none; without one a card has its sum, in the speed's own unit."""
     found = propose(tmp_path, headers + ",angle_deg", T, joint["v"], joint["F"], joint["y"])
     assert {one.name: one.column for one in found.signals}["y"] == "angle_deg"
+    y = propose(tmp_path, headers, T, joint["v"], joint["F"]).signal("y")
+    assert y is not None and (y.column, y.summed) == (headers.split(",")[1], True)
+    assert y.unit == {"rpm": "rpm", "deg/s": "deg/s", "omega [rad/s]": "rad/s"}.get(
+        str(y.column), "rad/s"
+    )
+
+
+def test_a_summed_speed_is_read_as_the_position(joint: dict[str, Array], tmp_path: Path) -> None:
+    rpm = joint["v"] * 30.0 / np.pi
+    rpm[100:103] = np.nan
+    found = checked_proposal(propose(tmp_path, "t_s,n_rpm,torque_Nm", T, rpm, joint["F"]))
+    assert not found.refused
+    (tmp_path / "card.toml").write_text(written(found), "utf-8")
+    read = read_runs(tmp_path / "run.csv", load_card(tmp_path / "card.toml"))
+    (run,) = read.runs
+    y = joint["y"] - joint["y"][0]
+    assert np.max(np.abs(run["y"] - y)) < 0.02 * np.ptp(y)
+    assert any("the speed 'n_rpm' summed over time" in one for one in read.remarks)
+
+
+def test_of_several_speeds_each_has_its_axis(joint: dict[str, Array], tmp_path: Path) -> None:
+    other = np.roll(joint["v"], 700), np.roll(joint["F"], 700)
+    headers = "t_s,leftSpeed,leftCommand,rightSpeed,rightCommand"
+    propose(tmp_path, headers, T, joint["v"], joint["F"], *other)
+    for axis in ("left", "right"):
+        found = proposed(tmp_path / "run.csv", axis=axis)
+        columns = {one.name: one.column for one in found.signals}
+        assert (columns["y"], columns["u"]) == (f"{axis}Speed", f"{axis}Command")
+
+
+@pytest.mark.parametrize("header", ["timestep [us]", "dt_us", ""])
+@pytest.mark.parametrize("even", [True, False])
+def test_the_time_from_row_to_row_is_summed(
+    joint: dict[str, Array], tmp_path: Path, header: str, even: bool
+) -> None:
+    steps = np.full(len(T), 2000.0)
+    if not even:
+        steps += np.random.default_rng(1).integers(-200, 900, len(T))
+    headers = f"{header},torque [Nm],angle [rad]" if header else ""
+    if even and not header:  # a column of one value says nothing without a name
+        return
+    t = 1e-6 * (np.cumsum(steps) - steps[0])
+    at = {name: np.interp(t, T, joint[name]) for name in ("F", "y")}
+    propose_lines = [headers] * bool(header)
+    rows = np.column_stack([steps * (1.0 if header else 1e-6), at["F"], at["y"]]).tolist()
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join([*propose_lines, *(",".join(map(repr, row)) for row in rows)]))
+    found = proposed(path)
+    clock = found.signal("t")
+    assert clock is not None and clock.summed and clock.unit == ("us" if header else "s")
+    (tmp_path / "card.toml").write_text(written(found), "utf-8")
+    runs = read_runs(path, load_card(tmp_path / "card.toml")).runs
+    assert sum(run.duration for run in runs) == pytest.approx(t[-1], rel=1e-2)
+
+
+def test_a_second_position_in_volts_is_no_command(joint: dict[str, Array], tmp_path: Path) -> None:
+    volts = 2.5 + 0.4 * joint["y"] + 1e-3 * np.random.default_rng(2).standard_normal(len(T))
+    headers = "t_s,torque [Nm],angle [rad],hall_voltage [V]"
+    found = propose(tmp_path, headers, T, joint["F"], joint["y"], volts)
+    assert found.signal("u") is None and found.signal("F") is not None
+
+
+def test_volts_of_every_channel_tell_nothing_of_one(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    """A scope's channels: a position by a potentiometer, a current by a shunt."""
+    y, u = 2.5 + 0.5 * joint["y"], 0.1 * joint["F"]
+    noise = 1e-4 * np.random.default_rng(4).standard_normal((2, len(T)))
+    rows = zip((T - 5.0).tolist(), (y + noise[0]).tolist(), (u + noise[1]).tolist(), strict=True)
+    lines = ["x-axis,1,2", "second,Volt,Volt", *(",".join(f"{x:+.6E}" for x in r) for r in rows)]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    found = checked_proposal(proposed(tmp_path / "run.csv"))
+    one = found.signal("y")
+    assert one is not None and (one.column, one.unit, one.sure) == (1, "V", False)
+    assert str(one.gain).partition(" ")[2].startswith("V/") and not found.refused
+
+
+def test_the_increment_of_a_scope_is_the_time_of_a_sample(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    rows = enumerate(np.column_stack([2.5 + joint["y"], 0.1 * joint["F"]]).tolist())
+    lines = ["X,CH1,CH2,Start,Increment,", "Sequence,VOLT,VOLT,-1.0e+01,2.000e-03"]
+    lines += [f"{k},{a:.6e},{b:.6e},," for k, (a, b) in rows]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    found = checked_proposal(proposed(tmp_path / "run.csv"))
+    t = found.signal("t")
+    assert t is not None and (t.column, t.gain, t.sure) == (0, "500 1/s", True)
+    assert not found.refused
+
+
+@pytest.mark.parametrize(("turn", "unit"), [(2.0 * np.pi, "rad"), (360.0, "deg"), (1.0, "turn")])
+def test_the_weight_of_an_arm_tells_an_angle_and_its_unit(
+    tmp_path: Path, turn: float, unit: str
+) -> None:
+    y = 1.2 * np.sin(1.3 * T) + 0.5 * np.sin(3.1 * T + 1.0)
+    v, a = np.gradient(y, T), np.gradient(np.gradient(y, T), T)
+    u = 0.1 * a + 0.3 * v + 0.8 * np.sign(v)
+    headers, of_turn = "t_s,pos,current", turn / (2.0 * np.pi)
+    found = propose(tmp_path, headers, T, of_turn * y, u + 3.0 * np.sin(y))
+    place = found.signal("y")
+    assert place is not None and (found.motion, place.unit) == ("rotary", unit)
+    assert propose(tmp_path, headers, T, of_turn * y, u + 2.0 * y).motion == "linear"  # a spring
+
+
+def test_a_position_in_percent_of_its_travel_is_one(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    share = 50.0 + 20.0 * joint["y"]
+    found = propose(tmp_path, "t_s,valve stem position [%],force_N", T, share, joint["F"])
+    y = found.signal("y")
+    assert y is not None and (y.column, y.unit) == ("valve stem position [%]", "%")
+    assert str(y.gain).partition(" ")[2].startswith("%/")
+    assert not checked_proposal(found).refused
+
+
+def test_two_positions_that_move_as_one_have_two_drives(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    beside = joint["y"] + 1e-3 * np.sin(40.0 * joint["y"])
+    part = 0.6 + 0.05 * np.sin(T)
+    shares = part * joint["F"], (1.0 - part) * joint["F"]
+    headers = "t_s,X1.pos [rad],X2.pos [rad],X1.torque [Nm],X2.torque [Nm]"
+    found = propose(tmp_path, headers, T, joint["y"], beside, *shares)
+    assert any("two drives push one body" in one for one in found.remarks)
+    apart = propose(tmp_path, headers, T, joint["y"], np.roll(beside, 800), *shares)
+    assert not any("two drives" in one for one in apart.remarks)
+
+
+def test_a_single_sampling_time_makes_the_clock(joint: dict[str, Array], tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    savemat(path, {"Ts": 2e-3, "u": joint["F"][:, None], "y": joint["y"][:, None]})
+    found = checked_proposal(proposed(path))
+    t = found.signal("t")
+    assert t is not None and (t.column, t.unit, t.summed) == ("Ts", "s", True)
+    (tmp_path / "card.toml").write_text(written(found), "utf-8")
+    (run,) = read_runs(path, load_card(tmp_path / "card.toml")).runs
+    assert len(run) == len(T) and run.h == pytest.approx(2e-3)
+
+
+def test_letters_that_tell_columns_apart_are_no_units(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    turn = 40.0 * joint["y"]
+    noise = np.random.default_rng(6).standard_normal((3, len(T)))
+    phases = [np.round(2048.0 + 100.0 * joint["F"] * np.cos(turn - k * 2.0944) + noise[k])
+              for k in range(3)]  # fmt: skip
+    headers = "t_s,angle_mrad,iq_mA,adc_a,adc_b,adc_c"
+    angle = np.round(1e3 * np.mod(turn, 2.0 * np.pi))
+    found = propose(tmp_path, headers, T, angle, 1e3 * joint["F"], *phases)
+    assert {one.name: one.column for one in found.signals} == {
+        "t": "t_s", "y": "angle_mrad", "u": "iq_mA",
+    }  # fmt: skip
+    assert any("leaps by 6283" in one for one in found.remarks)
 
 
 def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:

@@ -2,8 +2,11 @@
 
 import pytest
 
+from identification.log import Rig
 from identification.model.estimates import Estimate
-from workbench.steps.surrounding_lines import unequal_friction
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
+from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 
 
 def levels(up: float | None, down: float | None, sd: float) -> dict[str, Estimate]:
@@ -27,3 +30,12 @@ def test_else_nothing_is_said(up: float | None, down: float | None, sd: float) -
 def test_a_preload_of_a_spring_is_said_to_be_in_friction() -> None:
     (line,) = unequal_friction(levels(20.0, 15.0, 0.1), ("spring",))
     assert "a preload stands in F_cp and F_cn" in line
+
+
+def test_a_force_of_a_command_without_a_scale_is_in_units_of_it() -> None:
+    around = Surroundings(force=Size(-0.36, 0.01))
+    known, unknown = (
+        surrounding_lines(around, Rig("motor"), scaled=one)[0] for one in (True, False)
+    )
+    assert known.startswith("constant force: -0.36 N (")
+    assert unknown.startswith("constant force: -0.36 units of u (")

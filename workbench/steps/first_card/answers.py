@@ -9,7 +9,7 @@ from identification.errors import BadCard, UserError
 from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
-from workbench.cards.units import column_scale
+from workbench.cards.units import column_scale, over_time
 from workbench.steps.first_card.columns import COLUMN, Column
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
@@ -41,7 +41,8 @@ def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
         return replace(of, signals=tuple(other for other in of.signals if other is not one))
     found = replace(one, sure=True, why=CONFIRMED) if not text else _answered(of, one, text)
     try:
-        column_scale(found.unit, found.gain, name, of.motion)
+        unit = over_time(found.unit, name) if found.summed else found.unit
+        column_scale(unit, found.gain, name, of.motion)
     except BadCard as error:
         raise BadAnswer(str(error)) from None
     return replace(of, signals=tuple(found if other is one else other for other in of.signals))
@@ -121,7 +122,7 @@ def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
     if column := names.get(text) or names.get(before.strip()):
         unit = one.unit if text in names else _unit(last)
         return replace(given, column=column.raw.key, shown=column.shown, unit=unit, gain=None,
-                       bits=None)  # fmt: skip
+                       bits=None, summed=False)  # fmt: skip
     if WRITTEN_GAIN.fullmatch(text):
         return replace(given, gain=text)
     if written_unit(text) is None:

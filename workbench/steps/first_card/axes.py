@@ -1,13 +1,15 @@
 """Several axes or joints in one log: which column is of which, by what their headers share."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import takewhile
 
 import numpy as np
 
 from identification.arrays import Array
-from workbench.cards.headers import Header, meaning, says_purpose, words_of
+from workbench.cards.headers import Header, WrittenUnit, meaning, says_purpose, words_of
 
+OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
 
@@ -19,6 +21,8 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     several begin so. columns: headers and numbers; alike: correlation of the columns, (k, k).
     """
     heads = [head for head, _ in columns]
+    if not any(map(is_position, heads)):  # of speeds, of which a position is made
+        heads = [as_position(head) if head.speed else head for head in heads]
     words = [words_of(head.name) for head in heads]
     families: dict[tuple[str, ...], dict[str, int]] = {}
     for k, own in enumerate(words):
@@ -52,7 +56,7 @@ def _beginnings(
     out = list[tuple[str, ...]]()
     for head, own in zip(heads, words, strict=True):
         begin = tuple(own[: len(own) - len(end)])
-        if not (end and begin and tuple(own[len(begin) :]) == end and _is_position(head)):
+        if not (end and begin and tuple(own[len(begin) :]) == end and is_position(head)):
             continue
         alike = sum(tuple(other[: len(begin)]) == begin for other in words)
         if alike > 1 and not set(own) & set(best) and not any(map(says_purpose, begin)):
@@ -78,7 +82,7 @@ def _positions(
 
     alone: whether the headers are these words alone; then other headers have to hold them too.
     """
-    positions = [(word, k) for word, k in family.items() if _is_position(heads[k])]
+    positions = [(word, k) for word, k in family.items() if is_position(heads[k])]
     names = {word for word, _ in positions}
     elsewhere = sum(names <= set(other) for other in families)
     if alone and elsewhere < 2:
@@ -90,7 +94,8 @@ def _positions(
     return tuple(word for word, _ in apart)
 
 
-def _is_position(head: Header) -> bool:
+def is_position(head: Header) -> bool:
+    """Whether a header speaks of a position that is measured."""
     if head.purpose in ("reference", "error", "model"):
         return False
     if head.unit is not None:
@@ -98,6 +103,15 @@ def _is_position(head: Header) -> bool:
             head.unit.quantity == "count" and "position" in head.means
         )
     return max(head.means, key=lambda what: head.means[what], default="other") == "position"
+
+
+def as_position(head: Header) -> Header:
+    """The header of a speed, as one of what the speed sums up to."""
+    unit = head.unit
+    if unit is not None and unit.quantity == "velocity":
+        card = OF_TURNS.get(unit.card, unit.card.partition("/")[0])
+        unit = WrittenUnit(card, "position", unit.rotary)
+    return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
 
 
 def stem(head: Header) -> tuple[str, ...]:

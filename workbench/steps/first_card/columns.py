@@ -19,7 +19,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.relations import motion_of
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.cards.headers import Header, read_header
+from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.faulty_rows import (
     MOST_STARTS,
     late_stamps,
@@ -28,6 +28,7 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
+from workbench.logs.summed import summed
 from workbench.logs.unknown import RawColumn, UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
 from workbench.steps.first_card.registers import Register, read_register
@@ -39,16 +40,17 @@ WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
-AMPERES = ("A", "mA")
+AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
+PERIODS = {"ts", "dt", "timestep", "period", "tsample"}  # names of the time from row to row
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
 FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
-ANGLES_WRAP = (2.0 * np.pi, 360.0)
+ANGLES_WRAP = (2.0 * np.pi, 360.0, 2e3 * np.pi, 3600.0, 36000.0)  # rad, deg, and parts of them
 COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 
@@ -57,7 +59,8 @@ MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 class Column:
     """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
     as its register means them; axis: which of several machines of the log it is of ("": of all);
-    renewed: samples of `x` from one new value to the next of a column that is held, else 1."""
+    renewed: samples of `x` from one new value to the next of a column that is held, else 1;
+    summed: whether `values` or `x` are the sum of what the file has."""
 
     raw: RawColumn
     header: Header
@@ -66,6 +69,7 @@ class Column:
     register: Register | None = None
     axis: str = ""
     renewed: float = 1.0
+    summed: bool = False
 
     @property
     def bits(self) -> int | None:
@@ -167,6 +171,7 @@ def columns_of(log: UnknownLog) -> Columns:
              for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
+    heads = _without_letters(heads)
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
@@ -175,7 +180,17 @@ def columns_of(log: UnknownLog) -> Columns:
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
-    clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
+    steady = [one for one in read if one.raw.number in left_out and "time" in one.header.means]
+    rows = len(usable[0].values) if usable else 0
+    for one in (one for one in log.scalars if PERIODS & set(words_of(one.header))):
+        values = np.full(rows, one.values[0])
+        steady.append(Column(one, read_header(one.header), values, values))
+    steady = [one for one in steady if len(one.values) == rows]
+    clock = _of_steps(usable, steady) or _clock(
+        log.path, usable, [one for one in read if one.raw.unusable]
+    )
+    left_out.pop(clock.raw.number, None)
+    usable = [one for one in usable if one.raw.number != clock.raw.number] + [clock]
     if (piece := _longest_piece(clock.values)) is not None:
         usable = [replace(one, values=one.values[piece]) for one in usable]
         most = float(np.max(np.diff(clock.values)))
@@ -198,8 +213,23 @@ def columns_of(log: UnknownLog) -> Columns:
     phases = _phases(signals)
     left_out |= {one.raw.number: PHASE_CURRENT for one in phases}
     distinct, twice = _without_doubles([one for one in signals if one not in phases])
-    own = tuple(_with_axes(distinct))
+    own = tuple(_with_axes(_of_a_scope(distinct)))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _without_letters(heads: Sequence[Header]) -> list[Header]:
+    """The headers, without a unit that is the last of the letters by which several are told apart,
+    as the A of "adc_A" beside "adc_B"."""
+    apart = {one.text[:-1] for one in heads if one.text[-2:-1] in ("_", " ") and one.unit is None}
+    return [replace(one, unit=None) if one.text[:-1] in apart else one for one in heads]
+
+
+def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
+    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one."""
+    units = [one.header.unit for one in columns]
+    if not all(unit is not None and unit.card in VOLTS for unit in units):
+        return columns
+    return [replace(one, header=replace(one.header, doubtful=True)) for one in columns]
 
 
 def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
@@ -340,6 +370,29 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
         )
 
     return max(ticking, key=likely)
+
+
+def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | None:
+    """The clock of a log that has the time since the row before, summed, where no column is called
+    a time and goes up: of columns called a time the one that may hold that, of a log without any
+    names and clock the only one; None where none may. steady: columns of one value called so."""
+    ticking = [one for one in columns if _ticks(one)]
+    named = [*steady, *(one for one in columns if "time" in one.header.means)]
+    nameless = [one for one in columns if not (ticking or one.raw.header) and one.noisy]
+    found = [one for one in named or nameless if _are_steps(one.values)]
+    if len(found) != 1 or any("time" in one.header.means for one in ticking):
+        return None
+    whole = summed(found[0].values)
+    return replace(found[0], values=whole, x=whole, summed=True)
+
+
+def _are_steps(x: Array) -> bool:
+    """Whether values (n,) may be times from row to row: above 0, few far from their middle, about
+    which they go up and down."""
+    if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
+        return False
+    rise, far = np.diff(x), np.mean(x > LONGEST_GAP * np.median(x))
+    return bool(TWICE * np.sum(rise < 0.0) >= np.sum(rise > 0.0) and far < MOST_UNEVEN)
 
 
 def _wrong_with_clock(t: Array) -> str:

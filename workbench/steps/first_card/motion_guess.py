@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
+from identification.signals.relations import of_a_weight
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column
@@ -23,12 +24,14 @@ ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 
 class MotionGuess(NamedTuple):
-    """Whether the machine turns, why, whether that is sure, and whether by its own rotor."""
+    """Whether the machine turns, why, whether that is sure, and whether by its own rotor; angle:
+    the unit of its position, where a weight tells it."""
 
     motion: Motion
     why: str
     sure: bool
     rotor: bool = False
+    angle: str = ""
 
     @property
     def machine(self) -> str:
@@ -42,7 +45,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
     weak = {
         name: column.header.turning
         for name, column in roles.columns.items()
-        if name in ("y", "u", "F")
+        if name in ("y", "u", "F", "v")
     }
     rotor = weak.get("u", 0.0) >= ROTOR
     for name in ("y", "r", "F", "v"):
@@ -70,8 +73,16 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
         why = f"machines that turn have names like {most.shown} more often"
         return MotionGuess("rotary", why, False, rotor)
     for one in beside:
-        if one.header.speed and one.header.angle and one.axis in ("", y.axis):
-            return MotionGuess("rotary", f"{one.shown} beside it is the speed of a turn", False)
+        force = "force" in one.header.means
+        if (one.header.speed or force) and one.header.angle and one.axis in ("", y.axis):
+            what = "a torque" if force else "the speed of a turn"
+            return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
+    drive = roles.columns.get("F" if roles.kind == "force" else "u")
+    if drive is not None and y.motion is not None and y.header.unit is None:
+        angle = of_a_weight(y.motion, y.x, drive.x, {**TURN_IN, "turn": 1.0})
+        if angle is not None:
+            why = f"the weight of an arm is in what drives, by an angle in {angle}"
+            return MotionGuess("rotary", why, False, rotor, angle)
     return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from identification.log import RigKind
 from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
+from workbench.cards.headers import read_header
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
@@ -26,6 +27,7 @@ from workbench.steps.first_card.refusals import (
 from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sizes import UnitGuess, factor
+from workbench.steps.first_card.sums import with_position
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
 from workbench.steps.hardly_identifiable import ALL_FOLLOWED
@@ -53,7 +55,7 @@ LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit i
 class SignalGuess:
     """One signal of the card: its column (as the card names it and as the file shows it), unit and
     gain, whether column and unit are sure, and why; rival: what it would be otherwise, as an answer
-    says it."""
+    says it; summed: whether the column is what the signal goes by."""
 
     name: str
     column: str | int
@@ -64,6 +66,7 @@ class SignalGuess:
     sure: bool
     why: str
     rival: str = ""
+    summed: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,8 @@ class Proposal:
             "else": {one.key: one.rival for one in self.rig if one.rival},
             "signals": {
                 one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
-                           "bits": one.bits, "sure": one.sure, "why": one.why, "else": one.rival}
+                           "bits": one.bits, "summed": one.summed, "sure": one.sure, "why": one.why,
+                           "else": one.rival}
                 for one in self.signals
             },
             "file": self.spec.model_dump(exclude_defaults=True),
@@ -142,6 +146,9 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     columns = columns_of(read_unknown(path))
     signals, only = of_axis(columns, axis)
     roles = known_roles(signals, only)
+    if roles is None and (own := with_position(columns, signals, only)):
+        columns, only = own
+        roles = known_roles(columns.signals, only)
     if roles is None:
         raise no_body(columns)
     refuse_resting(columns, roles)
@@ -351,7 +358,15 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         if sign < 0.0:
             gain = -1.0 if gain is None else f"-{gain}"
         odds = SURE if name == "t" else roles.odds[name]
-        why = "it goes up evenly" if name == "t" else roles.why.get(name, "the header says so")
+        why = roles.why.get(name, "the header says so")
+        if name == "t":
+            why = "the time from row to row, summed" if one.summed else "it goes up evenly"
+        elif one.summed:
+            why = f"the speed, summed over time, {why}"
+            own = read_header(one.raw.header, one.raw.unit_below).unit
+            of_speed = own.card if own and own.quantity == "velocity" else f"{unit.unit}/s"
+            rival = f"{unit.rival}/s" if unit.rival and not unit.gain else ""
+            unit = replace(unit, unit=of_speed, rival=rival)
         if sign < 0.0:
             why += "" if name == "r" else f"; with this sign {sign_shown_by(roles.law)}"
         why += f"; unit {unit.why}"
@@ -360,8 +375,9 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         if name in exchanged:
             rival = found[exchanged[name]].answer
         out.append(
-            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival)
-        )
+            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why, rival,
+                        one.summed)
+        )  # fmt: skip
     return out
 
 

@@ -29,16 +29,6 @@ def no_body(columns: Columns) -> BadLog:
             " the current that makes the torque too (the drive's q current), or add a column of it"
             " by Park's transform with the electrical angle"
         )
-    speeds = [one for one in columns.signals if one.header.speed]
-    if speeds and all(said(one, "y") < 0.0 for one in columns.signals):
-        one = min(speeds, key=lambda one: one.header.purpose == "reference")
-        turns = one.header.unit is not None and one.header.unit.card == "rpm"
-        how = " (1 rpm for 1 s is 6 deg)" if turns else ""
-        return BadLog(
-            f"{columns.log.path}: column {one.shown} is a speed, and there is no position, which"
-            " every card needs; log the position too, or add a column of it, the speed summed over"
-            f" time{how}"
-        )
     pair = _followed(columns.signals)
     if pair is not None and (told := _hardly_moves(pair, columns.signals)):
         return BadLog(f"{columns.log.path}: {told}")

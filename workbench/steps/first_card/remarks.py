@@ -9,7 +9,8 @@ import numpy as np
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import lead
 from workbench.cards.headers import words_of
-from workbench.steps.first_card.columns import Columns
+from workbench.steps.first_card.axes import is_position
+from workbench.steps.first_card.columns import NEARLY_ALIKE, Columns
 from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.refusals import without_sign
 from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, are_constant
@@ -103,12 +104,21 @@ def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
 def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
     """Axes of the log, and names that several columns have."""
     if columns.axes:
-        own = roles.columns["y"].axis
-        said = f"this card is of {own}" if own else "this card is of none of them"
+        y = roles.columns["y"]
+        said = f"this card is of {y.axis}" if y.axis else "this card is of none of them"
         yield (
             f"{len(columns.axes)} axes in this log: {', '.join(columns.axes)}; {said}, another is"
             " had by --axis NAME"
         )
+        others = [one for one in columns.signals if one.axis not in ("", y.axis)]
+        twins = [one for one in others if is_position(one.header)
+                 and np.corrcoef(one.x, y.x)[0, 1] > NEARLY_ALIKE]  # fmt: skip
+        if twins:
+            yield (
+                f"{twins[0].shown} moves as {y.shown} does: where two drives push one body, what"
+                f" drives here is that of {y.axis} alone, and mass and friction come out as its"
+                " share; add a column of the sum"
+            )
     raw = [one.raw for one in columns.read if one.raw.header and isinstance(one.raw.key, int)]
     for name in (name for name, many in Counter(one.header for one in raw).items() if many > 1):
         places = [str(one.number) for one in raw if one.header == name]

@@ -207,8 +207,8 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
         most = MOST_BY_CHANGE if head >= HEADER_SAYS else MOST_UNNAMED
-        if head < HEADER_SAYS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
-            return -3.0  # one more position, of a model or another sensor
+        if abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
+            return -3.0  # one more position, of a model or another sensor, be it in volts
         if one.noisy and moved < MOVES_NOTHING:
             return -3.0
         forces = [seen.pairs.signals.index(of) for name, of in way.columns.items() if name == "F"]

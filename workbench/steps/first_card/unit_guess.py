@@ -14,7 +14,9 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import derivative, lead
+from workbench.cards.headers import words_of
 from workbench.cards.units import Motion, force_unit
+from workbench.logs.layout import NUMBER
 from workbench.steps.first_card.columns import Column, Columns
 from workbench.steps.first_card.motion_guess import (
     MotionGuess,
@@ -54,6 +56,7 @@ NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
 COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
 REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
 SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
+INCREMENTS = {"increment", "interval", "xincrement"}  # words of the time of a sample
 SENSOR_OUTPUTS = ("command", "count")
 
 Units = dict[str, UnitGuess]
@@ -69,10 +72,15 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     out = dict(given)
     if "y" not in out and (turn := unit_by_turn(roles.columns["y"])) and motion.motion == "rotary":
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
+    if "y" not in out and motion.angle:
+        why, rival = "by the weight of an arm in what drives", {"rad": "deg"}
+        out["y"] = UnitGuess(motion.angle, None, False, why, rival.get(motion.angle, "rad"))
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
     if "t" not in out and (ticking := _ticks(columns)):
         out["t"] = ticking
+    if "t" not in out and (step := _increment(columns)):
+        out["t"] = step
     if "t" not in out and counts_samples(columns.clock):
         out["t"] = by_sample_number(columns, roles, out)
     out |= _jointly(columns, roles, motion, out)
@@ -147,6 +155,17 @@ def _ticks(columns: Columns) -> UnitGuess | None:
         fits = step >= SHORTEST_TICK if first > 1e9 else step < LONGEST_DAY
         if fits and any(low < first < high for low, high in ranges):
             return UnitGuess("1", gain, True, "it counts from an epoch")
+    return None
+
+
+def _increment(columns: Columns) -> UnitGuess | None:
+    """The rate of a clock that counts by ones, of a scope that writes the time of one below a name
+    of its own beside the signals' units; None where none is written."""
+    counts = columns.clock.whole and columns.step == 1.0
+    for one in columns.read if counts else ():
+        step = one.raw.unit_below
+        if INCREMENTS & set(words_of(one.raw.header)) and NUMBER.fullmatch(step):
+            return UnitGuess("1", f"{1.0 / float(step):.9g} 1/s", True, f"by {one.raw.header!r}")
     return None
 
 
@@ -294,7 +313,8 @@ def by_reference(
     y, r = roles.columns["y"], roles.columns.get("r")
     if not is_output(y):
         return None
-    unit = "V" if y.header.unit and y.header.unit.quantity == "command" else "count"
+    own = y.header.unit
+    unit = own.card if own and own.quantity == "command" else "count"
     per = "turn" if motion == "rotary" else "mm"
     turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
     if turn is not None and turn not in REGISTERS:
@@ -317,7 +337,7 @@ def by_reference(
     if turn is not None:
         return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
     why, width = "not in the log: see the sensor's data sheet", float(np.ptp(y.numbers))
-    if unit == "V":
+    if unit != "count":
         return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
     span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
     whole = width > NEARLY_A_TURN * span and float(np.min(y.numbers)) >= 0.0

@@ -115,6 +115,9 @@ def _by_unit(one: Column, role: str) -> float:
         return {"y": 2.0, "r": 1.0, "u": 1.0}.get(role, -4.0)
     if quantity == "command":
         raw = 2.5 if unit in ("V", "mV", "1") else BY_UNIT
+        means = one.header.means
+        if unit == "%" and max(means, key=lambda of: means[of], default="") == "position":
+            return 0.0  # a share of its travel
         return raw if role == "u" else {"1": 0.0}.get(unit, AGAINST_UNIT)
     return BY_UNIT if role in ROLES_OF[quantity] else AGAINST_UNIT
 

@@ -49,6 +49,8 @@ def _signal_line(one: SignalGuess) -> Line:
         value = {**value, "gain": one.gain}
     if one.bits is not None:
         value = {**value, "bits": one.bits, "signed": True}
+    if one.summed:
+        value = {**value, "summed": True}
     named = isinstance(one.column, int) and not one.shown.startswith("number")
     why = f"{one.shown}: {one.why}" if named else one.why
     return Line(one.name, value, _remark(one.sure, why, one.rival))

@@ -1,0 +1,36 @@
+"""A position of a log that has its speed alone: the sum of that, as a card's `summed` says."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.logs.summed import summed
+from workbench.steps.first_card.axes import as_position
+from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.sizes import USUAL, factor, likeliest
+from workbench.steps.first_card.weights import said
+
+BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
+
+
+def with_position(
+    columns: Columns, signals: Sequence[Column], only: Column | None
+) -> tuple[Columns, Column] | None:
+    """The columns with the sum of a speed, which is then the position, in place of the speeds among
+    these signals; None where none is a speed, or another column may be the position.
+
+    only: the speed that somebody asked for.
+    """
+    speeds = [one for one in signals if one.header.speed and one.header.purpose != "reference"]
+    if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
+        return None
+    own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
+    unit, clock = own.header.unit, columns.clock.header.unit
+    usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
+    second = factor(clock.card if clock and clock.quantity == "time" else usual)
+    h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.card if unit else "", 1.0)
+    x = summed(own.x, np.full(len(own.x), h))
+    position = replace(own, header=as_position(own.header), x=x, summed=True)
+    kept = [one for one in signals if not one.header.speed]
+    return replace(columns, signals=(*kept, position)), position
