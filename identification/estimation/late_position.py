@@ -29,7 +29,7 @@ from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
 from identification.signals.check import are_steps
-from identification.thresholds import ADEQUATE, ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY, HOPELESS
 
 SLOW_LOG = (
     6e-3  # s between samples, from which the equation's windows are too long to identify a lag
@@ -79,7 +79,7 @@ def what_acts_beside(
     def follows(samples: float) -> bool:
         """Whether a run follows with that lag where it clearly does not without."""
         without, with_it = left(0.0), left(samples)
-        if without <= ASTRAY or not np.isfinite(with_it):
+        if without <= ASTRAY or with_it > HOPELESS:
             return False
         return explains(without - 1.0, with_it - 1.0)
 
