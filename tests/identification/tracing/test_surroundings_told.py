@@ -57,10 +57,8 @@ def test_a_lag_that_leaves_but_noise_is_the_machines(
     """Noise was half of what was missing: a run down to the noise had a probability of 23 %."""
     monkeypatch.setattr(surroundings_told, "lag_explains", lambda *_: (0.155, 0.117))
     of = trace_of("none", ())
-    late, log = (
-        Surroundings(lag=Size(8e-3, 5e-4)),
-        Log("late", dict.fromkeys("ty", np.linspace(0.0, 1.0, 9))),
-    )
+    late = Surroundings(lag=Size(8e-3, 5e-4), gives=20.0)
+    log = Log("late", dict.fromkeys("ty", np.linspace(0.0, 1.0, 9)))
     found = surroundings_told.with_surroundings(
         replace(of, complete=complete), late, [log], [log], Rig("motor", force_per_command=1.0)
     )
