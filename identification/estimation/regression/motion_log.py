@@ -136,8 +136,10 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNois
 def _beside_the_equations(one: MotionLog, motion: Motion) -> LogNoise:
     """The noise of a log, that of its force no more than the equations leave of it."""
     noise, log = one.noise, one.log
+    if one.held:
+        return replace(noise, F=min(noise.F, _left_of_force(one)))
     F = min(noise.F, max(_left_of_force(one), rounding_of_force(log)))
-    if one.held or one.whole is None:
+    if one.whole is None:
         return replace(noise, F=F)
     F = min(F, _unexplained(one))
     of_command = integral(one.signals["u"], log.h)
@@ -188,14 +190,16 @@ def _beside_control(log: Log) -> float:
 
 
 def _left_of_force(one: MotionLog) -> float:
-    """Noise of a motor's force [N] that would hardly leave so little of the equation of motion.
+    """Noise of the force [N] that would hardly leave so little of the equation of motion.
 
-    No more than that is noise: what its controller makes of a noise that no signal shows was given
-    to the motor too, and is none. Noise leaves the same at any lag, a command that acts off its row
-    more than its noise: so by the lag that leaves least. Of a chi-square; ours.
+    No more than that is noise: what a controller makes of a noise that no signal shows was given to
+    the body too, and is none. Noise leaves the same at any lag, a command that acts off its row
+    more than its noise: so by the lag that leaves least. Of a measured force in the faster windows,
+    where the equation surely holds. Of a chi-square; ours.
     """
     X = mechanical(one, NOTHING_KNOWN).X
-    fast = one.speed >= np.quantile(one.speed, SLOWEST_PART) if len(one.speed) else one.up
+    slowest = 0.0 if one.held or not len(X) else float(np.quantile(one.speed, SLOWEST_PART))
+    fast = one.speed >= slowest
     X = X[fast]
     free = int((X.shape[0] - X.shape[1]) / OVERLAP)
     if free < 1:
