@@ -52,8 +52,8 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
     TRIM each instead of their squared residual; the best threshold is taken, none above the band
-    where that is known. Under prescribed motion it slides at any speed. Sources: Cauchy's weights, Holland, Welsch, Commun. Stat. A 6
-    (1977) 813; the trimming is ours: `README.md`, (10), (11).
+    where that is known. Under prescribed motion it slides at any speed. Sources: Cauchy's weights,
+    Holland, Welsch, Commun. Stat. A 6 (1977) 813; the trimming is ours: `README.md`, (10), (11).
     """
     scale = stage.scale(equation)
     if equation == REST:
