@@ -23,6 +23,7 @@ from identification.tracing.free_run.backward_elimination import (
     Setting,
     fewest,
     suffices,
+    with_band,
 )
 from identification.tracing.free_run.forward_selection import judged_forward
 from identification.tracing.plain_model import PlainModel
@@ -38,6 +39,7 @@ def selection(
     and what trying them needs."""
     setting = Setting(plain, rng.spawn(1)[0])
     first = choose(plain.start, plain.first, plain.library, rng, report, most=1)
+    first = with_band(first, setting)
     if not first.steps or suffices(first, setting):
         return setting, first
     return setting, choose(plain.start, plain.first, plain.library, rng, report, first)
