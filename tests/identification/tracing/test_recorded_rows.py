@@ -15,7 +15,7 @@ def log_of(dead_zone: float, felt: bool) -> Log:
     """A cylinder under a command that chatters within 0.1 V and now and then goes beyond; not felt:
     its force has nothing to do with it."""
     rng = np.random.default_rng(3)
-    t: Array = np.arange(20000) * H
+    t: Array = np.asarray(H * np.arange(20000), dtype=np.float64)
     within = np.where(np.sin(2 * np.pi * 4.0 * t) > 0.0, 0.099, -0.099)
     u = within + 0.03 * np.sin(2 * np.pi * 0.5 * t) * (np.sin(2 * np.pi * 0.11 * t) > 0.97)
     y = 1e-4 * np.sin(2 * np.pi * 0.4 * t)

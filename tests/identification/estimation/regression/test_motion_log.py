@@ -34,7 +34,7 @@ def test_what_a_loop_adds_to_a_measured_force_is_no_noise_of_its_sensor(
 ) -> None:
     """The body has been given it too: by third differences both are noise."""
     rng, h = np.random.default_rng(2), 1e-3
-    t: Array = np.arange(20000) * h
+    t: Array = np.asarray(h * np.arange(20000), dtype=np.float64)
     F = 25.0 * np.sin(2 * np.pi * 0.7 * t) + 8.0 * np.sin(2 * np.pi * 2.3 * t)
     F = F + chatter * rng.standard_normal(len(t))
     body = Plant(Karnopp(2.0, 8.0, 9.0, 50.0, 60.0, 3e-3, -3e-3, 11.0, -12.0))
