@@ -29,7 +29,7 @@ from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.progress import Halt
 from identification.signals.check import are_steps
-from identification.thresholds import ADEQUATE, ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY, HOPELESS
 
 SLOW_LOG = (
     6e-3  # s between samples, from which the equation's windows are too long to identify a lag
@@ -79,7 +79,7 @@ def what_acts_beside(
     def follows(samples: float) -> bool:
         """Whether a run follows with that lag where it clearly does not without."""
         without, with_it = left(0.0), left(samples)
-        if without <= ASTRAY or not np.isfinite(with_it):
+        if without <= ASTRAY or with_it > HOPELESS:
             return False
         return explains(without - 1.0, with_it - 1.0)
 
@@ -95,20 +95,21 @@ def what_acts_beside(
     in_loop = not motor or any("r" in log for log in logs)
     if found.lag.value and not believed(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
-    if found.lag.value or not motor or h < SLOW_LOG:
+    if not motor or not (found.lag.value or h >= SLOW_LOG):
         return found
-    best = _best_lag(left, halt)
-    if best == 0.0 or not follows(best):
+    best = _best_lag(left, halt, found.lag.value / h)
+    if best == found.lag.value / h or not follows(best):
         return found
     return replace(found, lag=Size(best * h, LAG_SD * h))
 
 
-def _best_lag(left: Callable[[float], float], halt: Halt) -> float:
-    """The lag in samples, by halves, that leaves least; 0 where the run is followed without one."""
-    best = 0.0
+def _best_lag(left: Callable[[float], float], halt: Halt, begun: float) -> float:
+    """The lag in samples, by halves from one of the equation (0: none is known), that leaves least;
+    that one where the run is followed with it."""
+    best = begun
     if left(best) <= ADEQUATE:
         return best
-    for samples in DOUBLED:
+    for samples in () if begun else DOUBLED:
         if not halt.reached():  # a lag near by, but not the right one, may leave more than none
             best = min(best, samples, key=left)
     for step in NEARER:

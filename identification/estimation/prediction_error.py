@@ -46,13 +46,17 @@ class PredictionErrorFit:
     latent: LatentForces
 
     @property
-    def is_likelier(self) -> bool:
-        """Whether the logs are significantly likelier, and nothing of account is missing that a
-        latent force, rather than these parameters, would stand for."""
+    def is_known(self) -> bool:
+        """Whether nothing of account is missing that a latent force, rather than these parameters,
+        would stand for."""
         p = self.plant.friction
         share = self.latent.share(max(p.F_cp, p.F_cn))
-        known = share is not None and share <= MATERIAL and bool(np.all(self._variances > 0.0))
-        return known and significant(self.gain, len(self.names))
+        return share is not None and share <= MATERIAL and bool(np.all(self._variances > 0.0))
+
+    @property
+    def is_likelier(self) -> bool:
+        """Whether they are known, and the logs significantly likelier."""
+        return self.is_known and significant(self.gain, len(self.names))
 
     @property
     def sd(self) -> dict[str, float]:

@@ -12,6 +12,7 @@ from identification.estimation.regression.equation_rows import (
     MECHANICAL,
     MotionLog,
     actuator,
+    integral,
 )
 from identification.estimation.regression.held_command import (
     UNSEEN,
@@ -240,7 +241,7 @@ def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:
         raise BadLog(f"{name}: drive by command asked for, but no command u is logged")
     if drive is not None:
         return drive
-    return "command" if logged and left_by_actuator(logs) * WORSE <= 1.0 else "force"
+    return "command" if logged and explains_force(logs) else "force"
 
 
 def commanded(logs: Sequence[Log]) -> bool:
@@ -248,13 +249,25 @@ def commanded(logs: Sequence[Log]) -> bool:
     return all("u" in log and np.ptp(log["u"]) > 0 for log in logs)
 
 
-def left_by_actuator(logs: Sequence[Log]) -> float:
-    """Share of the force's rate that a linear actuator with the logged command leaves.
+def explains_force(logs: Sequence[Log], dead_zones: Sequence[float] = ()) -> bool:
+    """Whether a linear actuator with the logged command leaves less than all of the force's rate.
 
+    dead_zones: quantiles of the command's size, behind a dead zone of one of which it may do so.
     Source: the paper's dF/dt = k1 u - k2 v, in weak form (Messenger, Bortz 2021).
     """
     seen = [motion_log(log, held=False, by_command=True) for log in logs]
-    rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in seen])
+    sizes = np.quantile(np.concatenate([np.abs(log["u"]) for log in logs]), dead_zones)
+    return any(_left_by_actuator(seen, size) * WORSE <= 1.0 for size in (0.0, *sizes.tolist()))
+
+
+def _left_by_actuator(logs: Sequence[MotionLog], dead_zone: float) -> float:
+    """Share of the force's rate that a linear actuator behind a dead zone [V] leaves."""
+    parts = []
+    for one in logs:
+        u = np.asarray(one.log["u"])
+        beyond = np.sign(u) * np.maximum(np.abs(u) - dead_zone, 0.0)
+        parts.append(actuator(one, np.array([1.0, 0.0, 0.0]), u=integral(beyond, one.log.h)))
+    rows = stacked(parts)
     return left_share(solve_rows(rows), rows.sd, rows.b)
 
 

@@ -40,7 +40,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import values_of
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import Karnopp
-from identification.model.plant import Plant
+from identification.model.plant import Motor, Plant
 from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
 from identification.thresholds import HOPELESS, MATERIAL, WORSE
@@ -140,12 +140,16 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
 
 def shown_sliding(plant: Plant) -> list[str]:
     """Names of the parameters that a plant shows while it slides: none of a stick limit, nor of an
-    effect that acts at rest, which stops and reversals show."""
+    effect that acts at rest, which stops and reversals show, nor of an actuator's, whose force is
+    measured."""
+    motor = isinstance(plant.actuator, Motor)
     of_effects = [
         f"{acting.key}.{p.name}"
         for acting in plant.effects
         for p in acting.effect.params
-        if not acting.effect.place.at_rest and p.name not in AT_REST
+        if not acting.effect.place.at_rest
+        and p.name not in AT_REST
+        and (motor or not acting.effect.place.in_actuator)
     ]
     return [*FIVE, *of_effects]
 

@@ -20,7 +20,7 @@ from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
-from identification.estimation.regression.motion_log import again, motion_log
+from identification.estimation.regression.motion_log import SLOWEST_PART, again, motion_log
 from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
@@ -57,7 +57,6 @@ OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another i
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
 FEWEST_WINDOWS = 40  # windows of sliding
-SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself

@@ -53,18 +53,19 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
         rows = replace(rows, remarks=(*rows.remarks, *said))
     if halt.reached():
         halt.left_out(REFINEMENT)
-    start, first = model.stage, model.outcomes
+    start = model.stage
     if model.imposed:
-        return PlainModel(rows, start, first, model, library, recorded)
+        return PlainModel(rows, start, model.outcomes, model, library, recorded)
     logs = rows.logs
     if model.misfit <= ADEQUATE:  # else its stops are not the machine's
         logs = tuple(replace(one, reference=model.plant.friction) for one in logs)
     # A run that is not followed may have swollen its band in place of what is missing.
     slow = band(model) if model.misfit <= ASTRAY else 0.0
     start = replace(start, band=slow, sliding=model.plant.friction)
+    first = base_fits(start)
     with halt.closing():  # or it would be open whether an effect is worth a trial at all
         follows = misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE
     if follows and all(mean_square(o) <= ADEQUATE for o in first.values()):
         library = {}  # neither the plain plant's run nor its equations leave anything but noise
     rows = replace(rows, recorded=replace(rows.recorded, logs=logs))
-    return PlainModel(rows, start, base_fits(start), model, library, recorded)
+    return PlainModel(rows, start, first, model, library, recorded)

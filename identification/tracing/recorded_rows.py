@@ -11,6 +11,7 @@ from identification.estimation.recorded_logs import (
     RecordedLogs,
     chosen_drive,
     commanded,
+    explains_force,
     needed,
     slower_remarks,
     with_clocks,
@@ -24,6 +25,7 @@ from identification.thresholds import FOURFOLD
 from identification.tracing.remaining_structure import FEWEST_ROWS
 
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
+DEAD_ZONES = (0.2, 0.4, 0.6, 0.8)  # quantiles of the command's size
 OF_SPEED = frozenset({"v", "reversal"})
 COMMAND_SAYS_LITTLE = (
     "the command explains little of the force, so effects between command and force were not tried"
@@ -59,6 +61,8 @@ def recorded_rows(train: Sequence[Log], rig: Rig, halt: Halt | None = None) -> R
     """
     slower = needed(train, rig)
     drive: Drive = "command" if rig.kind == "motor" else chosen_drive(slower, rig, None)
+    if drive == "force" and commanded(slower) and explains_force(slower, DEAD_ZONES):
+        drive = "command"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(slower)
     recorded, refused = _prescribed_if_needed(recorded)
     recorded = with_clocks(recorded, slower_remarks(train, slower))

@@ -23,6 +23,7 @@ from identification.tracing.free_run.backward_elimination import (
     Setting,
     fewest,
     suffices,
+    with_band,
 )
 from identification.tracing.free_run.forward_selection import judged_forward
 from identification.tracing.plain_model import PlainModel
@@ -38,6 +39,7 @@ def selection(
     and what trying them needs."""
     setting = Setting(plain, rng.spawn(1)[0])
     first = choose(plain.start, plain.first, plain.library, rng, report, most=1)
+    first = with_band(first, setting)
     if not first.steps or suffices(first, setting):
         return setting, first
     return setting, choose(plain.start, plain.first, plain.library, rng, report, first)
@@ -76,16 +78,32 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     if significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names)):
         lacks = other
         model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in given}})
-    if not any(one.walks(setting.drive) for one in setting.logs):
+    searched = _searched(model.plant) & set(names)
+    walks = any(one.walks(setting.drive) for one in setting.logs)
+    if not (walks or searched):
         return model
     best = setting.halt.tried(
         LIKELIEST,
         lambda: prediction_error_fit(model.plant, names, setting.logs, slowest, lacks),
         None,
     )
-    if best is None or not best.is_likelier:
+    if best is None or not best.is_known:
         return model
-    return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
+    if walks and best.is_likelier:
+        return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
+    own = {name: sd for name, sd in best.sd.items() if name in searched}
+    return replace(model, sd={**model.sd, **own})
+
+
+def _searched(plant: Plant) -> set[str]:
+    """Names of effects' parameters that a search of the equations gives, which know no deviation of
+    them."""
+    return {
+        f"{acting.key}.{p.name}"
+        for acting in plant.effects
+        for p in acting.effect.params
+        if not p.linear and p.name != "asymmetry"
+    }
 
 
 def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:

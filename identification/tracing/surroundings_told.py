@@ -132,8 +132,8 @@ def _with_named(
     """
     without, with_them = left["test"]
     known, share = surrounding_estimates(around), (with_them / without) ** 2
-    late = named[0].key == DELAY
-    sure = probability(evidence(with_them / without, 1)) if late else 1.0 - CHANCE_LEVEL
+    late, still_missing = named[0].key == DELAY, 0.0 if of.complete else with_them / without
+    sure = probability(evidence(still_missing, 1)) if late else 1.0 - CHANCE_LEVEL
     found = tuple(
         FoundEffect(
             one.effect,

@@ -278,6 +278,8 @@ def test_beyond_chance() -> None:
     assert is_significant(0.63, 0.1) and not is_significant(0.4, 0.1)
     assert not shows(20.0) and shows(31.0)
     assert significant_share(0.4, 0.1, 1.0) == 0.0 and significant_share(0.4, 0.064, 1.0) == 0.4
+    # Nor may one be cut to the largest that is so unsure: leakage made a share of 3.3.
+    assert significant_share(3.3, 0.5, 1.0) == 0.0
     # A change of 20 or 31 by the rows, of which 2.5 count as one.
     assert not drifted(np.sqrt(0.5), 100) and drifted(np.sqrt(0.5), 156)
 

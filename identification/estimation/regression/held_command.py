@@ -78,7 +78,7 @@ def significant_share(share: float, sd: float, gain: float) -> float:
     A drive's own lag adds to it: what is beyond the largest share is not missed where this explains
     as much but for an immaterial part of the square.
     """
-    if share < BEYOND_CHANCE * sd or gain < MATERIAL:
+    if min(share, LARGEST_SHARE) < BEYOND_CHANCE * sd or gain < MATERIAL:
         return 0.0
     beyond = max(BEYOND_CHANCE * sd, share * MATERIAL**0.5)
     return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + beyond else 0.0

@@ -47,6 +47,7 @@ OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff ma
 CALM_SHARE = 0.9  # of the samples, those that show the controller
 OF_DRIFT = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
+SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
 OFF_ITS_ROW = 8  # samples, to either side, by which a motor's force may act off its row
 
 
@@ -137,9 +138,10 @@ def _beside_the_equations(one: MotionLog, motion: Motion) -> LogNoise:
     noise, log = one.noise, one.log
     if one.held:
         return replace(noise, F=min(noise.F, _left_of_force(one)))
+    F = min(noise.F, max(_left_of_force(one), rounding_of_force(log)))
     if one.whole is None:
-        return noise
-    F = min(noise.F, _unexplained(one))
+        return replace(noise, F=F)
+    F = min(F, _unexplained(one))
     of_command = integral(one.signals["u"], log.h)
     walk = force_random_walk(log["F"], motion.y, of_command, log.h, 1.0 / motion.cutoff)
     # A random walk's steps are in the third differences by which the sensor's noise was seen.
@@ -188,19 +190,24 @@ def _beside_control(log: Log) -> float:
 
 
 def _left_of_force(one: MotionLog) -> float:
-    """Noise of a motor's force [N] that would hardly leave so little of the equation of motion.
+    """Noise of the force [N] that would hardly leave so little of the equation of motion.
 
-    No more than that is noise: what its controller makes of a noise that no signal shows was given
-    to the motor too, and is none. Noise leaves the same at any lag, a command that acts off its row
-    more than its noise: so by the lag that leaves least. Of a chi-square; ours.
+    No more than that is noise: what a controller makes of a noise that no signal shows was given to
+    the body too, and is none. Noise leaves the same at any lag, a command that acts off its row
+    more than its noise: so by the lag that leaves least. Of a measured force in the faster windows,
+    where the equation surely holds. Of a chi-square; ours.
     """
     X = mechanical(one, NOTHING_KNOWN).X
+    slowest = 0.0 if one.held or not len(X) else float(np.quantile(one.speed, SLOWEST_PART))
+    fast = one.speed >= slowest
+    X = X[fast]
     free = int((X.shape[0] - X.shape[1]) / OVERLAP)
     if free < 1:
         return np.inf
     F, at = np.asarray(one.log["F"]), np.arange(len(one.log))
     lags = range(-OFF_ITS_ROW, OFF_ITS_ROW + 1)
-    rows = [one.sliding.held @ np.interp(at - lag, at, F) for lag in lags]
+    mean_of = one.sliding.held if one.held else one.sliding.mean
+    rows = [(mean_of @ np.interp(at - lag, at, F))[fast] for lag in lags]
     square = min(float(np.sum((b - X @ least_squares(X, b)) ** 2)) for b in rows) / OVERLAP
     mean = weights(one.sliding.length, one.log.h)[0]
     return float(np.sqrt(square / chdtri(free, 1.0 - CHANCE_LEVEL) / noise_gain(mean)))

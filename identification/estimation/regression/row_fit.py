@@ -51,9 +51,9 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     """Fit and criterion of an equation's rows.
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
-    TRIM each instead of their squared residual; the best threshold is taken. Under prescribed
-    motion it slides at any speed. Sources: Cauchy's weights, Holland, Welsch, Commun. Stat. A 6
-    (1977) 813; the trimming is ours: `README.md`, (10), (11).
+    TRIM each instead of their squared residual; the best threshold is taken, none above the band
+    where that is known. Under prescribed motion it slides at any speed. Sources: Cauchy's weights,
+    Holland, Welsch, Commun. Stat. A 6 (1977) 813; the trimming is ours: `README.md`, (10), (11).
     """
     scale = stage.scale(equation)
     if equation == REST:
@@ -68,6 +68,8 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
         fit = solve_rows(rows)
         return RowFit(rows, fit, fit.cost / scale + rows.lost, 0.0)
     edges = np.quantile(rows.speed, TRIMS[:1] if stage.imposed else TRIMS)
+    if stage.band > 0.0:  # above it the body slides, whatever would be left out better
+        edges = np.unique([edges[0], *edges[edges < stage.band], max(stage.band, edges[0])])
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
     size = of_column(A)
     whitened = A / size

@@ -21,11 +21,13 @@ from identification.estimation.windowed_run.refinement import Refit
 from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, HALF, HOPELESS, OF_ACCOUNT
+from identification.thresholds import ADEQUATE, COMPLETE, HALF, HOPELESS, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
+    earned,
     enough,
     equations_explained,
+    only,
     with_steps,
 )
 from identification.tracing.free_run.contenders import RunContender, contender, on_whole_logs
@@ -75,7 +77,25 @@ def contest(
     rivals = [one for one in found if one.effect.key != winner.effect.key]
     if done.misfit > decisive(model.misfit, rivals):
         return None
-    return _taken(winner, done, rivals, setting, model.misfit)
+    bare = on_whole_logs(without_effect(winner), setting)
+    if bare.misfit <= COMPLETE or done.misfit >= earned(bare.misfit):
+        return _bare(winner.steps, bare, choice, model)
+    return _taken(winner, done, rivals, setting, min(bare.misfit, model.misfit))
+
+
+def without_effect(one: RunContender) -> RunContender:
+    """The structure without its last effect, from the plant that it has led to: a better start is
+    no effect."""
+    stay = tuple(acting for acting in one.plant.effects if acting.key != one.effect.key)
+    return replace(one, plant=replace(one.plant, effects=stay))
+
+
+def _bare(
+    steps: tuple[Step, ...], done: Refit, choice: Choice, model: FittedStructure
+) -> tuple[Choice, FittedStructure]:
+    """The choice with these of its steps, and its model as refined."""
+    choice = only(choice, steps)
+    return choice, replace(model, stage=choice.end, outcomes=choice.base).refined(done)
 
 
 def decisive(before: float, others: Sequence[RunContender]) -> float:

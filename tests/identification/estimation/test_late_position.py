@@ -64,6 +64,30 @@ def test_a_lag_that_no_run_bears_out_is_believed_where_it_explains_most_and_no_l
     assert bool(what_acts_beside([motor], rig).lag.value) == (believed and not in_loop)
 
 
+@pytest.mark.parametrize(("without", "with_it"), [(np.inf, 80.0), (90.0, 60.0)])
+def test_a_run_that_no_lag_lets_follow_bears_none_out(
+    without: float, with_it: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cogging of 20 % of friction passed for 15 ms, and with it taken out for nothing else."""
+    left = iter([without, with_it])
+    monkeypatch.setattr(
+        late_position, "surroundings", lambda *_: Surroundings(lag=Size(7.0 * H, 0.5 * H))
+    )
+    monkeypatch.setattr(late_position, "lag_explains", lambda *_: (1.08, 0.93))
+    monkeypatch.setattr(late_position, "_run", lambda *_: late_position._Run(next(left)))
+    assert not what_acts_beside([late_log(0.0)], Rig("force", motion="rotary")).lag.value
+
+
+def test_a_lag_of_the_equation_is_refined_by_a_run_that_shows_another() -> None:
+    """In a loop the position's noise draws it: 4 samples were 6."""
+
+    def left(samples: float) -> float:
+        return 1.0 + (samples - 4.0) ** 2
+
+    assert late_position._best_lag(left, Halt(), 6.0) == 4.0
+    assert late_position._best_lag(lambda _: 1.2, Halt(), 6.0) == 6.0  # it follows as it is
+
+
 @pytest.mark.parametrize(("seed", "late"), [(0, 0), (0, 1), (1, 0), (1, 2), (4, 1)])
 def test_a_lag_of_a_short_slow_log_is_found_where_the_command_jumps_and_nowhere_else(
     seed: int, late: int

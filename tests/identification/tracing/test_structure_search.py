@@ -21,11 +21,16 @@ BENT = {"m": 0.5, "spring.k": 30.0, "F_sp": 2.0}  # deviations of a run that is 
 @cache
 def spring() -> tuple[Setting, Choice]:
     """A motor with a spring of 40 N/m, and what its equations call for."""
-    one = seen(made(4, {"spring": {"k": 40.0}}))
+    return called_for("spring", {"k": 40.0})
+
+
+def called_for(key: str, values: dict[str, float]) -> tuple[Setting, Choice]:
+    """A motor with this effect, and what its equations call for."""
+    one = seen(made(4, {key: values}))
     rng = np.random.default_rng(0)
     start, first = first_stage([one], False)
     plain = FittedStructure(start, first, plant(), {}, False, 90.0)
-    library = {"spring": built_in()["spring"]}
+    library = {key: built_in()[key]}
     setting = setting_of([one], plain, library, rng)
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
 
@@ -52,3 +57,17 @@ def test_numbers_that_make_the_position_likelier_take_the_place_of_bent_ones() -
     assert found.sd["spring.k"] < 1.0 and found.sd["m"] < 0.1
     assert found.sd["F_sp"] == BENT["F_sp"]  # of which sliding says nothing
     assert found.plant.friction.F_sp == model(55.0).plant.friction.F_sp
+
+
+def test_a_searched_parameter_has_the_deviation_of_its_likelihood() -> None:
+    """That of its search, a trust of 3 %, made 12.0 mm "11.3 to 12.7"."""
+    values = {"a": 3.0, "b": 0.0, "period": 0.012, "a_2": 0.0, "b_2": 0.0}
+    setting, choice = called_for("cogging", values)
+    own = replace(
+        setting.plain.model, plant=plant({"cogging": values}), misfit=1.0, stage=choice.end,
+        sd={**BENT, "cogging.period": 3.6e-4, "cogging.a": 0.1},
+    )  # fmt: skip
+    found = likelier(choice, own, setting)
+    (acting,) = found.plant.effects
+    sd = found.sd["cogging.period"]
+    assert 0.0 < sd < 1e-5 and abs(acting.values["period"] - 0.012) < 4.0 * sd

@@ -1,14 +1,21 @@
 """Orders of a turn in a trace: named first, proved on logs that no fit has seen, drawn before."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import NotIdentifiable
+from identification.log import Log, Rig
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
+from identification.tracing import surroundings_told
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.estimation.test_turn_orders import BOTH_WAYS, ONE_WAY, RIG, log_of
+from tests.workbench.trace_values import trace_of
 
 COGGING: dict[float, float] = {7: 0.8, 28: 0.4}
 
@@ -41,3 +48,20 @@ def test_a_log_of_one_way_has_its_orders_and_no_level_of_friction() -> None:
 def test_what_is_not_in_the_held_out_log_is_not_named() -> None:
     with pytest.raises(NotIdentifiable):  # one way alone, and its orders are not there
         traced(ONE_WAY, {})
+
+
+@pytest.mark.parametrize(("complete", "probable"), [(True, True), (False, False)])
+def test_a_lag_that_leaves_but_noise_is_the_machines(
+    complete: bool, probable: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Noise was half of what was missing: a run down to the noise had a probability of 23 %."""
+    monkeypatch.setattr(surroundings_told, "lag_explains", lambda *_: (0.155, 0.117))
+    of = trace_of("none", ())
+    late = Surroundings(lag=Size(8e-3, 5e-4), gives=20.0)
+    log = Log("late", dict.fromkeys("ty", np.linspace(0.0, 1.0, 9)))
+    found = surroundings_told.with_surroundings(
+        replace(of, complete=complete), late, [log], [log], Rig("motor", force_per_command=1.0)
+    )
+    (delay,) = found.effects
+    assert delay.effect.key == "input_delay" and found.verdict == "effect"
+    assert (delay.probability > 0.9) == probable

@@ -18,6 +18,7 @@ from identification.thresholds import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, equations_explained
 from identification.tracing.free_run.contenders import RunContender, less_load
 from identification.tracing.free_run.forward_selection import (
+    contest,
     decisive,
     judged_forward,
     luck,
@@ -26,7 +27,7 @@ from identification.tracing.free_run.forward_selection import (
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.trace import trace
-from tests.identification.motor_logs import K_A, made, plant, seen
+from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 from tests.identification.tracing.settings import MOTOR, setting_of
 
 
@@ -108,6 +109,25 @@ def test_a_complete_run_of_a_motor_has_nothing_missing() -> None:
     found = trace([made(8)], [made(9)], MOTOR, built_in(), np.random.default_rng(0))
     assert found.verdict == "none" and not found.effects and not found.unknown.depends_on
     assert found.after["train"].position_rms == pytest.approx(1e-5, rel=0.05)
+
+
+def test_a_contender_that_has_only_the_better_start_adds_no_effect(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Cogging's run of 6.5 became 1 with a coupling that gave by a thousandth of the noise."""
+    setting, plain = setting_with_play(4, 0.0)
+    lost = replace(plain, plant=plant(friction=replace(NINE, F_sp=20.0)), misfit=6.5)
+    none = choose(setting.plain.start, setting.plain.first, {}, setting.rng, lambda _s, _p: None)
+    good = plant({"compliance": {"flexibility": 1e-10}})
+    one = RunContender((), built_in()["compliance"], good, 1.0)
+    place = "identification.tracing.free_run.forward_selection"
+    monkeypatch.setattr(f"{place}.structures", lambda *_: [None])
+    monkeypatch.setattr(f"{place}.contender", lambda *_: one)
+    found = contest(none, lost, setting, lambda _s, _p: None)
+    assert found is not None
+    choice, model = found
+    assert not choice.steps and not model.plant.effects
+    assert model.misfit <= COMPLETE and model.plant.friction.F_sp == pytest.approx(16.0, rel=0.01)
 
 
 def test_what_is_decisive() -> None:
