@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.prediction_error import significant
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
 from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT
@@ -110,9 +111,29 @@ class HeldOut:
         of_force = None if plain is self.model else self._force_left(self.missing)
         if of_force is not None:
             return min(of_force**2, self._of_rest)
+        if self._of_equation is not None:
+            return min(self._of_equation, self._of_rest)
         runs = plain is not self.model and not plain.imposed and not self.model.imposed
         by_run = runs and plain.misfit > ADEQUATE
         return min(share_left(self.was, self.now, self.noise, by_run), self._of_rest)
+
+    @cached_property
+    def _of_equation(self) -> float | None:
+        """Share that effects leave of what the equation of motion lacks on the test logs, beyond
+        the sensors' noise, where they leave the measured force as it is and make the position
+        significantly likelier that was measured while sliding; else None.
+
+        By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, as `prediction_error`: an
+        effect that seldom acts lacks hardly any force on the whole.
+        """
+        missing, noise = self.missing, self.noise.force_rms or 0.0
+        was, now = (one["test"].force_rms for one in (self.before, self.after))
+        if missing is None or not self._as_measured or was is None or now is None or was <= noise:
+            return None
+        sizes = sum(len(step.candidate.effect.params) for step in self.choice.steps)
+        if not significant(2.0 * missing.gained, sizes):
+            return None
+        return max(now**2 - noise**2, 0.0) / (was**2 - noise**2)
 
     @cached_property
     def _of_rest(self) -> float:
@@ -189,8 +210,13 @@ class HeldOut:
         """Whether effects that leave the measured force as it is leave next to nothing of what was
         missing on the test logs: then it was predicted, and a run that loses its way at a stop says
         nothing against them."""
-        as_measured = not any(step.candidate.effect.place.on_signals for step in self.choice.steps)
-        return as_measured and self.share <= OF_ACCOUNT
+        return self._as_measured and self.share <= OF_ACCOUNT
+
+    @property
+    def _as_measured(self) -> bool:
+        """Whether there are effects, which all leave force and position as they were measured."""
+        steps = self.choice.steps
+        return bool(steps) and not any(one.candidate.effect.place.on_signals for one in steps)
 
     @cached_property
     def missing(self) -> MissingForce | None:
