@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.prediction_error import significant
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
 from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT
