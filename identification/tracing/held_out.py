@@ -120,17 +120,19 @@ class HeldOut:
     @cached_property
     def _of_equation(self) -> float | None:
         """Share that effects leave of what the equation of motion lacks on the test logs, beyond
-        the sensors' noise, where they leave the measured force as it is and make the position
-        significantly likelier that was measured while sliding; else None.
+        the sensors' noise, where they are effects of that equation, leave the measured force as it
+        is and make the position significantly likelier that was measured while sliding; else None.
 
         By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, as `prediction_error`: an
         effect that seldom acts lacks hardly any force on the whole.
         """
         missing, noise = self.missing, self.noise.force_rms or 0.0
         was, now = (one["test"].force_rms for one in (self.before, self.after))
-        if missing is None or not self._as_measured or was is None or now is None or was <= noise:
+        effects = [step.candidate.effect for step in self.choice.steps]
+        of_motion = self._as_measured and not any(one.place.in_actuator for one in effects)
+        if missing is None or not of_motion or was is None or now is None or was <= noise:
             return None
-        sizes = sum(len(step.candidate.effect.params) for step in self.choice.steps)
+        sizes = sum(len(one.params) for one in effects)
         if not significant(2.0 * missing.gained, sizes):
             return None
         return max(now**2 - noise**2, 0.0) / (was**2 - noise**2)
