@@ -253,8 +253,10 @@ class HeldOut:
 
     def _force_left(self, missing: MissingForce | None) -> float | None:
         """Share of the missing force that is left, None where neither model lacks one of account,
-        or the logs only bound it."""
-        if missing is None:
+        the logs only bound it, or all effects are an actuator's, whose force is measured."""
+        effects = [step.candidate.effect for step in self.choice.steps]
+        of_actuator = not self.plain.recorded.held and all(one.place.in_actuator for one in effects)
+        if missing is None or (effects and of_actuator):
             return None
         lacked = [
             one.share(self.coulomb) or 0.0

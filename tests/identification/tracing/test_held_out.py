@@ -10,6 +10,7 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.latent_force import LatentForce, LatentForces, Rougher
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.structure_fit import FittedStructure, band
@@ -180,3 +181,20 @@ def test_an_effect_that_seldom_acts_is_judged_by_the_likelihood_of_the_held_out_
     assert held._force_left(held.missing) is None
     assert held.share == pytest.approx(0.21 / 80.0 if judged_by_force else 12.6 / 21.0)
     assert ("half" not in held.against) == judged_by_force
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_no_effect_of_an_actuator_is_proved_by_the_force_that_a_body_lacks(
+    measured: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The plain model's body is bent by its run, which numbers of the equation put right whatever
+    is named: a dead zone stood for leakage. Of a motor the force is that of its command."""
+    monkeypatch.setattr(RecordedLogs, "held", not measured)
+    own, n = replace(judged()), np.ones(8)
+    (step,) = own.choice.steps
+    effect = built_in()["valve_dead_zone"]
+    named = replace(step, candidate=replace(step.candidate, effect=effect))
+    held = replace(own, choice=replace(own.choice, steps=(named,)))
+    sliding = Residual("mechanical", n, n, n, n, n, {})
+    found = held._force_left(MissingForce(latent(2.0, 0.1), latent(0.02, 0.001), sliding))
+    assert (found is None) == measured
