@@ -3,8 +3,9 @@
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
 command acts as late as it does, and nowhere else. So a lag is believed where a run follows with it,
-and a motor's searched there where the log is slow. One that explains most of what the equation
-leaves is believed without, where no loop is known, or where it is too short for a run to notice.
+a motor's is refined there, and searched where the log is slow. One that explains most of what the
+equation leaves is believed without, where no loop is known, or where it is too short for a run to
+notice.
 """
 
 from collections.abc import Callable, Sequence
