@@ -129,7 +129,8 @@ class HeldOut:
         missing, noise = self.missing, self.noise.force_rms or 0.0
         was, now = (one["test"].force_rms for one in (self.before, self.after))
         effects = [step.candidate.effect for step in self.choice.steps]
-        of_motion = self._as_measured and not any(one.place.in_actuator for one in effects)
+        elsewhere = any(one.place.in_actuator or one.place.at_rest for one in effects)
+        of_motion = self._as_measured and not elsewhere
         if missing is None or not of_motion or was is None or now is None or was <= noise:
             return None
         sizes = sum(len(one.params) for one in effects)
