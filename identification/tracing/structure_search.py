@@ -59,8 +59,9 @@ def refinement(
 
 
 def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> FittedStructure:
-    """The model, with sliding friction and effects as the equations identify them, or as they make
-    what was measured while sliding likeliest, where that is significantly likelier.
+    """The model, with sliding friction and effects as they make what was measured while sliding
+    likeliest, or as the equations identify them where more is missing, if that is significantly
+    likelier than as the run has them.
 
     A run begins and ends its stops by the noise of a measured force, and is bent by those that it
     loses. By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, of the position measured
@@ -75,12 +76,12 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     plant = plant_with(model.plant, given, values_of(found.plant, given))
     slowest = choice.base[MECHANICAL].slowest
     lacks, other = (latent_forces(one, setting.logs, slowest) for one in (model.plant, plant))
-    if significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names)):
+    bent = significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names))
+    if bent:
         lacks = other
         model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in given}})
-    searched = _searched(model.plant) & set(names)
     walks = any(one.walks(setting.drive) for one in setting.logs)
-    if not (walks or searched):
+    if not (bent or walks):
         return model
     best = setting.halt.tried(
         LIKELIEST,
@@ -91,13 +92,17 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
         return model
     if walks and best.is_likelier:
         return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
-    own = {name: sd for name, sd in best.sd.items() if name in searched}
-    return replace(model, sd={**model.sd, **own})
+    if not bent:
+        return model
+    # The rows know deviations for given shapes alone.
+    rows = {n: x for n, x in model.sd.items() if n not in _searched(model.plant)}
+    own = {name: max(sd, rows.get(name, 0.0)) for name, sd in best.sd.items()}
+    return replace(model, plant=best.plant, sd={**model.sd, **own})
 
 
 def _searched(plant: Plant) -> set[str]:
-    """Names of effects' parameters that a search of the equations gives, which know no deviation of
-    them."""
+    """Names of effects' parameters that are shapes, found by a search, whose rows know none of
+    their deviations."""
     return {
         f"{acting.key}.{p.name}"
         for acting in plant.effects

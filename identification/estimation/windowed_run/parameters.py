@@ -71,7 +71,7 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
         for p in acting.effect.params:
             here = acting.values[p.name]
             low, high = p.low, p.high
-            if not p.linear and here > 0:
+            if not p.linear and here > 0 and p.name != "asymmetry":  # which may have either sign
                 low, high = max(low, here / wide(p)), min(high, here * wide(p))
             own[p.name] = float(np.clip(every.get(f"{acting.key}.{p.name}", here), low, high))
         effects.append(acting.effect.acting(own))

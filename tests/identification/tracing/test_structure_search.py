@@ -63,8 +63,9 @@ def test_a_searched_parameter_has_the_deviation_of_its_likelihood() -> None:
     """That of its search, a trust of 3 %, made 12.0 mm "11.3 to 12.7"."""
     values = {"a": 3.0, "b": 0.0, "period": 0.012, "a_2": 0.0, "b_2": 0.0}
     setting, choice = called_for("cogging", values)
+    bent = plant({"cogging": {**values, "a": 2.0}})
     own = replace(
-        setting.plain.model, plant=plant({"cogging": values}), misfit=1.0, stage=choice.end,
+        setting.plain.model, plant=bent, misfit=1.0, stage=choice.end,
         sd={**BENT, "cogging.period": 3.6e-4, "cogging.a": 0.1},
     )  # fmt: skip
     found = likelier(choice, own, setting)
