@@ -8,6 +8,7 @@ import numpy as np
 from identification.effects._library import Library
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
+from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
 from identification.estimation.structure_fit import FittedStructure, band, plain_structure
@@ -65,7 +66,9 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     first = base_fits(start)
     with halt.closing():  # or it would be open whether an effect is worth a trial at all
         follows = misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE
-    if follows and all(mean_square(o) <= ADEQUATE for o in first.values()):
+    # Breakaways as they were before a band was known, which may be another effect's.
+    explained = {**model.outcomes, **{e: o for e, o in first.items() if e == MECHANICAL}}
+    if follows and all(mean_square(o) <= ADEQUATE for o in explained.values()):
         library = {}  # neither the plain plant's run nor its equations leave anything but noise
     rows = replace(rows, recorded=replace(rows.recorded, logs=logs))
     return PlainModel(rows, start, first, model, library, recorded)
