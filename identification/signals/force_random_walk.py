@@ -5,8 +5,7 @@ force beside the model's, held back by the actuator's k2 alone. The measured for
 k1 times the command's integral plus k2 y is then a random walk in white noise (a local level;
 Durbin, Koopman, Time Series Analysis by State Space Methods, 2012, section 2). Its likelihood has
 the closed form of a filter of gain g, in which k1, k2, an offset of the rate and a start are
-linear, and with them what a leakage would add, which is no noise either. What is not white after it
-is something that the model lacks.
+linear. What is not white after it is no noise, but something that the model lacks.
 """
 
 import numpy as np
@@ -37,8 +36,7 @@ def force_random_walk(F: Array, y: Array, impulse: Array, h: float, apart: float
     n = len(x)
     if n < LEAST_COMPARED:
         return 0.0
-    columns = [each[::step] for each in (impulse, y, np.cumsum(F) * h)]  # the last of a leakage
-    X = np.column_stack([*columns, np.arange(n) / n, np.ones(n)])
+    X = np.column_stack([impulse[::step], y[::step], np.arange(n) / n, np.ones(n)])
     X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     plain = n * np.log(float(np.mean(_filtered(x, X, 0.0) ** 2)))
     best: tuple[float, float] | None = None  # cost, and step of the walk

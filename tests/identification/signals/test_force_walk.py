@@ -46,17 +46,6 @@ def test_what_a_valve_swallows_is_no_noise() -> None:
         assert force_random_walk(*signals(0.0, seed, dead=0.02), H, 8 * H) == 0.0
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_leaks_is_no_walk(seed: int) -> None:
-    """Beside a leakage of 1.5/s a walk was not found, or taken for five times as large."""
-    F, y, impulse = signals(3e-3, seed)
-    made, leaked = np.zeros(N), 0.0
-    for i in range(1, N):
-        leaked = made[i - 1] * (1.0 - 1.5 * H)
-        made[i] = leaked + F[i] - F[i - 1]
-    assert force_random_walk(made, y, impulse, H, 8 * H) == pytest.approx(3e-3, rel=0.5)
-
-
 def test_a_log_too_short_tells_none() -> None:
     F, y, impulse = (x[:200] for x in signals(0.05, 1))
     assert force_random_walk(F, y, impulse, H, 8 * H) == 0.0
