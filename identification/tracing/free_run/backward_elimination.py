@@ -86,10 +86,8 @@ def _model(choice: Choice, setting: Setting) -> FittedStructure:
 def with_band(choice: Choice, setting: Setting) -> Choice:
     """The choice beside the band of its run, above which its equations are to hold, where these do
     beside any and the run is followed."""
-    if not (choice.steps and equations_explained(choice.base)):
-        return choice
-    model = fitted(choice, setting)
-    if model.imposed or model.misfit > ASTRAY:
+    model = _of_explained(choice, setting)
+    if model is None or model.imposed or model.misfit > ASTRAY:
         return choice
     end = replace(choice.end, band=band(model))
     return replace(choice, end=end, base=base_fits(end))
@@ -97,10 +95,16 @@ def with_band(choice: Choice, setting: Setting) -> Choice:
 
 def suffices(choice: Choice, setting: Setting) -> bool:
     """Whether neither the equations nor the run call for another effect beside those chosen."""
-    if not (choice.steps and equations_explained(choice.base)):
+    model = _of_explained(choice, setting)
+    if model is None:
         return False
-    model = fitted(choice, setting)
     return model.imposed or model.misfit <= followed_up_to(choice, setting, False)
+
+
+def _of_explained(choice: Choice, setting: Setting) -> FittedStructure | None:
+    """The model of effects that explain the equations; None of others."""
+    explained = choice.steps and equations_explained(choice.base)
+    return fitted(choice, setting) if explained else None
 
 
 def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:

@@ -10,7 +10,7 @@ from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale, over_time
-from workbench.steps.first_card.columns import COLUMN, Column
+from workbench.steps.first_card.column import COLUMN, Column
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"

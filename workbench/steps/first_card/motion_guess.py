@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.signals.relations import of_a_weight
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
-from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.registers import halved_counts
 from workbench.steps.first_card.roles import Roles
 

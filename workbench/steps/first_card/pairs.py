@@ -17,7 +17,7 @@ from identification.signals.relations import (
     lead,
 )
 from workbench.steps.first_card.axes import correlation, normed, stem
-from workbench.steps.first_card.columns import MOST_ROWS_READ, Column
+from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 
 HALF_VELOCITY = 0.5  # share of a column, from which it may be the velocity that comes late
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum

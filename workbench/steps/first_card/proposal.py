@@ -14,7 +14,8 @@ from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import read_header
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
-from workbench.steps.first_card.columns import Column, Columns, columns_of
+from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.columns import Columns, columns_of
 from workbench.steps.first_card.motion_guess import is_current, known_motion
 from workbench.steps.first_card.refusals import (
     SAID_SO,

@@ -9,7 +9,8 @@ from identification.errors import BadLog
 from identification.signals.relations import FEWEST_MOVING, lead, moving
 from identification.thresholds import TWICE
 from workbench.cards.headers import words_of
-from workbench.steps.first_card.columns import PHASE_CURRENT, Column, Columns
+from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.columns import PHASE_CURRENT, Columns
 from workbench.steps.first_card.motion_guess import is_current
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.weights import SURE, said, together

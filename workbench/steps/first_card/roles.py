@@ -21,7 +21,7 @@ from identification.signals.relations import (
     by_inertia,
     force_law,
 )
-from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, follows
 from workbench.steps.first_card.ways import (
     HEADER_SAYS,

@@ -7,7 +7,8 @@ import numpy as np
 
 from workbench.logs.summed import summed
 from workbench.steps.first_card.axes import as_position
-from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 

@@ -17,7 +17,8 @@ from identification.signals.relations import derivative, lead
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion, force_unit
 from workbench.logs.layout import NUMBER
-from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
     MotionGuess,
     counts_per_turn,

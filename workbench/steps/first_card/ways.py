@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, force_laws
-from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
 from workbench.steps.first_card.weights import (
     AREA_RATIOS,

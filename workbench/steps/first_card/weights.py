@@ -12,7 +12,7 @@ from identification.arrays import Array
 from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
-from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
 from workbench.steps.first_card.registers import halved_counts
 
