@@ -40,14 +40,18 @@ class Minimum:
         """Whether hardly more than noise is left."""
         return self.mean < ADEQUATE
 
-    def covariance(self, cluster: IntArray | None = None, noise: Array | None = None) -> Array:
+    def covariance(
+        self, cluster: IntArray | None = None, noise: Array | None = None,
+        alike: IntArray | None = None,
+    ) -> Array:  # fmt: skip
         """Of x, (k, k): the sandwich (J'J)^-1 S (J'J)^-1, S the covariance of the scores J'r.
 
-        Of residuals that are white noise of this mean square S is mean J'J. cluster (n,): stretches
-        of the first n residuals within which they are correlated; the stretches are independent,
-        and the scatter of their scores gives S (Liang, Zeger, Biometrika 73 (1986) 13). noise
-        (draws, n): draws of the first n residuals' noise, whose scores do (Huber, Robust Statistics
-        (1981)).
+        Of residuals that are white noise of this mean square S is mean J'J; where, of the first n,
+        those of one number in alike (n,) are one value, mean A'A, their rows of J summed. cluster (n,):
+        stretches of the first n residuals within which they are correlated; the stretches are
+        independent, and the scatter of their scores gives S (Liang, Zeger, Biometrika 73 (1986)
+        13). noise (draws, n): draws of the first n residuals' noise, whose scores do (Huber, Robust
+        Statistics (1981)).
         """
         J = smooth_jacobian(self.fun, self.x)
         inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
@@ -55,9 +59,11 @@ class Minimum:
             moved = noise @ J[: noise.shape[1]] @ inverse
             return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
         if cluster is None:
-            return np.asarray(inverse * self.mean)
+            n = 0 if alike is None else len(alike)
+            whole = J if alike is None else np.vstack([_sums(J[:n], alike), J[n:]])
+            return np.asarray(self.mean * (whole @ inverse).T @ (whole @ inverse))
         pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
-        moved = np.column_stack([np.bincount(cluster, column) for column in pull.T]) @ inverse
+        moved = _sums(pull, cluster) @ inverse
         count = len(moved)
         spare = count / max(count - len(self.x), 1)
         wider = spare * moved.T @ moved
@@ -65,6 +71,11 @@ class Minimum:
         if count <= 2 * len(self.x):
             wider = spare**2 * (wider + inverse * self.mean)
         return np.asarray(wider, dtype=np.float64)
+
+
+def _sums(rows: Array, of: IntArray) -> Array:
+    """Sums (groups, k) of the rows (n, k) of each group, whose number is in `of` (n,)."""
+    return np.column_stack([np.bincount(of, column) for column in rows.T])
 
 
 def gauss_newton(

@@ -27,7 +27,13 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     mechanical,
 )
-from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted, ways_of
+from identification.estimation.regression.force_terms import (
+    ForceFit,
+    Lateness,
+    fewest_terms,
+    fitted,
+    ways_of,
+)
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import settled_rows, usual_fastest
 from identification.estimation.regression.weighted_rows import (
@@ -40,6 +46,7 @@ from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAM
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
+from identification.signals.weak_form import WeakWindows
 from identification.thresholds import HALF
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
@@ -141,7 +148,8 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    rows = [one.rows for one in settled_rows(recorded.logs)]
+    made = settled_rows(recorded.logs)
+    rows = [one.rows for one in made]
     up, down = ways_of(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
@@ -149,7 +157,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
             f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
             " directions"
         )
-    return fewest_terms(rows), rows
+    return fewest_terms(rows, _lateness([one.windows for one in made], recorded)), rows
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
@@ -162,7 +170,18 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
     if way is None or len(up) < FEWEST_COMPARED:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
-    return _made(fitted(data, ONE_WAY[way]), data, recorded, why)
+    late = _lateness([one.sliding.at(np.flatnonzero(one.up == way)) for one in moved], recorded)
+    return _made(fitted(data, ONE_WAY[way], late), data, recorded, why)
+
+
+def _lateness(windows: Sequence[WeakWindows], recorded: RecordedLogs) -> Lateness | None:
+    """How unsure the instants of a measured force are in these windows; a motor's are those of its
+    command."""
+    if recorded.held:
+        return None
+    logged = zip(windows, recorded.plain, strict=True)
+    rate = np.concatenate([w.first @ np.asarray(log["F"]) for w, log in logged])
+    return Lateness(rate, recorded.instant_sd)
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:

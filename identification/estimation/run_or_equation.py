@@ -125,16 +125,16 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
-    # Of a run that is not followed, windows may identify next to nothing.
-    if surer or not fit.adequate:
+    # Windows may identify next to nothing: where they do not follow, or a measured force drifts.
+    if surer or _identified(fit) < len(FIVE):
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
         if left is None and other is not None and is_no_run(other.chi_square):
             other = None  # of few rows, of which far more than noise is left
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
-            fit = replace(other, adequate=fit.adequate)
-    else:
-        fit = likeliest(fit, recorded)
+            other = replace(other, adequate=fit.adequate)
+            return other if left is None else _unless_unexplained(other, left)
+    fit = likeliest(fit, recorded)
     return fit if left is None else _unless_unexplained(fit, left)
 
 

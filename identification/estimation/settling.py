@@ -48,6 +48,9 @@ from identification.thresholds import ADEQUATE
 # Relative deviations that the force between its samples adds where it drives the run (where it
 # corrects one, so much less as its gain squared), by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
+# Of a motor, whose stops come and go with the steps of its command, OF_STEPS of it, from clean
+# motors behind encoders of 500 to 8000 counts (tests/identification/estimation/test_counted.py).
+OF_STEPS = 0.1
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
 
 # What stops that come and go, in steps of the likelihood, add to deviations over whole runs; for
@@ -174,7 +177,8 @@ def between_samples_sd(
     """Deviations (d,) of values that the force between its samples adds, as far as it drives: of
     that part, by default as a run is driven."""
     gain = max(one.noise.corrected for one in recorded.logs)
-    part = of if of is not None else 1.0 if recorded.drive == "force" else gain**2
+    least = OF_STEPS if recorded.held else gain**2
+    part = of if of is not None else 1.0 if recorded.drive == "force" else least
     return np.asarray(part * np.array([BETWEEN.get(name, 0.0) for name in names]) * np.abs(values))
 
 

@@ -73,9 +73,9 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
-    if recorded.by_command:
-        return fit
-    if recorded.drive == "force" and fit.adequate and not fit.imposed:
+    if recorded.by_command or (fit.imposed and not recorded.held):
+        return fit  # the equation of a measured force has an unknown instant beside it
+    if recorded.drive == "force" and fit.adequate:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
     rate = np.zeros(len(FIVE))

@@ -21,6 +21,7 @@ STRETCH, GROUPS = 25, 8  # samples whose noise is one value, and groups of these
 QUICK_GROUP = 2  # groups from the fastest, whose speed decides whether the jitter matters
 WEIGHINGS = 4  # in which the weights of the line converge
 LEAST_OF_SQUARE = 0.05  # of a group's square, as which the line counts there at least
+OF_HALF_A_COUNT = 64.0 / 21.0  # of white noise, what counting leaves at half a count a sample
 
 
 class PositionNoise(NamedTuple):
@@ -42,8 +43,13 @@ def position_noise(y: Array, v: Array) -> PositionNoise | None:
     speed = np.mean(np.asarray(v)[whole].reshape(count, STRETCH) ** 2, axis=1)
     groups = np.array_split(np.argsort(speed), GROUPS)
     x = np.array([np.mean(speed[one]) for one in groups])
-    # An encoder's counts are as coarse in slow motion, where they seldom change.
-    z = np.maximum([np.median(power[one]) for one in groups], resolution(y) ** 2 / 12.0)
+    # An encoder's counts are as coarse in slow motion, where they seldom change; slower than one a
+    # sample they are no white noise.
+    of_count = resolution(y)
+    each = np.diff(y[: count * STRETCH + 1 : STRETCH]) / STRETCH
+    slow = np.array([np.mean(each[one] ** 2) < of_count**2 for one in groups])
+    least = np.where(slow, OF_HALF_A_COUNT, 1.0) * of_count**2 / 12.0
+    z = np.maximum([np.median(power[one]) for one in groups], least)
     if not np.all(z > 0.0):
         return None
     X, line = np.column_stack([np.ones(GROUPS), x / max(float(x[-1]), 1e-300)]), z

@@ -51,20 +51,42 @@ class ForceFit:
         return dict(zip((FIVE[i] for i in self.used), spread, strict=True))
 
 
+@dataclass(frozen=True, eq=False)
+class Lateness:
+    """How unsure the instant is at which a logged force acts: what a delay of 1 s would take from
+    the rows, (r,) [N/s], and the deviation of that delay [s] before anything is fitted.
+
+    F(t - lag) = F - lag F' to first order. A lag of part of a sample shows as damping, m w^2 lag
+    in motion of w [rad/s]; as an unknown of normal prior it widens what it is confounded with, and
+    no more than the rows leave it open. Source: Robinson, Statistical Science 6 (1991) 15.
+    """
+
+    rate: Array
+    sd: float
+
+    def beside(self, columns: Array, weight: Array, variance: float) -> Array:
+        """Weighted columns (r, k) with that of the delay, and its prior as one more row, in units
+        of the rows' variance: (r + 1, k + 1)."""
+        out = np.zeros((len(columns) + 1, columns.shape[1] + 1))
+        out[:-1, :-1], out[:-1, -1] = columns, weight * self.rate
+        out[-1, -1] = variance**0.5 / self.sd
+        return out
+
+
 def ways_of(rows: Sequence[Rows]) -> tuple[int, int]:
     """Windows in which the body mostly moves up, and down."""
     up = sum(int(np.count_nonzero(part.X[:, 1] > 0.5)) for part in rows)
     return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
 
 
-def fewest_terms(data: Sequence[Rows]) -> ForceFit:
+def fewest_terms(data: Sequence[Rows], late: Lateness | None = None) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
     than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
     the levels are as uncertain as beside viscous friction that is left out, where these logs
     separate the two."""
-    every = [fitted(data, used) for used in COLUMN_SETS]
+    every = [fitted(data, used, late) for used in COLUMN_SETS]
     rows = stacked(data)
     rubs = _rubs(every[-1], rows.b)
     fits = [one for one in every if _may_be(one) and (1 in one.used or rubs)]
@@ -109,8 +131,10 @@ def predicts_as_much(left: float, least: float) -> bool:
     return left <= WORSE * least
 
 
-def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
-    """Weighted least squares of these columns.
+def fitted(
+    data: Sequence[Rows], used: tuple[int, ...], late: Lateness | None = None
+) -> ForceFit:
+    """Weighted least squares of these columns, beside the instant of the force where it is unsure.
 
     Sources: Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; independent samples among correlated
     ones, Bayley, Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184.
@@ -126,11 +150,16 @@ def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     independent = effective_samples([part for part in parts if len(part) > 8])
     square = float(np.mean((weight * residual) ** 2))
     variance = square * len(residual) / max(independent - len(used), 1.0)
+    if late is not None:
+        chosen = late.beside(chosen, weight, variance)
+        theta = least_squares(chosen, np.append(weight * force, 0.0))[: len(used)]
+        residual = force - columns @ theta
     inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / max(np.std(force), 1e-300)
     return ForceFit(
         used=used,
         theta=theta,
-        covariance=inverse_of_gram(chosen) * variance + np.diag((OF_EQUATION * theta) ** 2),
+        covariance=inverse_of_gram(chosen)[: len(used), : len(used)] * variance
+        + np.diag((OF_EQUATION * theta) ** 2),
         residuals=parts,
         rms=rms(residual),
         relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),

@@ -246,7 +246,8 @@ def refit(
         if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
         cluster = _windows(logs, drive) if drifts else None
-        return factor * inside.covariance(cluster, noise) * np.outer(size, size)
+        covariance = inside.covariance(cluster, noise, _counts(logs, drive))
+        return factor * covariance * np.outer(size, size)
 
     names = tuple(unknowns.names[i] for i in unknowns.at)
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)
@@ -342,6 +343,19 @@ def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | Non
             return None
         parts.append(np.array([soft(r.ravel()) for r in draws if r is not None]))
     return np.concatenate(parts, axis=1)
+
+
+def _counts(logs: Sequence[MotionLog], drive: Drive) -> IntArray:
+    """Numbers of the errors over all logs, (n,), the same of those that are one: of a position while
+    it stands on one count of its encoder."""
+    parts, count = [], 0
+    for one in logs:
+        n = len(one.log)
+        y = np.cumsum(np.diff(np.asarray(one.log["y"]), prepend=np.nan) != 0.0)
+        others = np.arange(0 if one.is_forced(drive) else n) + y[-1] + 1
+        parts.append(np.concatenate([y, others]) + count)
+        count = int(parts[-1][-1]) + 1
+    return np.concatenate(parts)
 
 
 def _windows(logs: Sequence[MotionLog], drive: Drive) -> IntArray:

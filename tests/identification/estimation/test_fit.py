@@ -1,5 +1,6 @@
 """The nine-parameter fit on logs of known plants, and its honesty where a log is silent."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 from typing import Any
@@ -13,11 +14,12 @@ from identification.estimation import fit as fitting
 from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
+from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.run_or_equation import LeftOfEquation, left_by
 from identification.estimation.structure_fit import FittedStructure, plain_structure
 from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Log, Rig
-from identification.model.estimates import KarnoppFit, LogFit
+from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.identification.motor_logs import K_A, NINE, made
@@ -228,22 +230,29 @@ class Told:
     adequate: bool
     name: str
     logs: tuple[LogFit, ...]
+    estimates: Mapping[str, Estimate]
     effects: tuple[()] = ()
 
 
-@pytest.mark.parametrize(("adequate", "left", "by"), [
-    (True, 2.0, "equation"),  # more than 1 % of the Coulomb level beyond it
-    (True, 1.02, "run"),
-    (False, 2.0, "equation"),
+@pytest.mark.parametrize(("adequate", "left", "identified", "by"), [
+    (True, 2.0, 5, "equation"),  # more than 1 % of the Coulomb level beyond it
+    (True, 1.02, 5, "run"),
+    (False, 2.0, 5, "equation"),
+    (True, 1.02, 3, "equation"),  # a noisy force leaves the run's friction open
 ])  # fmt: skip
 def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
-    monkeypatch: pytest.MonkeyPatch, adequate: bool, left: float, by: str
+    monkeypatch: pytest.MonkeyPatch, adequate: bool, left: float, identified: int, by: str
 ) -> None:
     """Where the run is followed to the noise, nothing is missing beside the equation's numbers."""
     log = made_log(table(1), seconds=0.5)
     near = LogFit("made", (0.0, 0.0, 0.0), 1e-9, None, 1.0)
-    run: Any = Told(table(1), adequate, "run", (near,))
-    other = replace(run, adequate=False, name="equation")
+    known, open_ = Estimate(1.0, "N", 0.05, 0.9, 1.1), Estimate(None, "N", reason="drifts")
+    every = {name: known for name in FIVE}
+    run: Any = Told(
+        table(1), adequate, "run", (near,),
+        {name: known if i < identified else open_ for i, name in enumerate(FIVE)},
+    )  # fmt: skip
+    other = replace(run, adequate=False, name="equation", estimates=every)
     recorded: Any = SimpleNamespace(plain=[log], logs=())
     monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)

@@ -48,6 +48,19 @@ def test_the_covariance_is_that_of_noise(fun: Callable[[Array], Array]) -> None:
     np.testing.assert_allclose(spread, np.sqrt(np.diag(expected)), rtol=0.1)
 
 
+def test_residuals_that_are_one_value_count_once() -> None:
+    """As the errors of a position are that stands on one count of its encoder; the covariance is
+    that of drawn noise of which each value stays for four residuals."""
+    alike = np.repeat(np.arange(100), 4)
+    of_stretches = RNG.standard_normal((4000, 100))[:, alike]
+    half = np.hstack([of_stretches[:, :200], RNG.standard_normal((4000, 200))])
+    found = Minimum(smooth, AT, 1.0)
+    for noise, numbers in ((of_stretches, alike), (half, alike[:200])):
+        wide = np.sqrt(np.diag(found.covariance(noise=noise)))
+        spread = np.sqrt(np.diag(found.covariance(alike=numbers)))
+        np.testing.assert_allclose(spread, wide, rtol=0.1)
+
+
 def test_a_descent_comes_down_from_far_and_halted_keeps_what_it_has() -> None:
     t = np.linspace(0.0, 1.0, 400)
     left = [1000]

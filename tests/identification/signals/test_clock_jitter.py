@@ -42,6 +42,13 @@ def test_an_even_clock_has_none(h: float, count: float) -> None:
         assert position_noise(*swinging(h, 0.0, seed, count)) is None
 
 
+@pytest.mark.parametrize("count", [4e-4, 1e-3])
+def test_counts_slower_than_one_a_sample_are_no_jitter(count: float) -> None:
+    """Half a count a sample leaves three times what white noise of a count would."""
+    for seed in range(5):
+        assert position_noise(*swinging(5e-4, 0.0, seed, count)) is None
+
+
 def test_beside_coarse_counts_a_slight_jitter_is_of_no_account() -> None:
     assert position_noise(*swinging(1e-3, 1e-6, 0, count=2e-5)) is None
 
