@@ -16,7 +16,7 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     mechanical,
 )
-from identification.estimation.regression.force_terms import fewest_terms
+from identification.estimation.regression.force_terms import Lateness, fewest_terms
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import NOISE_ROUNDS
 from identification.estimation.regression.standstill import breakaways
@@ -65,7 +65,7 @@ def axis_equation(log: Log, rig: Rig) -> AxisEquation:
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
     rows = _converged(one)
-    fit = fewest_terms([rows])
+    fit = fewest_terms([rows], None if one.held else Lateness.of([one.sliding], [log]))
     names = [FIVE[k] for k in fit.used]
     values = dict(zip(names, fit.theta.tolist(), strict=True))
     levels = np.array([values.get(name, 0.0) for name in ("F_cp", "F_cn")])

@@ -47,11 +47,11 @@ class Minimum:
         """Of x, (k, k): the sandwich (J'J)^-1 S (J'J)^-1, S the covariance of the scores J'r.
 
         Of residuals that are white noise of this mean square S is mean J'J; where, of the first n,
-        those of one number in alike (n,) are one value, mean A'A, their rows of J summed. cluster (n,):
-        stretches of the first n residuals within which they are correlated; the stretches are
-        independent, and the scatter of their scores gives S (Liang, Zeger, Biometrika 73 (1986)
-        13). noise (draws, n): draws of the first n residuals' noise, whose scores do (Huber, Robust
-        Statistics (1981)).
+        those of one number in alike (n,) are one value, mean A'A, their rows of J summed in A.
+        cluster (n,): stretches of the first n residuals within which they are correlated; the
+        stretches are independent, and the scatter of their scores gives S (Liang, Zeger, Biometrika
+        73 (1986) 13). noise (draws, n): draws of the first n residuals' noise, whose scores do
+        (Huber, Robust Statistics (1981)).
         """
         J = smooth_jacobian(self.fun, self.x)
         inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)

@@ -46,7 +46,6 @@ from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAM
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
-from identification.signals.weak_form import WeakWindows
 from identification.thresholds import HALF
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
@@ -157,7 +156,8 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
             f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
             " directions"
         )
-    return fewest_terms(rows, _lateness([one.windows for one in made], recorded)), rows
+    late = None if recorded.held else Lateness.of([one.windows for one in made], recorded.plain)
+    return fewest_terms(rows, late), rows
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
@@ -170,18 +170,9 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
     if way is None or len(up) < FEWEST_COMPARED:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
-    late = _lateness([one.sliding.at(np.flatnonzero(one.up == way)) for one in moved], recorded)
+    windows = [one.sliding.at(np.flatnonzero(one.up == way)) for one in moved]
+    late = None if recorded.held else Lateness.of(windows, recorded.plain)
     return _made(fitted(data, ONE_WAY[way], late), data, recorded, why)
-
-
-def _lateness(windows: Sequence[WeakWindows], recorded: RecordedLogs) -> Lateness | None:
-    """How unsure the instants of a measured force are in these windows; a motor's are those of its
-    command."""
-    if recorded.held:
-        return None
-    logged = zip(windows, recorded.plain, strict=True)
-    rate = np.concatenate([w.first @ np.asarray(log["F"]) for w, log in logged])
-    return Lateness(rate, recorded.instant_sd)
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:

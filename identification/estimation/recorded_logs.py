@@ -14,6 +14,7 @@ from identification.estimation.regression.equation_rows import (
     actuator,
     integral,
 )
+from identification.estimation.regression.force_terms import unseen_lag
 from identification.estimation.regression.held_command import (
     UNSEEN,
     between_samples,
@@ -36,7 +37,7 @@ from identification.progress import Halt
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
 from identification.signals.thin import at_needed_rate
-from identification.thresholds import FAR_LESS, WORSE
+from identification.thresholds import WORSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +89,8 @@ class RecordedLogs:
     def instant_sd(self) -> float:
         """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
         share above, of a measured one as likely anywhere up to where its lag would be seen."""
-        samples = self.share_sd if self.held else FAR_LESS / 3.0**0.5
-        return samples * self.logs[0].log.h
+        h = self.logs[0].log.h
+        return self.share_sd * h if self.held else unseen_lag(h)
 
     @property
     def moved(self) -> tuple[int, int]:

@@ -51,13 +51,15 @@ class Motion:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """What a position's spectrum says: `noise` [m] (white, one sigma), `cutoff` [Hz] to smooth at.
+    """What a position's spectrum says: `noise` [m] (one sigma), `cutoff` [Hz] to smooth at.
 
-    `cutoff` is twice the frequency where signal and noise are equal, at most `MOST_CUTOFF`.
+    `cutoff` is twice the frequency where signal and noise are equal, at most `MOST_CUTOFF`; below
+    it the noise is as that of a white one of deviation `slow` [m].
     """
 
     noise: float
     cutoff: float
+    slow: float
 
 
 def spectrum(y: Array, h: float) -> Spectrum:
@@ -65,7 +67,9 @@ def spectrum(y: Array, h: float) -> Spectrum:
 
     y: position [m], shape (n,); h: period [s]. The third difference whitens the spectrum of a
     motion (its acceleration jumps at a reversal); white noise then has the known shape
-    (2 sin(w/2))^6, fitted to the upper half of the band. Raises BadLog below 64 samples.
+    (2 sin(w/2))^6, fitted to the upper half of the band. An encoder's counts that come every T
+    samples are noise sampled so seldom: all of it lies in a T-th of the band, in which it is T
+    times as dense (Bennett, Bell Syst. Tech. J. 27 (1948) 446). Raises BadLog below 64 samples.
     """
     n = _checked(y)
     size = min(2048, 1 << int(np.log2(n // 4)))
@@ -79,10 +83,17 @@ def spectrum(y: Array, h: float) -> Spectrum:
     low = 1.0 - 2.0 / (9.0 * degrees)
     floor = float(np.median(ratio[f > 0.25])) / low**3
     # At rest a counted position shows no noise at all, and yet is off by a part of its step.
-    floor = max(floor, 2.0 * resolution(y) ** 2 / 12.0)
-    above = np.flatnonzero(_smooth(ratio) > 2.0 * floor)
-    cut = float(f[above[-1]]) if len(above) else float(f[0])
-    return Spectrum(float(np.sqrt(floor / 2.0)), min(CUTOFF_MARGIN * cut, MOST_CUTOFF) / h)
+    of_count = 2.0 * resolution(y) ** 2 / 12.0
+    floor, slow = max(floor, of_count), max(floor, of_count * _between_counts(y))
+    above = np.flatnonzero(_smooth(ratio) > 2.0 * slow)
+    cut = min(CUTOFF_MARGIN * float(f[above[-1] if len(above) else 0]), MOST_CUTOFF)
+    return Spectrum(float(np.sqrt(floor / 2.0)), cut / h, float(np.sqrt(slow / 2.0)))
+
+
+def _between_counts(y: Array) -> float:
+    """Samples from one change of a position to the next: the median, which rests do not move."""
+    changes = np.flatnonzero(np.diff(y))
+    return float(np.median(np.diff(changes))) if len(changes) > 1 else 1.0
 
 
 def is_long_enough(y: Array) -> bool:
@@ -142,7 +153,7 @@ def differentiate(
         a = np.gradient(v, h, edge_order=2)
     else:
         smooth, v, a = (_local(y, h, cut, order) for order in (0, 1, 2))
-    v_noise = found.noise * _velocity_gain(h, cut, method)
+    v_noise = found.slow * _velocity_gain(h, cut, method)
     return Motion(smooth, v, a, cut, found.noise, v_noise, edge)
 
 

@@ -20,8 +20,10 @@ from identification.estimation.regression.weighted_rows import (
     left_unseen,
     stacked,
 )
+from identification.log import Log
 from identification.model.estimates import NORMAL_95
-from identification.thresholds import HALF, WORSE
+from identification.signals.weak_form import WeakWindows
+from identification.thresholds import FAR_LESS, HALF, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS = (1, 2)
@@ -51,6 +53,11 @@ class ForceFit:
         return dict(zip((FIVE[i] for i in self.used), spread, strict=True))
 
 
+def unseen_lag(h: float) -> float:
+    """Deviation [s] of the instant at which a force measured every h [s] acts, by itself. Ours."""
+    return FAR_LESS * h / float(np.sqrt(3.0))
+
+
 @dataclass(frozen=True, eq=False)
 class Lateness:
     """How unsure the instant is at which a logged force acts: what a delay of 1 s would take from
@@ -63,6 +70,16 @@ class Lateness:
 
     rate: Array
     sd: float
+
+    @classmethod
+    def of(cls, windows: Sequence[WeakWindows], logs: Sequence[Log]) -> "Lateness":
+        """Of a measured force [N] in the windows of each log: as likely anywhere up to where a lag
+        would be taken out (Gautier, Khalil 1988; `surroundings`)."""
+        pairs = zip(windows, logs, strict=True)
+        return cls(
+            np.concatenate([w.first @ np.asarray(log["F"]) for w, log in pairs]),
+            unseen_lag(logs[0].h),
+        )
 
     def beside(self, columns: Array, weight: Array, variance: float) -> Array:
         """Weighted columns (r, k) with that of the delay, and its prior as one more row, in units
@@ -131,9 +148,7 @@ def predicts_as_much(left: float, least: float) -> bool:
     return left <= WORSE * least
 
 
-def fitted(
-    data: Sequence[Rows], used: tuple[int, ...], late: Lateness | None = None
-) -> ForceFit:
+def fitted(data: Sequence[Rows], used: tuple[int, ...], late: Lateness | None = None) -> ForceFit:
     """Weighted least squares of these columns, beside the instant of the force where it is unsure.
 
     Sources: Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; independent samples among correlated

@@ -51,13 +51,10 @@ def first_estimate(one: MotionLog) -> FirstEstimate:
     motion = differentiate(log["y"], log.h)
     moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
     fastest = float(np.quantile(np.abs(motion.v), FASTEST_QUANTILE))
-    if (
-        fastest <= FASTER_MOVES * motion.v_noise
-        or float(np.std(log["y"])) < NO_MOTION * motion.noise
-    ):
+    if float(np.std(log["y"])) < NO_MOTION * motion.noise:
         raise NotIdentifiable(
-            f"{log.name}: no motion above the noise of the velocity ({motion.v_noise:.3g} m/s);"
-            " record a run in which the body moves"
+            f"{log.name}: no motion above the noise of the position ({motion.noise:.3g}"
+            f" {'rad' if one.rotary else 'm'}); record a run in which the body moves"
         )
     force = np.abs(log["F"] - np.mean(log["F"]))
     level = float(np.quantile(force, 0.9))

@@ -346,8 +346,8 @@ def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | Non
 
 
 def _counts(logs: Sequence[MotionLog], drive: Drive) -> IntArray:
-    """Numbers of the errors over all logs, (n,), the same of those that are one: of a position while
-    it stands on one count of its encoder."""
+    """Numbers of the errors over all logs, (n,), the same of those that are one: of a position
+    while it stands on one count of its encoder."""
     parts, count = [], 0
     for one in logs:
         n = len(one.log)
