@@ -143,3 +143,17 @@ def test_a_cutoff_outside_the_band_is_refused(cutoff: float) -> None:
 def test_a_short_log_is_refused() -> None:
     with pytest.raises(BadLog, match="20 samples"):
         differentiate(np.zeros(20), h)
+
+
+@pytest.mark.parametrize(("counts", "rate"), [(200, 0.3), (500, 0.1), (500, 0.3), (2000, 0.1)])
+def test_counts_that_come_seldom_are_noise_below_the_cut_off_too(counts: int, rate: float) -> None:
+    """A swing of 1 rad behind so many counts a turn, one count in some ten samples: as white noise
+    of a count they left a cut-off of 40 to 390 Hz, and a speed that was all noise."""
+    h, step = 1e-3, 2.0 * np.pi / counts
+    t = h * np.arange(20_000)
+    w = 2.0 * np.pi * rate
+    motion = differentiate(step * np.round(np.sin(w * t) / step), h)
+    off = motion.v - w * np.cos(w * t)
+    assert np.sqrt(np.mean(off**2)) < 0.03 * w
+    assert np.sqrt(np.mean(off**2)) < 2.0 * motion.v_noise < 0.1 * w
+    assert motion.noise == pytest.approx(step / 12**0.5, rel=0.1)
