@@ -53,6 +53,7 @@ from identification.thresholds import (
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
 FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
+ABOUT_ITS_ROW = 0.5  # samples, to either side, in which a force that is held over its period acts
 OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
@@ -138,12 +139,12 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if looked is None:
         return NO_SURROUNDINGS
     found, used = looked
-    lag, sampled = _lag(found, used), False
+    lag, sampled = _lag(found, used, held), False
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
         current = _squares(moved, found.lags, turns, False, known) or found
-        other = _lag(current, used)
+        other = _lag(current, used, held)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
     h = logs[0].h
@@ -307,8 +308,8 @@ def apart(lag: float) -> bool:
     return abs(lag) >= FAR_LESS
 
 
-def _lag(found: _Squares, used: Sequence[int]) -> Size:
-    """The lag in samples, nothing where none shows beyond doubt."""
+def _lag(found: _Squares, used: Sequence[int], held: bool) -> Size:
+    """The lag in samples, nothing where none shows beyond doubt; held: of a motor's command."""
     left, theta = found.left(found.every, used)
     best = int(np.argmin(left))
     none = int(np.argmin(np.abs(found.lags)))
@@ -318,7 +319,9 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     if without <= OF_EQUATION**2 * float(np.sum(found.force[:, none])):
         return NOT_SHOWN  # in what the equation errs itself, a lag and inertia look alike
     lag = _lowest(found.lags, left)
-    if not apart(lag) or not explains(without, float(left[best])):
+    # A measured force is of any instant about its row: a lag within that need explain nothing.
+    about = not held and abs(lag) <= ABOUT_ITS_ROW
+    if not (about or apart(lag) and explains(without, float(left[best]))):
         return NOT_SHOWN
     each = left_out(
         found.blocks, lambda kept: np.asarray(_lowest(found.lags, found.left(kept, used)[0]))
