@@ -129,5 +129,7 @@ def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress)
         plant = Plant(fit.friction, fit.actuator)
         with recorded.halt.closing():
             left = misfit(plant, recorded.logs, recorded.drive)
+        # Numbers of largest likelihood may lose a stop that the run itself has followed.
+        left = min(left, fit.chi_square) if fit.adequate else left
         model = replace(model, plant=plant, misfit=left)
     return replace(plain, model=model)

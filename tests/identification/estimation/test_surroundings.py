@@ -24,12 +24,18 @@ TURNING = Rig("force", motion="rotary")
 MOTOR = Rig("motor", force_per_command=K_A)
 
 
-def pendulum(seed: int, a: float, b: float = 0.0, seconds: float = 20.0) -> Log:
+PULLS = ((0.25, 1.6), (0.6, 1.2), (1.3, 0.8))  # Hz, N m
+QUICK = ((0.3, 0.8), (3.0, 1.0), (8.0, 1.0))
+
+
+def pendulum(
+    seed: int, a: float, b: float = 0.0, seconds: float = 20.0,
+    pulls: tuple[tuple[float, float], ...] = PULLS,
+) -> Log:  # fmt: skip
     """A rod pushed to and fro by a torque that is measured; a sin y + b cos y pulls at it."""
     h = 2e-3
     t = h * np.arange(round(seconds / h), dtype=np.float64)
     rng = np.random.default_rng(seed)
-    pulls = ((0.25, 1.6), (0.6, 1.2), (1.3, 0.8))
     waves = [size * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f, size in pulls]
     F = np.sum(waves, axis=0)
     blank = Log("rod", {"t": t, "y": np.zeros(len(t)), "F": F})
@@ -92,6 +98,18 @@ def test_columns_of_two_instants_are_found(samples: float) -> None:
     told = lag_estimate(found)
     assert told is not None and told.low is not None and told.high is not None
     assert told.low < told.high
+
+
+@pytest.mark.parametrize("samples", [-0.5, -0.25, 0.25, 0.5])
+def test_a_measured_force_may_act_anywhere_within_its_sample(samples: float) -> None:
+    """As a torque that is held over its period does: left in, it was damping, another one in every
+    motion, and a machine that stays as it is had drifted."""
+    log = pendulum(3, 0.0, pulls=QUICK)
+    at = np.arange(len(log))
+    late = log.with_signals(F=np.interp(at + samples, at, log["F"]))
+    found = surroundings([late], TURNING)
+    assert found.lag.value == pytest.approx(samples * log.h, abs=4.0 * found.lag.sd)
+    assert 0.0 < found.lag.sd < 0.1 * log.h
 
 
 def test_no_lag_is_sought_that_is_much_of_a_stroke() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import pytest
 from identification.effects._library import built_in
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure
+from identification.tracing import structure_search
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.regression.stepwise import Choice, choose
-from identification.tracing.structure_search import likelier
+from identification.tracing.structure_search import likelier, settled_plain
 from tests.identification.motor_logs import made, plant, seen
 from tests.identification.tracing.settings import setting_of
 
@@ -72,3 +74,21 @@ def test_a_searched_parameter_has_the_deviation_of_its_likelihood() -> None:
     (acting,) = found.plant.effects
     sd = found.sd["cogging.period"]
     assert 0.0 < sd < 1e-5 and abs(acting.values["period"] - 0.012) < 4.0 * sd
+
+
+@pytest.mark.parametrize(("adequate", "left"), [(True, 1.0), (False, 4.0)])
+def test_what_follows_with_the_runs_numbers_lacks_nothing_with_likelier_ones(
+    monkeypatch: pytest.MonkeyPatch, adequate: bool, left: float
+) -> None:
+    """Those of largest likelihood lost a stop that the run had followed, and a machine that lacks
+    nothing had an effect that nobody knows."""
+    setting, _ = spring()
+    p = plant()
+    fit = SimpleNamespace(
+        friction=p.friction, actuator=p.actuator, adequate=adequate, chi_square=1.0,
+        drive=setting.drive, imposed=False,
+    )  # fmt: skip
+    monkeypatch.setattr(structure_search, "finished", lambda *_: fit)
+    monkeypatch.setattr(structure_search, "misfit", lambda *_: 4.0)
+    found = settled_plain(setting.plain, np.random.default_rng(0), lambda *_: None)
+    assert found.model.misfit == left
