@@ -13,9 +13,10 @@ mean square in units of the sensors' noise.
 # samples of a log (blind.py: single, removed; chapters.py; real.py).
 EARNS = 0.8  # left at most by whatever joins a model: an effect, gravity, a lag, another level
 HALF = 0.5  # left at most by what explains most; of a turn, in which neighbouring orders differ;
-# of a value, the half width of its interval up to which it is identified
+# of a value, the half width of its interval up to which it is identified; of a sample, to either
+# side of its row, in which a measured force acts
 FAR_LESS = 0.3  # left at most by another law of the same: two masses for one, a bristle; of a
-# sample, from which force and motion are not of one instant
+# sample, from which a motor's command and its motion are not of one instant
 OF_ACCOUNT = 0.1  # less of what is missing, or of all, is of no account
 NEARLY_ALL = 1.0 - OF_ACCOUNT  # chance with which a test alarms that is to find a change
 MATERIAL = 0.01  # of the Coulomb level, of a value, of an equation's square: the least reported

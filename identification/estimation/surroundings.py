@@ -53,7 +53,6 @@ from identification.thresholds import (
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
 LAG = 12.0  # samples, up to which they are
 FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
-ABOUT_ITS_ROW = 0.5  # samples, to either side, in which a force that is held over its period acts
 OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
@@ -320,8 +319,8 @@ def _lag(found: _Squares, used: Sequence[int], held: bool) -> Size:
         return NOT_SHOWN  # in what the equation errs itself, a lag and inertia look alike
     lag = _lowest(found.lags, left)
     # A measured force is of any instant about its row: a lag within that need explain nothing.
-    about = not held and abs(lag) <= ABOUT_ITS_ROW
-    if not (about or apart(lag) and explains(without, float(left[best]))):
+    about = not held and abs(lag) <= HALF
+    if not (about or (apart(lag) and explains(without, float(left[best])))):
         return NOT_SHOWN
     each = left_out(
         found.blocks, lambda kept: np.asarray(_lowest(found.lags, found.left(kept, used)[0]))

@@ -23,7 +23,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Log
 from identification.model.estimates import NORMAL_95
 from identification.signals.weak_form import WeakWindows
-from identification.thresholds import FAR_LESS, HALF, WORSE
+from identification.thresholds import HALF, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS = (1, 2)
@@ -54,8 +54,9 @@ class ForceFit:
 
 
 def unseen_lag(h: float) -> float:
-    """Deviation [s] of the instant at which a force measured every h [s] acts, by itself. Ours."""
-    return FAR_LESS * h / float(np.sqrt(3.0))
+    """Deviation [s] of the instant at which a force measured every h [s] acts: anywhere within half
+    a sample of its row. Ours."""
+    return HALF * h / float(np.sqrt(3.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +74,7 @@ class Lateness:
 
     @classmethod
     def of(cls, windows: Sequence[WeakWindows], logs: Sequence[Log]) -> "Lateness":
-        """Of a measured force [N] in the windows of each log: as likely anywhere up to where a lag
-        would be taken out (Gautier, Khalil 1988; `surroundings`)."""
+        """Of a measured force [N] in the windows of each log. Source: as of the class."""
         pairs = zip(windows, logs, strict=True)
         return cls(
             np.concatenate([w.first @ np.asarray(log["F"]) for w, log in pairs]),
