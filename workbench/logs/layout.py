@@ -6,21 +6,22 @@ Scopes of PLCs and drives, data loggers and spreadsheets put lines of their own 
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
+from workbench.cards.headers import written_unit
 from workbench.logs.times import is_time
 
 NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 
 _IN_A_ROW = 3  # lines of data that show where it begins
 _DATA_SHARE = 0.5  # of a line's fields above which numbers and times make it a line of data
-_UNIT_CELL = re.compile(
-    r"[\[(<].{0,20}[\])>]|[mµun]?[sm]|min|h|cm|km|inch?|deg|°|m?rad|rev|inc|"
-    r"(?:[mkM]?(?:Pa|bar|N|V|A|W|g|Hz)|hPa|psi|[mk]?N ?m|lbf?|kgf)|%|-|1|"
-    r"(?:[mµ]?m|deg|rad|rev|inc|°|U)/(?:s|min)(?:\^?2|²)?|rpm|1/min|min-1|°?[CFK]|"
+_UNITS_SHARE, _FEWEST_UNITS = 0.5, 2  # of a line's fields, known as units in one of units
+_TYPE_OR_UNIT = re.compile(
+    r"[\[(<].{0,20}[\])>]|[mkM]?(?:W|g|Hz)|h|[CF]|(?:inc|U)/(?:s|min)(?:\^?2|²)?|"
     r"(?:L?REAL|FLOAT|DOUBLE|U?[SDL]?INT|BOOL|BIT|BYTE|D?WORD|TIME)(?:8|16|32|64)?|"
-    r"double|float|int(?:8|16|32|64)?|seconds?|volts?"
+    r"double|float|int(?:8|16|32|64)?"
 )
 _SCOPE_NAME = "name"
 _SCOPE_ROWS = 3  # of a block of keys, at least
@@ -29,23 +30,28 @@ _SCOPE_TIME = "Time"
 
 @dataclass(frozen=True)
 class Layout:
-    """Names of the columns, none where there is no header, and the first line of data, from 0.
+    """Names of the columns, none where there is no header, None where what stands above the data
+    names another number of columns; the first line of data, from 0; and the units below the names.
 
     `groups` names the group of each column where several columns are times, each of those that
     follow it.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...] | None
     data: int
     groups: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
 
-def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
-    """Where header and data lie in these first lines of a file; None where that is not clear.
+def find_layout(
+    lines: Sequence[Sequence[str]], comments: Mapping[int, Sequence[str]] | None = None
+) -> Layout | None:
+    """Where header and data lie in these first lines of a file; None where no data are seen.
 
-    Empty lists are lines to be skipped. A header is the last line of as many fields as the data
-    have, above a row of units or types if there is one; or the row "Name" of a block in which
-    each line begins with a key, as TwinCAT's Scope writes.
+    Empty lists are lines to be skipped; comments: what they hold behind the sign of a comment. A
+    header is the last line of as many fields as the data have, above a row of units or types if
+    there is one; or the row "Name" of a block in which each line begins with a key, as TwinCAT's
+    Scope writes; or, where no other line stands above the data, the last comment of as many fields.
     """
     # Fields of a line of data: the most frequent number among the last lines.
     counted = Counter(len(line) for line in lines[len(lines) // 2 :] if line)
@@ -53,23 +59,40 @@ def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
     first = _first_data(lines, width)
     if first is None:
         return None
-    above = [line for line in lines[:first] if line]
-    if not above:
-        return Layout((), first)
-    block = list[Sequence[str]]()
-    for line in reversed(above):
-        if not 1 < len(line) <= width or _is_data(line, width):
-            break
-        block.insert(0, line)
-    scope = _scope(block, width)
-    if scope is not None:
-        return Layout(scope[0], first, scope[1])
-    whole = [line for line in block if len(line) == width]
-    if not whole or whole[-1] is not block[-1]:
-        return None
-    while len(whole) > 1 and (_is_units(whole[-1]) or is_mark(whole[-1], whole[-2])):
-        whole.pop()
-    return Layout(tuple(whole[-1]), first)
+    names, units = tuple[str, ...](), tuple[str, ...]()
+    if above := [line for line in lines[:first] if line]:
+        ends = any(line[-1] for line in lines[first:] if len(line) == width)
+        block = list[Sequence[str]]()
+        for line in reversed(above):
+            fitted = [*line, ""] if len(line) == width - 1 and not ends else line
+            fitted = fitted if any(fitted[width:]) else fitted[:width]
+            if not 1 < len(fitted) <= width or _is_data(fitted, width):
+                break
+            block.insert(0, fitted)
+        scope = _scope(block, width)
+        if scope is not None:
+            return Layout(scope[0], first, scope[1])
+        whole = [line for line in block if len(line) == width]
+        if whole and whole[-1] is block[-1]:
+            names, units = _names_and_units(whole)
+    elif noted := [one for k, one in (comments or {}).items() if k < first and len(one) == width]:
+        names, units = _names_and_units(noted)
+        names = () if all(map(is_number, names)) else names
+        above = []
+    return Layout(names if names or not above else None, first, units=units)
+
+
+def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the columns, and their units, of lines as wide as the data, right above these."""
+    whole, units = list(whole), tuple[str, ...]()
+    while len(whole) > 1 and (is_mark(whole[-1], whole[-2]) or _is_units(whole[-1])):
+        below = whole.pop()
+        units = tuple(_bare(one) for one in below) if _is_units(below) else units
+    names, over = whole[-1], whole[-2] if len(whole) > 1 else ()
+    if over and all(names) and len(set(names)) < len(names) and over[0] and not all(over):
+        groups = accumulate(over, lambda group, own: own or group)  # each written once
+        names = [f"{group} {own}" for group, own in zip(groups, names, strict=True)]
+    return tuple(names), units
 
 
 def is_number(field: str) -> bool:
@@ -96,9 +119,20 @@ def _is_data(line: Sequence[str], width: int) -> bool:
     return first and known > _DATA_SHARE * len(filled)
 
 
+def _bare(cell: str) -> str:
+    """A unit without the brackets around it."""
+    return cell.strip().strip("[](){}<>")
+
+
 def _is_units(line: Sequence[str]) -> bool:
+    """Whether a line holds units, or types of the values, and not names."""
     filled = [field for field in line if field]
-    return 2 * len(filled) >= len(line) and all(_UNIT_CELL.fullmatch(field) for field in filled)
+    others = [one for one in filled if written_unit(_bare(one)) is None]
+    known = len(filled) - len(others)
+    said = sum(one == "1" or not is_number(one) for one in filled)
+    if said and known >= max(_FEWEST_UNITS, _UNITS_SHARE * said):
+        return True
+    return 2 * len(filled) >= len(line) and all(map(_TYPE_OR_UNIT.fullmatch, others))
 
 
 def is_mark(line: Sequence[str], above: Sequence[str]) -> bool:

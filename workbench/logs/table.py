@@ -29,7 +29,8 @@ class Table:
     `headed` is false where the file gives no names: then columns go by number alone. `groups`
     names the group of each column where a file holds several, each with a clock of its own; a
     column then also goes by "group/name". `clocks`: the column of a group's clock, where it has a
-    name of its own. `remarks`: which rows were left out, without the name of the file.
+    name of its own. `units`: what a row below the names says, if there is one. `remarks`: which
+    rows were left out, without the name of the file.
     """
 
     names: tuple[str, ...]
@@ -38,6 +39,7 @@ class Table:
     headed: bool = True
     groups: tuple[str, ...] = ()
     clocks: Mapping[str, int] = field(default_factory=dict)
+    units: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
     def column(self, key: str | int, where: str) -> RawColumn:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,22 +52,15 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     text = _decode(path, spec.encoding)
     if blocks := _blocks(text, spec):
         return block_table(path, blocks, spec.decimal or decimal_of(blocks))
-    lines = text[:_EXAMINED].splitlines()
-    start = spec.skip_rows
-    while start < len(lines) and _skipped(lines[start], spec.comment):
-        start += 1
-    lines = lines[start:] if len(text) <= _EXAMINED else lines[start:-1]
-    if not lines:
-        raise BadLog(f"{path}: no rows after line {start}; check skip_rows in the card")
-    looked = [line for line in lines[1:] if not _skipped(line, spec.comment)]
-    marks = _marks(looked[-_COMPARED:], spec)
-    fields = [[] if _skipped(line, spec.comment) else _split(line, marks) for line in lines]
-    if spec.decimal is None and marks.delimiter == ",":
-        refuse_comma_as_both(path, fields)
-    found = find_layout(fields) if spec.header is None else None
-    if found is None:
+    head = _head_of(path, text, spec)
+    if not any(head.fields):
+        raise BadLog(f"{path}: no rows after line {spec.skip_rows}; check skip_rows in the card")
+    lines, fields, marks = head
+    found = _layout(head, spec) if spec.header is None else None
+    if found is None or found.names is None:
         found = _first_line_layout(path, lines, fields, spec)
     names = found.names or tuple(str(k) for k in range(len(fields[found.data])))
+    start = spec.skip_rows
     body = _without_again(_body(text, start + found.data, spec, marks), lines[: found.data])
     if not body.strip():
         raise BadLog(
@@ -83,7 +76,8 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     del text, body  # of a long log a gigabyte
     columns, remarks = _parse(path, content, marks, len(names), first_row)
     headed = bool(found.names)
-    table = Table(names, columns, first_row, headed, found.groups, remarks=remarks)
+    table = Table(names, columns, first_row, headed, found.groups, units=found.units,
+                  remarks=remarks)  # fmt: skip
     rows = fields[found.data : found.data + _COMPARED]
     table = with_whole_seconds(table, rows)
     if found.groups or not headed:
@@ -124,44 +118,77 @@ def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Tabl
 
 
 def _first_line_layout(
-    path: Path, lines: list[str], fields: list[list[str]], spec: FileSpec
+    path: Path, lines: Sequence[str], fields: Sequence[Sequence[str]], spec: FileSpec
 ) -> Layout:
     """The header in the first line, as the card says or because nothing shows where it is.
 
     Raises BadLog where the first line cannot be a header, since the rows have more fields.
     """
-    first, headed = fields[0], spec.header
+    at = next(k for k, line in enumerate(fields) if line)
+    first, headed = fields[at], spec.header
     if headed is None:
-        widths = [len(line) for line in fields[1:_COMPARED] if line]
+        widths = [len(line) for line in fields[at + 1 :][:_COMPARED] if line]
         width = max(set(widths), key=widths.count) if widths else 0
         if len(first) <= 1 and width > 1 and 2 * widths.count(width) >= len(widths):
-            header = next(k for k, line in enumerate(fields) if k and len(line) == width)
+            header = next(k for k, line in enumerate(fields) if k > at and len(line) == width)
             raise BadLog(
-                f"{path}: line {spec.skip_rows + 1} ({lines[0].strip()[:40]!r}) is no header of the"
-                f" {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
+                f"{path}: line {spec.skip_rows + at + 1} ({lines[at].strip()[:40]!r}) is no header"
+                f" of the {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
                 " card's [file], or comment to the sign with which such lines begin"
             )
         headed = not all(map(is_number, first))
-    return Layout(tuple(first) if headed else (), int(headed))
+    return Layout(tuple(first) if headed else (), at + int(headed))
 
 
-def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
-    """The first lines of a text file as fields, by the layout of the last of them.
-
-    For who does not know yet which line is the header. Raises BadLog where the file is not text.
-    """
+def layout_of(path: Path, spec: FileSpec) -> Layout | None:
+    """Where header and data lie in a text file; None where no table of numbers is seen, or several
+    stand one below the other. Raises BadLog where the file is not text."""
+    if holds_blocks(path, spec):
+        return None
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
-    text = _head(path, spec.encoding)
+    return _layout(_head_of(path, _head(path, spec.encoding), spec), spec)
+
+
+def first_lines(path: Path, spec: FileSpec) -> Sequence[Sequence[str]]:
+    """The first lines of a text file as fields. Raises BadLog where the file is not text."""
+    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+    return _head_of(path, _head(path, spec.encoding), spec).fields
+
+
+class _Head(NamedTuple):
+    """The first lines of a text, from that which the card says: as they are, their fields (none of
+    empty lines and comments), and the marks between these."""
+
+    lines: list[str]
+    fields: list[list[str]]
+    marks: _Marks
+
+
+def _head_of(path: Path, text: str, spec: FileSpec) -> _Head:
     lines = text[:_EXAMINED].splitlines()
-    lines = lines if len(text) <= _EXAMINED else lines[:-1]
-    marks = _marks([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
-    rows = [_split(line, marks) for line in lines]
+    lines = (lines if len(text) <= _EXAMINED else lines[:-1])[spec.skip_rows :]
+    skipped = [_skipped(line, spec.comment) for line in lines]
+    looked = [line for line, out in zip(lines, skipped, strict=True) if not out]
+    marks = _marks(looked[1:][-_COMPARED:], spec)
+    fields = [[] if out else _split(line, marks) for line, out in zip(lines, skipped, strict=True)]
     if spec.decimal is None and marks.delimiter == ",":
-        refuse_comma_as_both(path, rows)
-    return rows
+        _refuse_comma_as_both(path, fields)
+    return _Head(lines, fields, marks)
 
 
-def refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
+def _layout(head: _Head, spec: FileSpec) -> Layout | None:
+    """Where header and data lie in these lines."""
+    noted = {}
+    for k, line in enumerate(head.lines if spec.comment else ()):
+        if head.fields[k] and is_number(head.fields[k][0]):
+            break
+        if line.lstrip().startswith(spec.comment):
+            bare = _split(line.lstrip().lstrip(f"{spec.comment} "), head.marks)
+            noted[k] = bare if bare and bare[0] else bare[1:]
+    return find_layout(head.fields, noted)
+
+
+def _refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
     """Raises BadLog where a comma both parts the columns and is the decimal sign of all numbers.
 
     Each row then has twice the fields of the header, all of them whole numbers.

@@ -17,14 +17,13 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
-from workbench.cards.headers import read_header, written_unit
+from workbench.cards.headers import read_header
 from workbench.files import refuse_larger
 from workbench.logs.faulty_rows import numbers_in
-from workbench.logs.layout import is_mark, is_number
-from workbench.logs.packed import TEXT_BYTES, text_bytes
+from workbench.logs.packed import text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
-from workbench.logs.text import first_lines, holds_blocks
+from workbench.logs.text import layout_of
 from workbench.logs.times import seconds
 
 FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
@@ -105,8 +104,6 @@ def _moved(one: RawColumn, own: RawColumn | None, base: RawColumn) -> RawColumn:
     return replace(one, values=values)
 
 
-_BELOW = 5  # rows of numbers by which the first of them is known
-_MOSTLY = 0.5  # share of a row's fields, that are numbers where it is data, or units
 ONE_ROW = 1  # by which vectors of one log may differ in length
 _OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
 _ONLY_NUMBER = ("data", "value")  # of a message that holds one number
@@ -135,26 +132,25 @@ def read_unknown(path: Path) -> UnknownLog:
     file, are found by looking. Raises BadLog, one line, where there are no columns of numbers.
     """
     form = checked_format(path, FileSpec())
-    names, units, said = tuple[str, ...](), tuple[str, ...](), ""
+    said = ""
     if form == "csv":
-        spec, names, units = _text_layout(path)
+        spec = _text_spec(path)
     elif form == "json":
         rows, said = _rows_of(path)
         spec = FileSpec(rows=rows)
     else:
         spec = FileSpec(rows=_struct_of(path) if form == "mat" else None)
     table = read_table(path, spec)
-    headed = table.headed and not names
-    texts, full = names or _plain_names(table, form), table.full_names()
+    texts, full = _plain_names(table, form), table.full_names()
     if form == "csv" and (count := len(table.fetch(0))) < SHORTEST_LOG:
         raise BadLog(_too_short(path, f"{count} row" + ("s" if count != 1 else "")))
     found, scalars = list[RawColumn](), list[RawColumn]()
     for number in range(len(table.names)):
-        text = texts[number] if number < len(texts) and (table.headed or names) else ""
+        text = texts[number] if table.headed else ""
         called = table.names if table.clocks and table.names.count(text) == 1 else full
         twice = called.count(called[number]) > 1
-        key = called[number] if headed and text and not twice else number
-        below = units[number] if number < len(units) else ""
+        key = called[number] if text and not twice else number
+        below = table.units[number] if table.units else ""
         values, why = _numbers(table, number)
         if why.startswith(("text", _ONLY_DATES)):
             with suppress(BadLog):
@@ -214,67 +210,13 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
     return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
 
 
-def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
-    """How the file is to be read; names and units where the reader does not take them itself."""
-    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+def _text_spec(path: Path) -> FileSpec:
+    """How a text file is to be read, beside what the reader finds by itself."""
     spec = FileSpec(encoding=_encoding(path))
-    rows = [] if holds_blocks(path, spec) else first_lines(path, spec)
-    at = _first_of_data(rows)
-    above = [k for k in range(at or 0) if any(rows[k])]
-    while len(above) > 1 and is_mark(rows[above[-1]], rows[above[-2]]):
-        above.pop()
-    if at is None or not above:
-        return spec, (), ()
-    width = len(rows[at])
-    rows = [row if any(row[width:]) else row[:width] for row in rows]
-    below = above[-1]
-    units = _units(_uncommented(rows[below], spec), width)
-    if len(above) < 2 or len(_uncommented(rows[above[-2]], spec)) != width:
-        units = ()  # of no names: what looks like units is names of letters
-    head = above[-2] if units else below
-    commented = rows[head][0].startswith(spec.comment)
-    names = _uncommented(rows[head], spec)
-    by_number = spec.model_copy(update={"skip_rows": at, "header": False})
-    if len(names) != width or all(map(is_number, names)):
-        return by_number, (), ()
-    if units or commented:
-        return by_number, tuple(names), units
-    before = [k for k in above[:-1] if not rows[k][0].startswith(spec.comment)]
-    return (spec.model_copy(update={"skip_rows": head}) if before else spec), (), ()
-
-
-def _uncommented(row: Sequence[str], spec: FileSpec) -> list[str]:
-    """The fields of a line, the sign of a comment before them taken off."""
-    fields = [one.strip() for one in row]
-    if not row[0].startswith(spec.comment):
-        return fields
-    fields[0] = fields[0].lstrip("# ")
-    return fields if fields[0] else fields[1:]
-
-
-def _first_of_data(rows: Sequence[Sequence[str]]) -> int | None:
-    """Number of the first line of the table; None where there is none."""
-
-    def is_data(row: Sequence[str]) -> bool:
-        full = [one for one in row if one]
-        numbers = sum(map(is_number, full))
-        return len(full) > 1 and (numbers >= _MOSTLY * len(row) or numbers == len(full))
-
-    for at in range(len(rows)):
-        block = [row for row in rows[at : at + 2 * _BELOW] if any(row)][:_BELOW]
-        if rows[at] and all(is_data(row) and len(row) == len(rows[at]) for row in block):
-            return at
-    return None
-
-
-def _units(row: Sequence[str], width: int) -> tuple[str, ...]:
-    """The units that a row holds, a column each; nothing where it is no row of units."""
-    if len(row) != width:
-        return ()
-    plain = tuple(one.strip().strip("[](){}<>") for one in row)
-    known = sum(written_unit(one) is not None for one in plain if one)
-    full = sum(bool(one) and (one == "1" or not is_number(one)) for one in plain)
-    return plain if full and known >= max(2, _MOSTLY * full) else ()
+    found = layout_of(path, spec)
+    if found is None or found.names is not None:
+        return spec
+    return spec.model_copy(update={"skip_rows": found.data, "header": False})
 
 
 def _encoding(path: Path) -> str:

@@ -258,7 +258,7 @@ def test_volts_of_every_channel_tell_nothing_of_one(
     (tmp_path / "run.csv").write_text("\n".join(lines))
     found = checked_proposal(proposed(tmp_path / "run.csv"))
     one = found.signal("y")
-    assert one is not None and (one.column, one.unit, one.sure) == (1, "V", False)
+    assert one is not None and (one.column, one.unit, one.sure) == ("1", "V", False)
     assert str(one.gain).partition(" ")[2].startswith("V/") and not found.refused
 
 
@@ -271,7 +271,7 @@ def test_the_increment_of_a_scope_is_the_time_of_a_sample(
     (tmp_path / "run.csv").write_text("\n".join(lines))
     found = checked_proposal(proposed(tmp_path / "run.csv"))
     t = found.signal("t")
-    assert t is not None and (t.column, t.gain, t.sure) == (0, "500 1/s", True)
+    assert t is not None and (t.column, t.gain, t.sure) == ("X", "500 1/s", True)
     assert not found.refused
 
 
