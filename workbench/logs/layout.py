@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
 
 from workbench.cards.headers import written_unit
 from workbench.logs.times import is_time
@@ -90,8 +89,12 @@ def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple
         units = tuple(_bare(one) for one in below) if _is_units(below) else units
     names, over = whole[-1], whole[-2] if len(whole) > 1 else ()
     if over and all(names) and len(set(names)) < len(names) and over[0] and not all(over):
-        groups = accumulate(over, lambda group, own: own or group)  # each written once
-        names = [f"{group} {own}" for group, own in zip(groups, names, strict=True)]
+        plotted = [one.lower() for one in names] == ["x", "y"] * (len(names) // 2)
+        joined, group = list[str](), ""
+        for k, own in enumerate(names):
+            group = over[k] or group  # written once, above the first of its columns
+            joined.append(f"{group} {own}" if not plotted else group if k % 2 else own)
+        names = joined
     return tuple(names), units
 
 

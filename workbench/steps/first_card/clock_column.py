@@ -58,7 +58,7 @@ def is_second(one: Column, clock: Column) -> bool:
     come."""
     means = one.header.means
     going = ticks(one)
-    if going and {"time", "count"} & set(means):
+    if np.array_equal(one.values, clock.values) or (going and {"time", "count"} & set(means)):
         return True
     counts = (
         one.whole and _rises(one) and all(means[what] < 1.0 for what in means if what != "count")
@@ -91,7 +91,8 @@ def _rising_one(path: Path, columns: Sequence[Column], texts: Sequence[Column]) 
     """
     ticking = [one for one in columns if ticks(one)]
     rising = [one for one in columns if _rises(one)]
-    if not ticking and len(rising) == 1:  # a clock that is uneven, and called something else
+    same = all(np.array_equal(one.values, rising[0].values) for one in rising)
+    if not ticking and rising and same:  # a clock that is uneven, or called something else
         return rising[0]
     if not ticking:
         cells = [(one.shown, one.values if one.raw.cells is None else one.raw.cells)

@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.signals.differentiate import Motion, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
-from workbench.cards.headers import Header
+from workbench.cards.headers import Header, words_of
 from workbench.logs.unknown import RawColumn
 from workbench.steps.first_card.registers import Register
 
@@ -17,6 +17,8 @@ COLUMN = "column"
 MOST_ROWS_READ = 10_000
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
+CURRENTS = ("current", "strom", "電流", "电流", "courant", "corrente", " iq ", " i q ", " isq ",
+            " ia ", " i a ", " amp")  # fmt: skip
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 
 
@@ -91,6 +93,14 @@ class Column:
         few = self.levels
         whole = 1 < len(few) <= FEW_LEVELS and bool(np.all(few == np.round(few)))
         return whole and (few[0] >= 0.0 or bool(np.all(np.abs(few) <= 1.0)))
+
+    @cached_property
+    def current(self) -> bool:
+        """Whether it is a current, by its unit or by its name."""
+        text = f" {' '.join(words_of(self.header.name))} "
+        if self.header.unit is not None:
+            return self.header.unit.card in ("A", "mA")
+        return any(one in text for one in CURRENTS) or (" i " in text and not self.whole)
 
     @cached_property
     def way_gone(self) -> float:

@@ -1,5 +1,6 @@
 """Columns of an unknown log made comparable: the clock found, the others on its even grid."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
@@ -13,7 +14,7 @@ from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.cards.headers import Header, read_header
+from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.faulty_rows import (
     late_stamps,
     sound_rows,
@@ -21,12 +22,13 @@ from workbench.logs.faulty_rows import (
     told_of_starts,
 )
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import axes_of, correlation, without_blocks
+from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 from workbench.steps.first_card.registers import read_register
 
 MOST_MISSING = 0.1  # of a column that is used
+_INPUT = re.compile(r"input\W*\d+", re.I)
 AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
@@ -112,11 +114,14 @@ def _without_letters(heads: Sequence[Header]) -> list[Header]:
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
-    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one."""
+    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one, nor
+    does an input's number."""
     units = [one.header.unit for one in columns]
     if not all(unit is not None and unit.card in VOLTS for unit in units):
         return columns
-    return [replace(one, header=replace(one.header, doubtful=True)) for one in columns]
+    heads = [replace(one.header, doubtful=True) for one in columns]
+    heads = [replace(one, means={}) if _INPUT.fullmatch(one.name) else one for one in heads]
+    return [replace(one, header=head) for one, head in zip(columns, heads, strict=True)]
 
 
 def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
@@ -220,26 +225,42 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     """The columns without those that are another one in another unit, and what these are.
 
     Of two the one whose header says more is kept, else the finer, else the later: what is made
-    from a sensor's output stands behind it.
+    from a sensor's output stands behind it. Of a position before and behind a gear, the one whose
+    name begins as that of a force that is kept.
     """
-    distinct, twice = list[Column](), dict[int, str]()
     order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
     if not order:
         return [], {}
     alike = np.abs(correlation(np.column_stack([one.x for one in order])))
+    families = list[list[Column]]()
     place = {one.raw.number: k for k, one in enumerate(order)}
     for k, one in enumerate(order):
-        near = (other for other in distinct if alike[k, place[other.raw.number]] > NEARLY_ALIKE)
-        same = next((other for other in near if _same(one, other)), None)
-        if same is None:
-            distinct.append(one)
+        near = (of for of in families if alike[k, place[of[0].raw.number]] > NEARLY_ALIKE)
+        family = next((of for of in near if _same(one, of[0])), None)
+        if family is None:
+            families.append([one])
         else:
-            equal = np.array_equal(one.values, same.values, equal_nan=True)
-            said = (
-                f"equals {same.shown} in every row" if equal else f"is {same.shown} in another unit"
-            )
-            twice[one.raw.number] = said
-    return sorted(distinct, key=lambda one: one.raw.number), twice
+            family.append(one)
+    forces = {_begins(of[0]) for of in families if "force" in of[0].header.means}
+    for family in families:
+        if is_position(family[0].header):  # the sort is stable: else the first stays so
+            family.sort(key=lambda one: not (is_position(one.header) and _begins(one) in forces))
+    twice = {
+        one.raw.number: (
+            f"equals {kept.shown} in every row"
+            if np.array_equal(one.values, kept.values, equal_nan=True)
+            else f"is {kept.shown} in another unit"
+        )
+        for kept, *others in families
+        for one in others
+    }
+    return sorted((kept for kept, *_ in families), key=lambda one: one.raw.number), twice
+
+
+def _begins(one: Column) -> str:
+    """The first word of a header with several: of a joint, or of what drives it."""
+    words = words_of(one.header.name)
+    return "_".join(words[:2] if words[1:2] and words[1].isdigit() else words[:1])
 
 
 def _with_axes(columns: Sequence[Column]) -> list[Column]:

@@ -7,7 +7,6 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import of_a_weight
-from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.registers import halved_counts
@@ -18,8 +17,6 @@ TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
-CURRENTS = ("current", "strom", "電流", "电流", "courant", "corrente", " iq ", " i q ", " isq ",
-            " ia ", " i a ", " amp")  # fmt: skip
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 
@@ -61,7 +58,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
     if turn is not None:
         return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
     y = roles.columns["y"]
-    if "u" in roles.columns and is_count(y) and is_current(roles.columns["u"]):
+    if "u" in roles.columns and is_count(y) and roles.columns["u"].current:
         why = "counts of an encoder beside a motor's current are mostly those of a shaft"
         return MotionGuess("rotary", why, False, rotor)
     if is_count(y) and y.header.unit is None and not y.header.means:
@@ -94,14 +91,6 @@ def is_count(y: Column) -> bool:
     if len(y.levels) <= COUNTED_LEVELS:
         return False
     return y.whole or halved_counts(y.numbers)
-
-
-def is_current(u: Column) -> bool:
-    """Whether a command is a current, by its unit or by its name."""
-    text = f" {' '.join(words_of(u.header.name))} "
-    if u.header.unit is not None:
-        return u.header.unit.card in ("A", "mA")
-    return any(one in text for one in CURRENTS) or (" i " in text and not u.whole)
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:

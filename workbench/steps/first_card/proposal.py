@@ -16,11 +16,12 @@ from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns, columns_of
-from workbench.steps.first_card.motion_guess import is_current, known_motion
+from workbench.steps.first_card.motion_guess import known_motion
 from workbench.steps.first_card.refusals import (
     SAID_SO,
     no_body,
     of_axis,
+    refuse_error,
     refuse_resting,
     refuse_sign_bits,
     refuse_undriven,
@@ -28,7 +29,7 @@ from workbench.steps.first_card.refusals import (
 from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sizes import UnitGuess, factor
-from workbench.steps.first_card.sums import with_position
+from workbench.steps.first_card.sums import with_position, without_names
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
 from workbench.steps.hardly_identifiable import ALL_FOLLOWED
@@ -150,8 +151,11 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     if roles is None and (own := with_position(columns, signals, only)):
         columns, only = own
         roles = known_roles(columns.signals, only)
+    if only is None and (of_sum := without_names(columns, roles)):
+        columns, roles = of_sum
     if roles is None:
         raise no_body(columns)
+    refuse_error(columns, roles)
     refuse_resting(columns, roles)
     refuse_sign_bits(columns, roles)
     named = re.sub(r"[^\w.-]+", "-", name or path.stem).strip("-.") or "machine"
@@ -162,7 +166,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         share = derivative(y, roles.columns["u"].x).share  # of the command, that is the velocity
         if share > ALL_FOLLOWED:
             refuse_undriven(columns, roles, share)
-        if share > ALL_FOLLOWED and not is_current(roles.columns["u"]):
+        if share > ALL_FOLLOWED and not roles.columns["u"].current:
             return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
     return replace(found, other=other)

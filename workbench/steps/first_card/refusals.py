@@ -7,11 +7,10 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.signals.relations import FEWEST_MOVING, lead, moving
-from identification.thresholds import TWICE
+from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.column import Column
-from workbench.steps.first_card.columns import PHASE_CURRENT, Columns
-from workbench.steps.first_card.motion_guess import is_current
+from workbench.steps.first_card.columns import NEARLY_ALIKE, PHASE_CURRENT, Columns
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.weights import SURE, said, together
 
@@ -121,7 +120,7 @@ def _has(one: Column, words: Sequence[str]) -> bool:
 def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:
     """Raises BadLog where a command is always 0 and the current is what the motor makes that the
     body turns: the velocity alone (share), against it."""
-    if not is_current(roles.columns["u"]) or roles.signs["u"] > 0.0:
+    if not roles.columns["u"].current or roles.signs["u"] > 0.0:
         return
     for one in columns.read:
         if columns.left_out.get(one.raw.number) == "is always 0" and said(one, "u") >= SAID_SO:
@@ -145,6 +144,25 @@ def refuse_sign_bits(columns: Columns, roles: Roles) -> None:
             f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
             f" write x where x < {top}, else {top} - x, and give that log"
         )
+
+
+def refuse_error(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where what may be the position is made of a following error, as the terms of a
+    controller are: the error, its sum and its change."""
+    y = roles.columns["y"]
+    for one in columns.read if said(y, "y") < SAID_SO else ():
+        e, x = one.values, y.values
+        if one.header.purpose != "error" or len(e) != len(x) or not np.all(np.isfinite(e * x)):
+            continue
+        of_error = np.column_stack([e, np.cumsum(e), np.gradient(e), np.ones(len(e))])
+        left = x - of_error @ np.linalg.lstsq(of_error, x)[0]
+        reached = abs(float(np.corrcoef(e, x)[0, 1])) > NEARLY_ALIKE  # of a reference at rest
+        if np.var(left) < OF_ACCOUNT**2 * np.var(x) and not reached:
+            raise BadLog(
+                f"{columns.log.path}: no position: {y.shown} is made of the error {one.shown}, as"
+                " the terms of a controller are, and error and output alone identify no friction;"
+                " log the position too"
+            )
 
 
 def refuse_resting(columns: Columns, roles: Roles) -> None:

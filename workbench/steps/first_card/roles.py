@@ -21,6 +21,7 @@ from identification.signals.relations import (
     by_inertia,
     force_law,
 )
+from identification.thresholds import TWICE
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, follows
 from workbench.steps.first_card.ways import (
@@ -211,6 +212,8 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
             return -3.0  # one more position, of a model or another sensor, be it in volts
         if one.noisy and moved < MOVES_NOTHING:
             return -3.0
+        if one.current and one.x.min() >= 0.0 and seen.y.way_gone > TWICE:
+            return -3.0  # both ways a motor takes current: of its supply
         forces = [seen.pairs.signals.index(of) for name, of in way.columns.items() if name == "F"]
         if any(abs(seen.pairs.alike[at, k]) > EXACT_VELOCITY for at in forces):
             return -3.0  # the force once more, as the current that it was made of

@@ -14,7 +14,7 @@ USUAL: Mapping[str, Mapping[str, float]] = {  # signal: unit and how usual it is
     "y": {"m": 0.0, "mm": 0.5, "um": -1.0},
     "y rotary": {"rad": 0.3, "deg": 0.0, "turn": -1.5},
     "F": {"N": 0.0, "kN": -1.5, "mN": -3.0},
-    "F rotary": {"N m": 0.0, "mN m": -1.5},
+    "F rotary": {"N m": 0.0, "mN m": -2.5},
     "p": {"Pa": 0.0, "bar": 0.5, "kPa": -0.7, "MPa": -0.7, "mbar": -2.0, "psi": -2.0},
     "v": {"m/s": 0.0, "mm/s": 0.3},
     "v rotary": {"rad/s": 0.0, "deg/s": 0.0, "rpm": -0.5},

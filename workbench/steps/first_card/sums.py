@@ -9,9 +9,11 @@ from workbench.logs.summed import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
+from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, known_roles
 from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 
+EXPLAINED = 0.9  # share of a drive, by inertia and friction along a sum that no name calls so
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
 
@@ -27,11 +29,30 @@ def with_position(
     if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
         return None
     own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
+    return _summed(columns, [one for one in signals if not one.header.speed], own)
+
+
+def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles] | None:
+    """The columns of a log without names with the sum of one as the position, and the roles then,
+    where that explains a drive and what is known does not; else None."""
+    signals = columns.signals
+    if any(one.raw.header for one in signals) or (known and known.law.share > MOSTLY_ITS_LAW):
+        return None
+    found = list[tuple[Columns, Roles]]()
+    for own in signals:
+        summed, y = _summed(columns, [one for one in signals if one is not own], own)
+        roles = known_roles(summed.signals, y)
+        if roles is not None and roles.law.share > EXPLAINED:
+            found.append((summed, roles))
+    return max(found, key=lambda one: one[1].law.share, default=None)
+
+
+def _summed(columns: Columns, kept: Sequence[Column], own: Column) -> tuple[Columns, Column]:
+    """The columns kept beside the sum of one's own over time, and that."""
     unit, clock = own.header.unit, columns.clock.header.unit
     usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
     second = factor(clock.card if clock and clock.quantity == "time" else usual)
     h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.card if unit else "", 1.0)
     x = summed(own.x, np.full(len(own.x), h))
     position = replace(own, header=as_position(own.header), x=x, summed=True)
-    kept = [one for one in signals if not one.header.speed]
     return replace(columns, signals=(*kept, position)), position

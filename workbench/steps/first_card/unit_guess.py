@@ -23,7 +23,6 @@ from workbench.steps.first_card.motion_guess import (
     MotionGuess,
     counts_per_turn,
     is_count,
-    is_current,
     unit_by_turn,
 )
 from workbench.steps.first_card.registers import BITS
@@ -58,6 +57,7 @@ COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that enc
 REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
 SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
 INCREMENTS = {"increment", "interval", "xincrement"}  # words of the time of a sample
+DATA_SHEET = "not in the log: see the sensor's data sheet"
 SENSOR_OUTPUTS = ("command", "count")
 
 Units = dict[str, UnitGuess]
@@ -96,7 +96,16 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
             out[name] = _alone(name, column, motion)
-    return {name: out[name] for name in found}
+    return {name: _of_a_sensor(name, column, out[name]) for name, column in found.items()}
+
+
+def _of_a_sensor(name: str, column: Column, guess: UnitGuess) -> UnitGuess:
+    """The unit of a force or pressure; of one in volts that, and a gain to be looked up."""
+    own = column.header.unit
+    if name not in ("F", "p_p", "p_n") or own is None or own.quantity not in SENSOR_OUTPUTS:
+        return guess
+    gain, other = (f"1 {own.card}/{unit}" for unit in (guess.unit, guess.rival))
+    return UnitGuess(own.card, gain, False, DATA_SHEET, other)
 
 
 def _of_header(name: str, column: Column) -> UnitGuess | None:
@@ -261,7 +270,7 @@ def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
 
 def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
     """The unit of a signal by its own size."""
-    if name == "u" and "force" in column.header.means and not is_current(column):
+    if name == "u" and "force" in column.header.means and not column.current:
         unit, why = force_unit(motion.motion), "the header speaks of a force that is asked for"
         return UnitGuess(unit, None, False, why, "V")
     if name == "u":
@@ -284,7 +293,7 @@ def _of_command(column: Column) -> UnitGuess:
     text = column.header.name.casefold()
     if column.bits is not None:
         return UnitGuess("1", None, False, "a register: its full scale is in no log")
-    if is_current(column):
+    if column.current:
         return _command("A", "the header speaks of a current")
     share = any(one in text for one in SHARES)
     if share and peak > ALL_OF_IT:
@@ -337,7 +346,7 @@ def by_reference(
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
     if turn is not None:
         return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
-    why, width = "not in the log: see the sensor's data sheet", float(np.ptp(y.numbers))
+    why, width = DATA_SHEET, float(np.ptp(y.numbers))
     if unit != "count":
         return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
     span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
