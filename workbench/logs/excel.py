@@ -31,7 +31,7 @@ def read_excel(path: Path, spec: FileSpec) -> Table:
     refuse_long(path, len(rows))
     shown = _first_rows(rows, spec)
     found = find_layout(shown) if spec.header is None else None
-    if found is None or found.names is None:
+    if found is None:
         titles = tuple(shown[0]) if shown and spec.header is not False else ()
         found = Layout(titles, int(bool(titles)))
     first = spec.skip_rows + found.data
@@ -62,8 +62,7 @@ def _sheet(
             first = names[0] if spec.rows is None else spec.rows
             for name in names if spec.rows is None else ():
                 rows = _cells(book, name)
-                layout = find_layout(_first_rows(rows, spec)) if len(rows) >= SHORTEST_LOG else None
-                if layout is not None and layout.names is not None:
+                if len(rows) >= SHORTEST_LOG and find_layout(_first_rows(rows, spec)) is not None:
                     said = f"read from sheet {name!r}, the first with a table"
                     return name, rows, (said,) if name != first else ()
             return first, _cells(book, first), ()

@@ -29,14 +29,14 @@ _SCOPE_TIME = "Time"
 
 @dataclass(frozen=True)
 class Layout:
-    """Names of the columns, none where there is no header, None where what stands above the data
-    names another number of columns; the first line of data, from 0; and the units below the names.
+    """Names of the columns, none where nothing above the data names as many; the first line of
+    data, from 0; and the units below the names.
 
     `groups` names the group of each column where several columns are times, each of those that
     follow it.
     """
 
-    names: tuple[str, ...] | None
+    names: tuple[str, ...]
     data: int
     groups: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -77,8 +77,7 @@ def find_layout(
     elif noted := [one for k, one in (comments or {}).items() if k < first and len(one) == width]:
         names, units = _names_and_units(noted)
         names = () if all(map(is_number, names)) else names
-        above = []
-    return Layout(names if names or not above else None, first, units=units)
+    return Layout(names, first, units=units)
 
 
 def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...]]:

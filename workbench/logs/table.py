@@ -58,7 +58,7 @@ class Table:
             return key
         if not self.headed:
             raise BadLog(
-                f"{where}: no column {key!r}, the file has no header; "
+                f"{where}: no column {key!r}, the file has no header of its {count} columns; "
                 f"name the column by its number (0 to {count - 1}) in the card"
             )
         full = self.full_names()

@@ -57,8 +57,10 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
         raise BadLog(f"{path}: no rows after line {spec.skip_rows}; check skip_rows in the card")
     lines, fields, marks = head
     found = _layout(head, spec) if spec.header is None else None
-    if found is None or found.names is None:
-        found = _first_line_layout(path, lines, fields, spec)
+    if found is None:  # the card says so, or nothing shows where the data begin
+        at, first = next((k, line) for k, line in enumerate(fields) if line)
+        headed = spec.header if spec.header is not None else not all(map(is_number, first))
+        found = Layout(tuple(first) if headed else (), at + int(headed))
     names = found.names or tuple(str(k) for k in range(len(fields[found.data])))
     start = spec.skip_rows
     body = _without_again(_body(text, start + found.data, spec, marks), lines[: found.data])
@@ -115,38 +117,6 @@ def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Tabl
         plain = (cell.replace(marks.decimal, ".") for cell in cells if cell and is_number(cell))
         first.append(np.array([float(cell) for cell in plain]))
     return clock_groups(table, first) or table
-
-
-def _first_line_layout(
-    path: Path, lines: Sequence[str], fields: Sequence[Sequence[str]], spec: FileSpec
-) -> Layout:
-    """The header in the first line, as the card says or because nothing shows where it is.
-
-    Raises BadLog where the first line cannot be a header, since the rows have more fields.
-    """
-    at = next(k for k, line in enumerate(fields) if line)
-    first, headed = fields[at], spec.header
-    if headed is None:
-        widths = [len(line) for line in fields[at + 1 :][:_COMPARED] if line]
-        width = max(set(widths), key=widths.count) if widths else 0
-        if len(first) <= 1 and width > 1 and 2 * widths.count(width) >= len(widths):
-            header = next(k for k, line in enumerate(fields) if k > at and len(line) == width)
-            raise BadLog(
-                f"{path}: line {spec.skip_rows + at + 1} ({lines[at].strip()[:40]!r}) is no header"
-                f" of the {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
-                " card's [file], or comment to the sign with which such lines begin"
-            )
-        headed = not all(map(is_number, first))
-    return Layout(tuple(first) if headed else (), at + int(headed))
-
-
-def layout_of(path: Path, spec: FileSpec) -> Layout | None:
-    """Where header and data lie in a text file; None where no table of numbers is seen, or several
-    stand one below the other. Raises BadLog where the file is not text."""
-    if holds_blocks(path, spec):
-        return None
-    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
-    return _layout(_head_of(path, _head(path, spec.encoding), spec), spec)
 
 
 def first_lines(path: Path, spec: FileSpec) -> Sequence[Sequence[str]]:
@@ -346,9 +316,7 @@ class _Parsed:
         if are_few(count, rows):
             return f"{said}{more}: left out"
         advice = "correct or remove it"
-        if count > MANY and fields == self.width + 1:
-            advice = "the header has one name too few for the rows; add it"
-        elif count > MANY and fields > self.width and self.marks.delimiter == ",":
+        if count > MANY and fields > self.width and self.marks.delimiter == ",":
             advice = "if the numbers have decimal commas, export with ';' between the columns"
         raise BadLog(f"{path}: {said}{more}; {advice}")
 

@@ -20,10 +20,9 @@ from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header
 from workbench.files import refuse_larger
 from workbench.logs.faulty_rows import numbers_in
-from workbench.logs.packed import text_bytes
+from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
-from workbench.logs.text import layout_of
 from workbench.logs.times import seconds
 
 FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
@@ -134,7 +133,8 @@ def read_unknown(path: Path) -> UnknownLog:
     form = checked_format(path, FileSpec())
     said = ""
     if form == "csv":
-        spec = _text_spec(path)
+        refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+        spec = FileSpec(encoding=_encoding(path))
     elif form == "json":
         rows, said = _rows_of(path)
         spec = FileSpec(rows=rows)
@@ -208,15 +208,6 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
     alone = len(set(raw.tolist())) == 1 and not text.isalnum()
     shown = repr(text[:20])
     return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
-
-
-def _text_spec(path: Path) -> FileSpec:
-    """How a text file is to be read, beside what the reader finds by itself."""
-    spec = FileSpec(encoding=_encoding(path))
-    found = layout_of(path, spec)
-    if found is None or found.names is not None:
-        return spec
-    return spec.model_copy(update={"skip_rows": found.data, "header": False})
 
 
 def _encoding(path: Path) -> str:

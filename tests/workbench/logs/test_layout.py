@@ -140,7 +140,7 @@ def test_two_columns_below_keys_and_numbers() -> None:
 def test_what_shows_no_data_or_no_header_is_left_to_the_card() -> None:
     assert find_layout([["a", "b"], ["c", "d"], ["e", "f"]]) is None
     found = find_layout([["only one"], ["1", "2"], ["3", "4"], ["5", "6"]])
-    assert found is not None and (found.names, found.data) == (None, 1)
+    assert found is not None and (found.names, found.data) == ((), 1)
     found = find_layout([["1", "2"], ["3", "4"]])
     assert found is not None
     assert (found.names, found.data) == ((), 0)
