@@ -10,7 +10,7 @@ from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit
-from workbench.cards.units import Motion, conversion, number_and_unit
+from workbench.cards.units import Motion, in_unit_of
 
 _COMMAND = re.compile(r"\bV\b")
 _SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
@@ -52,22 +52,21 @@ def written_effect(
     effect = known_effect(key, library)
     units = effect_units(effect, motion, command)
     _check_names(key, written, effect)
-    plain = {name: value for name, value in written.items() if not isinstance(value, str)}
-    for name, value in plain.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise BadModel(
-                f"{key}.{name} = {value!r}: a number in {units[name]!r} or a text with its unit"
-                f' needed, as "{_example(effect, name)}"'
-            )
-    values = {name: float(str(value)) for name, value in plain.items()}
+    values = dict[str, float]()
     # Units with an exponent of their own last, when the exponent is known.
     for name in sorted(written, key=lambda name: "**" in units[name]):
-        text = written[name]
-        if isinstance(text, str):
-            unit = _SYMBOLIC_EXPONENT.sub(
-                lambda found: f"**{values.get(found[1], 1.0):g}", units[name]
-            )
-            values[name] = _with_unit(f"{key}.{name}", text, unit, _example(effect, name))
+        value, where = written[name], f"{key}.{name}"
+        unit = _with_exponents(units[name], values)
+        try:
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
+                raise BadCard(f"{where} = {value!r}: a number in {unit!r} or a text with its unit")
+            number = in_unit_of(value, unit, where)
+        except BadCard as error:
+            p = effect.params[effect.names.index(name)]
+            example = f"{p.typical:g}" if p.unit == "1" else f"{p.typical:g} {p.unit}"
+            raise BadModel(f'{error}; write it as "{example}"') from None
+        assert number is not None
+        values[name] = float(number)
     return effect.acting(values)
 
 
@@ -83,20 +82,17 @@ def estimates_in_si(
     units = effect_units(effect, motion, command)
     _check_names(key, estimates, effect)
 
-    def value(name: str) -> float:
-        found = estimates.get(name)
-        if found is None or found.value is None:
-            return 1.0 if found is None or found.assumed is None else found.assumed
-        return found.value
-
+    known = {
+        name: one.assumed if one.value is None else one.value for name, one in estimates.items()
+    }
+    values = {name: value for name, value in known.items() if value is not None}
     out: dict[str, Estimate] = {}
     for name, found in estimates.items():
         unit = units[name]
         if found.unit == unit:
             out[name] = found
             continue
-        plain = _SYMBOLIC_EXPONENT.sub(lambda part: f"**{value(part[1]):g}", found.unit)
-        target = _SYMBOLIC_EXPONENT.sub(lambda part: f"**{value(part[1]):g}", unit)
+        plain, target = (_with_exponents(one, values) for one in (found.unit, unit))
         same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]")
         out[name] = replace(same, unit=unit)
     return out
@@ -125,25 +121,9 @@ def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
             raise BadModel(f"{key} has no {p.name!r} [{p.unit}], {p.meaning}; add it")
 
 
-def _with_unit(where: str, text: str, unit: str, example: str) -> float:
-    """The number in `text` in SI; raises BadModel where it is of another kind than `unit`."""
-    number, own = number_and_unit(text)
-    if number is None:
-        raise BadModel(f'{where} = {text!r}: no number with a unit; write it as "{example}"')
-    try:
-        scale = conversion(own, unit)
-    except BadCard as error:
-        raise BadModel(f"{where}: {error}; {unit!r} needed") from None
-    if scale is None:
-        raise BadModel(
-            f'{where}: unit {own!r} is of another kind than {unit!r}; write it as "{example}"'
-        )
-    return scale.factor * number + scale.shift
-
-
-def _example(effect: Effect, name: str) -> str:
-    p = effect.params[effect.names.index(name)]
-    return f"{p.typical:g}" if p.unit == "1" else f"{p.typical:g} {p.unit}"
+def _with_exponents(unit: str, values: Mapping[str, float]) -> str:
+    """A unit, its exponents that are parameters as numbers; 1 where one is not known."""
+    return _SYMBOLIC_EXPONENT.sub(lambda found: f"**{values.get(found[1], 1.0):g}", unit)
 
 
 def _turned(unit: str) -> str:

@@ -121,6 +121,7 @@ def multisines(reference: ReferenceSection) -> list[MultisineSection]:
     return [reference] if isinstance(reference, MultisineSection) else []
 
 
+_AS_WRITTEN = ("loop", "noise_F", "noise_y", "noise_p", "seed", "drive")  # of a recipe's fields
 LONGEST_RECIPE = 1e8  # samples of a recipe: a gigabyte a signal
 
 
@@ -364,12 +365,7 @@ class RecipeSection(CardTable):
             plant=Plant(self.friction.value, drive, effects),
             duration=self.duration_s,
             h=self.h_s,
-            loop=self.loop,
             reference=specification(self.reference),
-            noise_F=self.noise_F,
-            noise_y=self.noise_y,
-            noise_p=self.noise_p,
-            seed=self.seed,
-            drive=self.drive,
             mean_pressure=self.mean_pressure_pa,
+            **{name: getattr(self, name) for name in _AS_WRITTEN},
         )

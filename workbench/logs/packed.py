@@ -3,6 +3,7 @@
 import gzip
 import zipfile
 import zlib
+from contextlib import nullcontext
 from pathlib import Path
 
 from identification.errors import BadLog
@@ -23,17 +24,16 @@ def text_bytes(path: Path, most: int | None = None) -> bytes:
     """
     with path.open("rb") as file:
         magic = file.read(len(ZIP))
-    limit = TEXT_BYTES + 1 if most is None else most
-    if not magic.startswith((GZIP, ZIP)):
-        with path.open("rb") as file:
+        file.seek(0)
+        limit = TEXT_BYTES + 1 if most is None else most
+        if not magic.startswith((GZIP, ZIP)):
             return file.read(limit)
     try:
-        if magic.startswith(GZIP):
-            with gzip.open(path) as packed:
-                content = packed.read(limit)
-        else:
-            with zipfile.ZipFile(path) as archive, archive.open(_only(path, archive)) as packed:
-                content = packed.read(limit)
+        with (
+            zipfile.ZipFile(path) if magic.startswith(ZIP) else nullcontext() as archive,
+            archive.open(_only(path, archive)) if archive else gzip.open(path) as packed,
+        ):
+            content: bytes = packed.read(limit)
     except (OSError, EOFError, RuntimeError, NotImplementedError, zlib.error,
             zipfile.BadZipFile) as error:  # fmt: skip
         text = " ".join(str(error).split())[:120]

@@ -17,6 +17,7 @@ TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
+MOST_QUARTERS, QUARTER = 20, 1e-3  # levels of a reference by quarters of a turn, and off one
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 
@@ -74,6 +75,9 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
         if (one.header.speed or force) and one.header.angle and one.axis in ("", y.axis):
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
+    if y.header.unit is None and (angle := _of_quarters(roles)):
+        why = f"its reference goes by quarters of a turn in {angle}"
+        return MotionGuess("rotary", why, False, rotor, angle)
     drive = roles.columns.get("F" if roles.kind == "force" else "u")
     if drive is not None and y.motion is not None and y.header.unit is None:
         angle = of_a_weight(y.motion, y.x, drive.x, {**TURN_IN, "turn": 1.0})
@@ -81,6 +85,17 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
             why = f"the weight of an arm is in what drives, by an angle in {angle}"
             return MotionGuess("rotary", why, False, rotor, angle)
     return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
+
+
+def _of_quarters(roles: Roles) -> str:
+    """The unit of an angle of which all levels of the reference are quarters of a turn; empty where
+    they are not."""
+    levels = roles.columns["r"].levels if "r" in roles.columns else np.zeros(0)
+    for unit, turn in TURN_IN.items() if len(levels) < MOST_QUARTERS else ():
+        quarters = 4.0 * levels / turn
+        if np.any(levels) and np.allclose(quarters, np.round(quarters), rtol=0.0, atol=QUARTER):
+            return unit
+    return ""
 
 
 def is_count(y: Column) -> bool:

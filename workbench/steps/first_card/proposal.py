@@ -175,25 +175,18 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
 def _or_velocity(motor: Proposal, roles: Roles, share: float) -> Proposal:
     """The proposal for a motor whose command is mostly the velocity, or for a valve and cylinder;
     the other of the two is what it would be otherwise."""
-    text = roles.columns["u"].header.name.casefold()
-    valve = any(word in text for word in VALVES)
-    why = (
-        f"{share:.0%} of {roles.columns['u'].shown} is the velocity: a valve, or a motor by voltage"
-    )
+    u = roles.columns["u"]
+    why = f"{share:.0%} of {u.shown} is the velocity: a valve, or a motor by voltage"
 
-    def of_kind(of: Proposal, kind: RigKind, rival: RigKind) -> Proposal:
-        rig = [
-            RigGuess("kind", kind, "", False, f"{DRIVEN_BY[kind]}; {why}", rival)
-            if one.key == "kind"
-            else one
-            for one in of.rig
-            if kind == "motor" or one.key != "force_per_command"
-        ]
-        return replace(of, kind=kind, rig=tuple(rig))
+    def of_kind(kind: RigKind, rival: RigKind) -> Proposal:
+        first, *rest = motor.rig  # the kind, and what it needs
+        first = replace(first, value=kind, sure=False, why=f"{DRIVEN_BY[kind]}; {why}", rival=rival)
+        rest = [x for x in rest if kind == "motor" or x.key != "force_per_command"]
+        return replace(motor, kind=kind, rig=(first, *rest))
 
-    both = of_kind(motor, "motor", "velocity"), of_kind(motor, "velocity", "motor")
-    first, second = both[::-1] if valve else both
-    return replace(first, other=second)
+    valve = any(word in u.header.name.casefold() for word in VALVES)
+    both = of_kind("motor", "velocity"), of_kind("velocity", "motor")
+    return replace(both[valve], other=both[not valve])
 
 
 def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
@@ -301,8 +294,7 @@ def _rig(
         out.append(_around_the_rod(roles, units))
     if roles.kind == "motor":
         force = "N m" if motion == "rotary" else "N"
-        asked = units["u"].unit == force
-        out.append(_as_asked(force) if asked else _motor_constant(columns, force))
+        out.append(_motor_constant(columns, force, asked=units["u"].unit == force))
     if "u" in roles.columns and (limit := _limit(roles.columns["u"])) is not None:
         out.append(RigGuess("control_limit_v", limit, "unit of u", False,
                             "the command stops there again and again"))  # fmt: skip
@@ -319,14 +311,12 @@ def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
     return RigGuess("supply_pressure_pa", AMBIENT if air else None, "Pa", False, why)
 
 
-def _as_asked(force: str) -> RigGuess:
-    """Force per command of a drive that is given a force."""
-    why = "the command is a force already, as the drive makes it"
-    return RigGuess("force_per_command", 1.0, f"{force}/u", False, why)
-
-
-def _motor_constant(columns: Columns, force: str) -> RigGuess:
-    """Force per command from a single value in the file whose name says so."""
+def _motor_constant(columns: Columns, force: str, *, asked: bool) -> RigGuess:
+    """Force per command: 1 of a command that is a force, else a single value in the file whose name
+    says so."""
+    if asked:
+        why = "the command is a force already, as the drive makes it"
+        return RigGuess("force_per_command", 1.0, f"{force}/u", False, why)
     for one in columns.log.scalars:
         if MOTOR_CONSTANT.search(one.header.strip()) and np.isfinite(one.values[0]):
             why = f"the file's {one.header!r}; check that it is {force} for one unit of u"

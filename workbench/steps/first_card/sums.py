@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.thresholds import HALF
 from workbench.logs.summed import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, WORK_GIVES_SIGN, Roles, known_roles
+from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
 from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 
@@ -34,19 +35,20 @@ def with_position(
 
 def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles] | None:
     """The columns of a log without names with the sum of one as the position, and the roles then,
-    where that explains a drive and what is known does not, nor has its speed beside it; else None.
-    """
+    where that leaves far less of a drive than what is known, which has no speed beside it."""
     signals = columns.signals
-    moves = known is not None and ("v" in known.columns or known.law.share > MOSTLY_ITS_LAW)
+    left = 1.0 if known is None else 1.0 - known.law.share
+    moves = known is not None and ("v" in known.columns or left < 1.0 - EXPLAINED)
     if moves or any(one.raw.header for one in signals):
         return None
     found = list[tuple[Columns, Roles]]()
     for own in signals:
         summed, y = _summed(columns, [one for one in signals if one is not own], own)
         roles = known_roles(summed.signals, y)
-        if roles and roles.law.share > EXPLAINED and abs(roles.law.work) > WORK_GIVES_SIGN:
+        if roles and roles.law.share > 1.0 - HALF * left and abs(roles.law.work) > WORK_GIVES_SIGN:
             found.append((summed, roles))
-    return max(found, key=lambda one: one[1].law.share, default=None)
+    best = max(found, key=lambda one: one[1].law.share, default=None)
+    return best if best and best[1].law.share > EXPLAINED else None
 
 
 def _summed(columns: Columns, kept: Sequence[Column], own: Column) -> tuple[Columns, Column]:

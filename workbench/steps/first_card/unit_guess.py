@@ -74,8 +74,8 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     if "y" not in out and (turn := unit_by_turn(roles.columns["y"])) and motion.motion == "rotary":
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
     if "y" not in out and motion.angle:
-        why, rival = "by the weight of an arm in what drives", {"rad": "deg"}
-        out["y"] = UnitGuess(motion.angle, None, False, why, rival.get(motion.angle, "rad"))
+        rival = "deg" if motion.angle == "rad" else "rad"
+        out["y"] = UnitGuess(motion.angle, None, False, motion.why, rival)
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
     if "t" not in out and (ticking := _ticks(columns)):
