@@ -16,6 +16,7 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
+from workbench.logs.layout import is_number
 from workbench.logs.table import RawColumn, Table
 
 FEWEST_BLOCKS = 2
@@ -23,7 +24,6 @@ UNIT_KEYS = ("unit", "units", "einheit", "unité", "単位")  # of a line that g
 PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
 _TEXT_LINE = re.compile(r"\n[ \t]*[\[\"]?(?:\d+\.)?[^\W\d_]")
 _ROW = r"[;,|\s]*[+-]?[\d.]+[^\n]*\n"
 _NUMBERS_BEGIN = re.compile(f"^{_ROW}{_ROW}", re.M)
@@ -164,7 +164,7 @@ def _fields(line: str, mark: str) -> list[str]:
 def _is_row(line: str, mark: str) -> bool:
     fields = _fields(line, mark)
     full = [one for one in fields if one]
-    return len(full) > 1 and all(map(_NUMBER.fullmatch, full))
+    return len(full) > 1 and all(map(is_number, full))
 
 
 def _heads(block: Block) -> list[str]:

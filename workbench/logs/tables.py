@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -57,17 +57,12 @@ _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
     "npy": (b"\x93NUMPY",),
     "rosbag": (b"#ROSBAG V2.0",),
 }
-_SUFFIXES: Mapping[Format, tuple[str, ...]] = {
-    "parquet": (".parquet",),
-    "mat": (".mat",),
-    "hdf5": (".h5", ".hdf5"),
-    "json": (".json",),
-    "tdms": (".tdms",),
-    "mdf": (".mdf", ".mf4"),
-    "mcap": (".mcap",),
+_SUFFIXES: Mapping[Format, tuple[str, ...]] = {  # beside the format's own name
+    "hdf5": (".h5",),
+    "mdf": (".mf4",),
     "ulog": (".ulg",),
     "excel": (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-    "npy": (".npy", ".npz"),
+    "npy": (".npz",),
     "rosbag": (".bag",),
 }
 _JSON = re.compile(rb"\s*(\{\s*[\"}]|\[\s*([\[{\"\d\]-]|true|false|null))")  # "[Name]" is a text's
@@ -97,9 +92,10 @@ def find_format(path: Path, head: bytes) -> Format:
     for form, magics in _MAGIC.items():
         if head.startswith(magics):
             return form
-    for form, suffixes in _SUFFIXES.items():
-        if path.suffix.lower() in suffixes:
-            return form
+    for form in get_args(Format):
+        own: Format = form
+        if own != "csv" and path.suffix.lower() in (f".{own}", *_SUFFIXES.get(own, ())):
+            return own
     return "json" if _JSON.match(head) else "csv"
 
 
@@ -358,15 +354,7 @@ def _of_archive(path: Path, found: dict[str, RawColumn], spec: FileSpec) -> Tabl
         if spec.rows not in found:
             raise BadLog(f"{path}: no array {spec.rows!r}{nearest(spec.rows, found)}")
         return of_array(path, np.squeeze(found[spec.rows]), spec)
-    vectors = {name: np.atleast_1d(np.squeeze(x)) for name, x in found.items()}
-    flat = {name: x for name, x in vectors.items() if x.ndim == 1}
-    long = max((x.size for x in flat.values()), default=0)
-    matrices = [x for x in vectors.values() if x.ndim == 2]
-    if matrices and long < max(max(x.shape) for x in matrices):
-        return of_array(path, max(matrices, key=lambda x: x.size), spec)
-    for name, x in vectors.items():
-        refuse_long(path, max(x.shape, default=0))
-        if x.ndim == 2 and long in x.shape:  # a row, or a column, an axis
-            each = x if x.shape[1] == long else x.T
-            flat |= {f"{name}_{k}": row for k, row in enumerate(each)}
-    return of_vectors(tuple(flat), flat.__getitem__, spec)
+    vectors = {name: np.squeeze(x) for name, x in found.items()}
+    longest = max(vectors.values(), key=lambda x: max(x.shape, default=0))
+    refuse_long(path, max(longest.shape, default=0))
+    return of_array(path, longest, spec) if longest.ndim == 2 else _of_tree(vectors, spec)

@@ -122,7 +122,7 @@ def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Tabl
 def first_lines(path: Path, spec: FileSpec) -> Sequence[Sequence[str]]:
     """The first lines of a text file as fields. Raises BadLog where the file is not text."""
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
-    return _head_of(path, _head(path, spec.encoding), spec).fields
+    return _head_of(path, _decode(path, spec.encoding, _HEAD_BYTES), spec).fields
 
 
 class _Head(NamedTuple):
@@ -175,24 +175,13 @@ def _refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
         )
 
 
-def _head(path: Path, encoding: str) -> str:
-    """More than `_EXAMINED` characters of the file, or all that it has."""
-    content = text_bytes(path, _HEAD_BYTES)
-    if len(content) == _HEAD_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
-        whole = content[: content.rfind(b"\n") + 1]
-        try:
-            text = whole.decode(encoding).removeprefix("\ufeff")
-        except (LookupError, UnicodeDecodeError):
-            text = ""
-        if len(text) > _EXAMINED and "\0" not in text:
-            return as_table(text)
-    return _decode(path, encoding)
-
-
-def _decode(path: Path, encoding: str) -> str:
-    content = text_bytes(path)
+def _decode(path: Path, encoding: str, most: int | None = None) -> str:
+    """The text, or the whole lines among so many first bytes of it."""
+    content = text_bytes(path, most)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        encoding = "utf-16"
+        encoding, content = "utf-16", content[: len(content) // 2 * 2]
+    elif len(content) == most:
+        content = content[: content.rfind(b"\n") + 1]
     try:
         text = content.decode(encoding)
     except LookupError:

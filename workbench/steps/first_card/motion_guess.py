@@ -75,9 +75,9 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
         if (one.header.speed or force) and one.header.angle and one.axis in ("", y.axis):
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
-    if y.header.unit is None and (angle := _of_quarters(roles)):
-        why = f"its reference goes by quarters of a turn in {angle}"
-        return MotionGuess("rotary", why, False, rotor, angle)
+    if y.header.unit is None and (quarters := _of_quarters(roles)):
+        why = f"its reference goes by quarters of a turn in {quarters}"
+        return MotionGuess("rotary", why, False, rotor, quarters)
     drive = roles.columns.get("F" if roles.kind == "force" else "u")
     if drive is not None and y.motion is not None and y.header.unit is None:
         angle = of_a_weight(y.motion, y.x, drive.x, {**TURN_IN, "turn": 1.0})

@@ -66,6 +66,7 @@ A_DECADE_ALIKE, MOST_ALIKE = (
     4.5,
 )  # a decade by which a reference is nearer to the position
 A_DECADE_LEFT, MOST_LEFT = 2.5, 5.0  # a decade by which less than a tenth of a force is unexplained
+TURNED_WITH_IT = ("work", "balance", "coulomb", "m", "inertia")  # by the sign of a force
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -200,14 +201,7 @@ def turned(law: ForceLaw) -> ForceLaw:
     """The law of the signal with the sign of a force."""
     if law.way > 0.0:
         return law
-    return law._replace(
-        way=1.0,
-        work=-law.work,
-        balance=-law.balance,
-        coulomb=-law.coulomb,
-        m=-law.m,
-        inertia=-law.inertia,
-    )
+    return law._replace(way=1.0, **{name: -getattr(law, name) for name in TURNED_WITH_IT})
 
 
 def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
