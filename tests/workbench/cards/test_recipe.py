@@ -224,7 +224,11 @@ def test_a_compensator_knows_the_plant_s_friction_or_another(tmp_path: Path) -> 
         ("{ k = 3.0 }", "{ k = nan }", "effect 'spring': k = nan N/m, must lie in"),
         ("{ k = 3.0 }", '{ k = "3 N" }', "spring.k: unit 'N' is of another kind than 'N/m'"),
         ("{ k = 3.0 }", '{ k = "3 N/q" }', "spring.k: unit 'N/q' is unknown"),
-        ("{ k = 3.0 }", '{ k = "stiff" }', "spring.k = 'stiff': a number needed, or one with a unit as 'N/m'"),
+        (
+            "{ k = 3.0 }",
+            '{ k = "stiff" }',
+            "spring.k = 'stiff': a number needed, or one with a unit as 'N/m'",
+        ),
         ("{ k = 3.0 }", "{ k = -1e99 }", "k = -1e+99 N/m, must lie in"),
     ],
 )

@@ -17,7 +17,7 @@ TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
-MOST_QUARTERS, QUARTER = 20, 1e-3  # levels of a reference by quarters of a turn, and off one
+MOST_QUARTERS, OFF_QUARTER = 20, 1e-3  # levels of a reference by quarters of a turn, and off one
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 
@@ -93,7 +93,7 @@ def _of_quarters(roles: Roles) -> str:
     levels = roles.columns["r"].levels if "r" in roles.columns else np.zeros(0)
     for unit, turn in TURN_IN.items() if len(levels) < MOST_QUARTERS else ():
         quarters = 4.0 * levels / turn
-        if np.any(levels) and np.allclose(quarters, np.round(quarters), rtol=0.0, atol=QUARTER):
+        if np.any(levels) and np.allclose(quarters, np.round(quarters), rtol=0.0, atol=OFF_QUARTER):
             return unit
     return ""
 

@@ -128,7 +128,7 @@ def _unreadable(columns: Columns, given: Units) -> str:
 def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) -> Units:
     """Units of clock, position, force and velocity that go together best."""
     turns = "" if motion.motion == "linear" else " rotary"
-    usual = {"t": _clock_units(columns.clock), "y": USUAL[f"y{turns}"]}
+    usual = {"t": USUAL["t"], "y": USUAL[f"y{turns}"]}
     for name in ("F", "v"):
         usual[name] = USUAL[f"{name}{turns}"] if name in roles.columns else {"": 0.0}
     open_of = {k: {given[k].unit: 0.0} if k in given else of for k, of in usual.items()}
@@ -148,19 +148,19 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         if name in given or unit == "":
             continue
         others = [(score, other[name]) for score, other in scored if other[name] != unit]
-        counted = name == "t" and not others  # from 1970 on
         related = _by_relation(name, names, given, slope)
-        why = "by its size, the header says none"
-        if counted or related:
-            why = "it counts from 1970" if counted else "by the velocity and the position"
-        rival = others[0][1] if others else ""
-        out[name] = UnitGuess(unit, None, counted or related, why, rival)
+        why = "by the velocity and the position" if related else "by its size, the header says none"
+        out[name] = UnitGuess(unit, None, related, why, others[0][1] if others else "")
     return out
 
 
 def _ticks(columns: Columns) -> UnitGuess | None:
-    """The rate of a clock that counts ticks or days since an epoch; None where it does not."""
+    """The unit of a clock that counts from 1970, or the rate of one that counts ticks or days since
+    an epoch; None where it does neither."""
     first, step = float(columns.clock.values[0]), columns.step
+    for unit, (low, high) in EPOCHS.items():
+        if low < first < high:
+            return UnitGuess(unit, None, True, "it counts from 1970")
     for gain, ranges in TICKS.items():
         fits = step >= SHORTEST_TICK if first > 1e9 else step < LONGEST_DAY
         if fits and any(low < first < high for low, high in ranges):
@@ -177,15 +177,6 @@ def _increment(columns: Columns) -> UnitGuess | None:
         if INCREMENTS & set(words_of(one.raw.header)) and NUMBER.fullmatch(step):
             return UnitGuess("1", f"{1.0 / float(step):.9g} 1/s", True, f"by {one.raw.header!r}")
     return None
-
-
-def _clock_units(clock: Column) -> Mapping[str, float]:
-    """Units that a clock may have: of a time since 1970 that one, of sample numbers none."""
-    first = float(clock.values[0])
-    for unit, (low, high) in EPOCHS.items():
-        if low < first < high:
-            return {unit: 0.0}
-    return USUAL["t"]
 
 
 def _plausible(
