@@ -90,34 +90,28 @@ def _parts(rows: Sequence[Sequence[str]]) -> list[_Part] | None:
 def _rewritten(text: str, delimiter: str, parts: Sequence[_Part]) -> str:
     """The text as a table of numbers, in the header what stood around them."""
     lines = text.splitlines()
-    data = next(k for k, line in enumerate(lines) if _holds(_split(line, delimiter), parts))
+    body = [_numbers(line, delimiter, parts) for line in lines]
+    data = next(k for k, numbers in enumerate(body) if numbers is not None)
     above = _split(lines[data - 1], delimiter) if data else []
     names = above if len(above) == len(parts) and not any(map(is_number, above)) else ()
     names = names or [""] * len(parts)
     header = [one.header(name) for one, name in zip(parts, names, strict=True)]
     if not all(header):  # a column without any name
         header = [one or str(k) for k, one in enumerate(header)]
-    body = [_numbers(line, delimiter, parts) for line in lines[data:]]
-    return "\n".join([delimiter.join(header), *body, ""])
+    # A line that is laid out otherwise stays as it is.
+    rows = [numbers or line for numbers, line in zip(body[data:], lines[data:], strict=True)]
+    return "\n".join([delimiter.join(header), *rows, ""])
 
 
-def _holds(cells: Sequence[str], parts: Sequence[_Part]) -> bool:
-    """Whether a line is one of numbers with these parts around them."""
-    return len(cells) == len(parts) and all(
-        (is_number(cell) or is_time(cell)) if one.plain else _CELL.fullmatch(cell) is not None
-        for cell, one in zip(cells, parts, strict=True)
-    )
-
-
-def _numbers(line: str, delimiter: str, parts: Sequence[_Part]) -> str:
-    """A line with its numbers alone; one that is laid out otherwise as it is."""
-    cells = _split(line, delimiter)
-    if not _holds(cells, parts):
-        return line
-    found = (None if one.plain else _CELL.fullmatch(cell)
-             for cell, one in zip(cells, parts, strict=True))  # fmt: skip
-    bare = [cell if one is None else one["number"] for cell, one in zip(cells, found, strict=True)]
-    return delimiter.join(bare)
+def _numbers(line: str, delimiter: str, parts: Sequence[_Part]) -> str | None:
+    """A line with its numbers alone; None of one that has not these parts around them."""
+    bare, cells = list[str](), _split(line, delimiter)
+    for cell, one in zip(cells, parts, strict=False):
+        found = None if one.plain else _CELL.fullmatch(cell)
+        if found is None and not (one.plain and (is_number(cell) or is_time(cell))):
+            return None
+        bare.append(cell if found is None else found["number"])
+    return delimiter.join(bare) if len(cells) == len(parts) else None
 
 
 def _split(line: str, delimiter: str) -> list[str]:

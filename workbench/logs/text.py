@@ -98,11 +98,6 @@ def _of_long_rows(path: Path, body: str, marks: _Marks, spec: FileSpec) -> Table
     return of_array(path, np.array(numbers), spec.model_copy(update={"skip_rows": 0}))
 
 
-def holds_blocks(path: Path, spec: FileSpec) -> bool:
-    """Whether the tables of several variables stand one below the other in a text file."""
-    return bool(_blocks(_decode(path, spec.encoding), spec))
-
-
 def _blocks(text: str, spec: FileSpec) -> list[Block]:
     """The blocks of a text of which the card does not say where its table begins."""
     found = blocks_of(text) if not spec.skip_rows and spec.header is None else []

@@ -52,8 +52,6 @@ WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio 
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
 ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
-NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
-COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
 REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
 SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
 INCREMENTS = {"increment", "interval", "xincrement"}  # words of the time of a sample
@@ -78,11 +76,9 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
         out["y"] = UnitGuess(motion.angle, None, False, motion.why, rival)
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
-    if "t" not in out and (ticking := _ticks(columns)):
-        out["t"] = ticking
-    if "t" not in out and (step := _increment(columns)):
-        out["t"] = step
-    if "t" not in out and counts_samples(columns.clock):
+    if "t" not in out and (counted := _ticks(columns) or _increment(columns)):
+        out["t"] = counted
+    elif "t" not in out and counts_samples(columns.clock):
         out["t"] = by_sample_number(columns, roles, out)
     out |= _jointly(columns, roles, motion, out)
     if no_clock:
@@ -337,14 +333,10 @@ def by_reference(
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
     if turn is not None:
         return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
-    why, width = DATA_SHEET, float(np.ptp(y.numbers))
     if unit != "count":
-        return guess(_sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)), why)
-    span = 2.0 ** np.ceil(np.log2(max(width, 1.0)))
-    whole = width > NEARLY_A_TURN * span and float(np.min(y.numbers)) >= 0.0
-    if motion == "rotary" and whole and span in COUNTS_OF_A_TURN:
-        return guess(span, f"it spans nearly {span:.9g}, a turn it may be", number)
-    return guess(number, why, other)
+        of_range = float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)
+        return guess(_sensible(of_range), DATA_SHEET)
+    return guess(number, DATA_SHEET, other)
 
 
 def _by_velocity(
