@@ -170,7 +170,7 @@ def of_a_motor(one: Column) -> float:
 
 
 def limits(pairs: Pairs) -> dict[int, int]:
-    """Commands before a limiter: what comes out of it, each by its place."""
+    """Commands before a limiter or a sum: what comes out of it, each by its place."""
     likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
@@ -241,7 +241,7 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    like = found.likeness
+    like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
@@ -262,6 +262,12 @@ def ahead_of(seen: Seen, k: int) -> float:
     if y.header.purpose == "filtered" and one.header.purpose != "reference" and said(one, "y") > 0:
         score += OF_A_COPY
     return score + _named_for(seen, k)
+
+
+def _alike_then(y: Array, r: Array, ahead: int) -> float:
+    """Correlation of a position with what is ahead of it by so many samples."""
+    late, early = (y[ahead:], r[: len(r) - ahead]) if ahead >= 0 else (y[:ahead], r[-ahead:])
+    return float(np.corrcoef(late, early)[0, 1])
 
 
 def _named_for(seen: Seen, k: int) -> float:
