@@ -165,17 +165,22 @@ class PresentPPI(_Common):
     """share of the reference's speed that is fed forward"""
 
 
-class PresentRST(_Common):
-    """An RST as a card writes it."""
+class Polynomials(CardTable):
+    """Those of an RST."""
 
-    kind: Literal["RST"]
-    """S u = T r - R y"""
     R: tuple[float, ...] = Field(min_length=1)
     """coefficients in z^-1"""
     S: tuple[float, ...] = Field(min_length=1)
     """coefficients in z^-1"""
     T: tuple[float, ...] = Field(min_length=1)
     """coefficients in z^-1"""
+
+
+class PresentRST(Polynomials, _Common):
+    """An RST as a card writes it."""
+
+    kind: Literal["RST"]
+    """S u = T r - R y"""
 
 
 ControllerSection = Annotated[

@@ -25,6 +25,7 @@ from identification.signals.excitation import (
     Steps,
     Sum,
 )
+from workbench.cards.controller import Polynomials
 from workbench.cards.effect_values import written_effect
 from workbench.cards.table import CardTable, Divisor, NotNegative, Positive
 from workbench.cards.units import Motion
@@ -153,17 +154,11 @@ class RecipePID(CardTable):
     """s"""
 
 
-class RecipeRST(CardTable):
+class RecipeRST(Polynomials):
     """Polynomials in z^-1: S(z^-1) F_ref = T(z^-1) r - R(z^-1) y."""
 
     kind: Literal["RST"]
     """S F_ref = T r - R y, in z^-1"""
-    R: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    S: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    T: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
 
 
 class RecipeForcePI(CardTable):

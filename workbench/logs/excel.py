@@ -103,15 +103,11 @@ def _shown(row: list[Any]) -> list[str]:
     return texts if any(texts) else []
 
 
-def _point(cell: Any) -> Any:
-    """The cell, a number as text with a decimal point."""
-    if isinstance(cell, str) and NUMBER.fullmatch(cell.strip()):
-        return cell.strip().replace(",", ".")
-    return cell
-
-
 def _column(rows: list[list[Any]], number: int) -> RawColumn:
-    cells = [_point(row[number]) if number < len(row) else None for row in rows]
+    """A column's cells, numbers that are text with a decimal point; all as numbers where they are."""
+    cells = [row[number] if number < len(row) else None for row in rows]
+    texts = [isinstance(cell, str) and NUMBER.fullmatch(cell.strip()) for cell in cells]
+    cells = [one[0].replace(",", ".") if one else x for x, one in zip(cells, texts, strict=True)]
     if any(isinstance(cell, str | date | time | timedelta) and cell != "" for cell in cells):
         return np.asarray(cells, dtype=object)
     return np.asarray([np.nan if cell in ("", None) else float(cell) for cell in cells])

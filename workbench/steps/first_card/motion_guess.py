@@ -109,15 +109,11 @@ def is_count(y: Column) -> bool:
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:
-    """Unit of an angle and its evidence: its steps are a turn over a power of two, or it leaps
-    by a turn; None where neither is so."""
-    leap = float(np.max(np.abs(np.diff(y.numbers)), initial=0.0))
+    """Unit of an angle whose steps are a turn over a power of two, and that; None of others."""
     for unit, turn in TURN_IN.items():
         power = np.log2(turn / y.step) if y.step > 0.0 else 0.5
         if abs(power - round(power)) < WHOLE_POWER:
             return unit, f"its steps are a turn over {2 ** round(power)}"
-        if abs(leap / turn - 1.0) < WRAPS and float(np.ptp(y.numbers)) < (1.0 + WRAPS) * turn:
-            return unit, "it leaps by a turn"
     return None
 
 

@@ -19,7 +19,6 @@ from identification.signals.relations import (
 from workbench.steps.first_card.axes import correlation, normed, stem
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 
-HALF_VELOCITY = 0.5  # share of a column, from which it may be the velocity that comes late
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
 MOST_CONSTANT = 0.3  # of a signal's spread, that a derivative is off the change of what it is of
@@ -179,8 +178,8 @@ def _both(one: Column, other: Column) -> tuple[Array, Array]:
 class Seen:
     """The other columns as a position sees them; `at` is its place among them.
 
-    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,),
-    the share where it comes late too; v_constant: what is constant beside it, in units of the
+    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,);
+    v_constant: what is constant beside it, in units of the
     spread.
     """
 
@@ -195,10 +194,6 @@ class Seen:
         square, together = max(float(v @ v), 1e-300), v @ f
         self.v_factor = together / square
         self.v_share = together**2 / square / np.maximum(np.sum(f**2, axis=0), 1e-300)
-        for k in np.flatnonzero((self.v_share > HALF_VELOCITY) & (together > 0.0)).tolist():
-            late = lead(v, f[:, k])  # a drive's velocity comes late, by its filter
-            if late.samples > 0.0 and late.likeness > 0.0:
-                self.v_share[k] = max(self.v_share[k], late.likeness**2)
         spread = np.maximum(np.std(self.smooth[inside], axis=0), 1e-300)
         constant = self.smooth[inside].mean(axis=0) - self.v_factor * self.motion.v[inside].mean()
         self.v_constant = np.abs(constant) / spread

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,12 @@ class SignalGuess:
     rival: str = ""
     summed: bool = False
 
+    def as_json(self) -> dict[str, Any]:
+        """The signal as --json prints it."""
+        own = asdict(self)
+        del own["name"], own["shown"]
+        return {**own, "else": own.pop("rival")}
+
 
 @dataclass(frozen=True)
 class RigGuess:
@@ -123,12 +129,7 @@ class Proposal:
                     **{one.key: one.value for one in self.rig}},
             "sure": {one.key: one.sure for one in self.rig},
             "else": {one.key: one.rival for one in self.rig if one.rival},
-            "signals": {
-                one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
-                           "bits": one.bits, "summed": one.summed, "sure": one.sure, "why": one.why,
-                           "else": one.rival}
-                for one in self.signals
-            },
+            "signals": {one.name: one.as_json() for one in self.signals},
             "file": self.spec.model_dump(exclude_defaults=True),
             "unused": dict(self.unused),
             "hardly_told": self.hardly,

@@ -39,7 +39,6 @@ NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 EXACT_VELOCITY = 0.9995  # the same, from which it was made of the position, whatever its name
-AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
 MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
 BEHIND = -6.0  # for a reference that is behind the position, as another sensor or a model is
@@ -58,8 +57,7 @@ STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's co
 OF_A_COPY = -5.0  # for a reference that is filtered from a position, or filtered to one
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
-FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
-AS_FAR = 0.25  # of its range, that a reference of few levels is off the position's at most
+FLAG_AS_REFERENCE = -3.0
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
@@ -248,9 +246,6 @@ def ahead_of(seen: Seen, k: int) -> float:
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
-    if one.flag and found.likeness > AS_LIKE:
-        far = float(np.ptp(one.x)) / float(np.diff(np.quantile(y.x, (0.02, 0.98)))[0])
-        score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
     rough = one.noise / max(float(np.std(one.x)), 1e-300)
     rough /= max(y.noise / max(float(np.std(y.x)), 1e-300), 1e-300)
     score += 1.0 if rough < 1.0 else -1.0 if rough < ROUGHER else -2.0
