@@ -31,10 +31,9 @@ from workbench.logs.faulty_rows import (
     stretches,
     told_of_starts,
 )
-from workbench.logs.summed import summed, with_sums
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
-from workbench.logs.times import seconds
+from workbench.logs.times import seconds, summed
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
@@ -154,7 +153,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole = whole if np.all(rows) else at_rows(whole, rows)
         whole["t"], late = late_stamps(whole["t"])
         said = (*said, late) if late else said
-        whole, of_speeds = with_sums(whole, card.signals)
+        whole, of_speeds = _with_sums(whole, card.signals)
         told = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))
         return Log(called, whole), table.first_row, told
 
@@ -166,7 +165,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         return _signal(table, number, "t", card, path)[0]
 
     found = on_one_clock(signals, groups, clock, called)
-    whole, of_speeds = with_sums(_same_length(found.signals, path), card.signals)
+    whole, of_speeds = _with_sums(_same_length(found.signals, path), card.signals)
     told = tuple(f"{called}: {one}" for one in (*remarks, *of_speeds))
     return Log(called, whole), table.first_row + found.first, (*told, *found.remarks)
 
@@ -262,3 +261,20 @@ def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
                 "all signals of a run need one length"
             )
     return {k: v if len(v) == length else np.full(length, v[0]) for k, v in signals.items()}
+
+
+def _with_sums(
+    signals: dict[str, Array], specs: Mapping[str, SignalSpec]
+) -> tuple[dict[str, Array], list[str]]:
+    """The signals, of which positions are summed where the log has their speed, and what is said
+    of that."""
+    said = list[str]()
+    for name in (name for name, spec in specs.items() if spec.summed and name != "t"):
+        with np.errstate(invalid="ignore"):  # of times that are none, which are refused later
+            step = np.diff(signals["t"], prepend=signals["t"][:1])
+        signals = {**signals, name: summed(signals[name], step)}
+        said.append(
+            f"{name!r} is the speed {specs[name].column!r} summed over time: so is its noise, which"
+            " makes part of what a run leaves of the position, and of what seems missing"
+        )
+    return signals, said

@@ -18,8 +18,7 @@ from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
 from workbench.logs.clocks import clock_groups, topic_groups
 from workbench.logs.faulty_rows import are_few
-from workbench.logs.labelled import as_table
-from workbench.logs.layout import Layout, find_layout, is_number
+from workbench.logs.layout import Layout, as_table, find_layout, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table, of_array
 from workbench.logs.times import with_whole_seconds

@@ -9,10 +9,10 @@ import pytest
 
 from identification.errors import BadLog
 from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card.column import read_register
 from workbench.steps.first_card.columns import columns_of
 from workbench.steps.first_card.proposal import Proposal, proposed
-from workbench.steps.first_card.refusals import no_body
-from workbench.steps.first_card.registers import read_register
+from workbench.steps.first_card.remarks import no_body
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
 H, HOLD, LATE = 0.005, 4, 20  # s a row; rows for which a value is held; rows of a speed's mean

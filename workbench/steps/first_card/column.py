@@ -1,7 +1,9 @@
-"""A column of an unknown log, and what its values by themselves show."""
+"""A column of an unknown log, what its values by themselves show, and registers: counts below zero
+in two's complement or by a bit of sign, and parts of counts."""
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +13,82 @@ from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
 from workbench.cards.headers import Header, words_of
 from workbench.logs.unknown import RawColumn
-from workbench.steps.first_card.registers import Register
+
+BITS = (16, 32)  # of a register that counts below zero as two's complement
+FEWEST_BITS = 8  # of a magnitude beside its sign
+BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
+NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
+# Of leaps at a bit of sign: how many at least, the share of those near zero, how far it goes both
+# ways, and times all magnitudes that the bit is far above them.
+FEWEST_LEAPS, OFTEN_NEAR, BOTH_WAYS, FAR_ABOVE = 4, 0.25, 0.25, 2.0
+SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
+COUNT_PARTS = 256.0  # of a count that is halved again and again
+LONG_WAY_OF_COUNTS = 1000.0  # that such a position covers at least
+OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
+
+
+class Register(NamedTuple):
+    """A column as its register means it: bits of two's complement, or the bit of its sign.
+
+    row: where it first leaps, a row of data from 1.
+    """
+
+    values: Array
+    bits: int | None
+    sign_bit: int | None = None
+    row: int = 0
+
+
+def read_register(x: Array) -> Register | None:
+    """The column (n,) of whole numbers as signed ones; None where it is as it stands."""
+    finite = x[np.isfinite(x)]
+    if len(finite) < 2 or finite.min() < 0 or np.any(finite != np.round(finite)):
+        return None
+    for bits in BITS:
+        top = 2.0**bits
+        middle = (finite > top / 8) & (finite < top * 7 / 8)
+        low, high = np.mean(finite <= top / 8), np.mean(finite >= top * 7 / 8)
+        if finite.max() < top and np.mean(middle) < BETWEEN_SIGNS and low > 0.0 and high > 0.0:
+            return Register(np.where(x >= top / 2, x - top, x), bits)
+    return _sign_and_magnitude(x)
+
+
+def _sign_and_magnitude(x: Array) -> Register | None:
+    """The column whose topmost bit is the sign: it leaps by that bit where it passes zero.
+
+    In a few rows a stroke it passes zero within a row: then by those leaps that are near it, which
+    no signal has that goes through the bit's value; or, where that is far above all else, by this.
+    """
+    finite = x[np.isfinite(x)]
+    bit = int(np.log2(max(finite.max(), 1.0)))
+    top = 2.0**bit
+    if bit < FEWEST_BITS or not np.any(finite < top):
+        return None
+    read = np.where(x >= top, top - x, x)
+    most, least = float(np.nanmax(np.abs(read))), float(min(np.nanmax(read), -np.nanmin(read)))
+    step, smooth = np.abs(np.diff(x)), np.abs(np.diff(read))
+    leaps = np.flatnonzero((x[1:] >= top) != (x[:-1] >= top))
+    if not len(leaps):
+        return None
+    near = np.maximum(np.abs(read[leaps]), np.abs(read[leaps + 1])) <= NEAR_ZERO * most
+    slow = np.nanmax(smooth) <= SMOOTHER * np.nanmax(step) and np.mean(near) >= 0.5
+    both = len(leaps) >= FEWEST_LEAPS and least > BOTH_WAYS * most
+    apart = FAR_ABOVE * most < top and finite[finite >= top].min() - top <= NEAR_ZERO * most
+    if slow or (both and (np.mean(near) >= OFTEN_NEAR or apart)):
+        return Register(read, None, bit, int(leaps[0]) + 2)
+    return None
+
+
+def halved_counts(x: Array) -> bool:
+    """Whether steps are counts that a drive interpolates, in parts of a power of two."""
+    if float(np.ptp(x)) < LONG_WAY_OF_COUNTS:
+        return False
+    parts = COUNT_PARTS * np.diff(x)
+    off = np.abs(parts - np.round(parts))
+    decimal = 1000.0 * np.diff(x)  # millimetres, or degrees, to three places have such steps too
+    return bool(np.mean(off < OFF_PART) > MOSTLY and np.mean(
+        np.abs(decimal - np.round(decimal)) < OFF_PART) < MOSTLY)  # fmt: skip
+
 
 COLUMN = "column"
 MOST_ROWS_READ = 10_000

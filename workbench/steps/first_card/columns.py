@@ -24,8 +24,7 @@ from workbench.logs.faulty_rows import (
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
-from workbench.steps.first_card.column import MOST_ROWS_READ, Column
-from workbench.steps.first_card.registers import read_register
+from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_register
 
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)

@@ -8,8 +8,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.signals.relations import of_a_weight
 from workbench.cards.units import Motion
-from workbench.steps.first_card.column import Column
-from workbench.steps.first_card.registers import halved_counts
+from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.roles import Roles
 
 WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one

@@ -17,16 +17,19 @@ from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns, columns_of
 from workbench.steps.first_card.motion_guess import known_motion
-from workbench.steps.first_card.refusals import (
+from workbench.steps.first_card.remarks import (
+    BALANCED,
     SAID_SO,
+    are_exchanged,
+    behind_reference,
     no_body,
     of_axis,
     refuse_error,
     refuse_resting,
     refuse_sign_bits,
     refuse_undriven,
+    remarks_on,
 )
-from workbench.steps.first_card.remarks import BALANCED, are_exchanged, behind_reference, remarks_on
 from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.sums import with_position, without_names

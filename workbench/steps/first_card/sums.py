@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.thresholds import HALF
-from workbench.logs.summed import summed
+from workbench.logs.times import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns

@@ -17,7 +17,7 @@ from identification.signals.relations import derivative, lead
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion, force_unit
 from workbench.logs.layout import NUMBER
-from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
     MotionGuess,
@@ -25,7 +25,6 @@ from workbench.steps.first_card.motion_guess import (
     is_count,
     unit_by_turn,
 )
-from workbench.steps.first_card.registers import BITS
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
 

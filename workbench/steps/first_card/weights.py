@@ -12,9 +12,8 @@ from identification.arrays import Array
 from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
-from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.pairs import Pairs, Seen
-from workbench.steps.first_card.registers import halved_counts
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
