@@ -89,9 +89,6 @@ def estimates_in_si(
     out: dict[str, Estimate] = {}
     for name, found in estimates.items():
         unit = units[name]
-        if found.unit == unit:
-            out[name] = found
-            continue
         plain, target = (_with_exponents(one, values) for one in (found.unit, unit))
         same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]")
         out[name] = replace(same, unit=unit)

@@ -146,13 +146,6 @@ def on_one_clock(
         times = clock(group)
         if np.array_equal(times, base, equal_nan=True):
             continue
-        if _same_but_for_ends(times, base):
-            for name in members[group]:
-                values = signals[name][: len(base)]
-                missing = (0, len(base) - len(values))
-                every[name] = np.pad(values, missing, constant_values=np.nan)
-            usable[len(times) :] = False
-            continue
         known = np.isfinite(times)
         _check(f"{where}, the clock of group {group!r}", times[known])
         period = _period(times)
@@ -181,13 +174,6 @@ def on_one_clock(
     first, last = (int(np.flatnonzero(usable)[k]) for k in (0, -1))
     parts = {name: values[first : last + 1] for name, values in every.items()}
     return OneClock(parts, first, tuple(remarks))
-
-
-def _same_but_for_ends(times: Array, base: Array) -> bool:
-    """Whether one clock is the other's beginning, a few rows at the end apart."""
-    both = min(len(times), len(base))
-    rows = abs(len(times) - len(base))
-    return 0 < rows <= FEW_ROWS and bool(np.array_equal(times[:both], base[:both]))
 
 
 def _period(times: Array) -> float:

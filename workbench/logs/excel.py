@@ -104,7 +104,7 @@ def _shown(row: list[Any]) -> list[str]:
 
 
 def _column(rows: list[list[Any]], number: int) -> RawColumn:
-    """A column's cells, numbers that are text with a decimal point; all as numbers where they are."""
+    """A column's cells, numbers that are text with a decimal point."""
     cells = [row[number] if number < len(row) else None for row in rows]
     texts = [isinstance(cell, str) and NUMBER.fullmatch(cell.strip()) for cell in cells]
     cells = [one[0].replace(",", ".") if one else x for x, one in zip(cells, texts, strict=True)]

@@ -21,7 +21,6 @@ from workbench.logs.channels import read_mdf, read_tdms, read_ulog
 from workbench.logs.excel import read_excel
 from workbench.logs.messages import read_bag, read_mcap
 from workbench.logs.packed import GZIP, ZIP, text_bytes
-from workbench.logs.structs import plain_tree, records, tags_are_sound, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
     RawColumn,
@@ -29,7 +28,11 @@ from workbench.logs.table import (
     damaged,
     of_array,
     of_vectors,
+    plain_tree,
+    records,
     refuse_long,
+    tags_are_sound,
+    vectors_of,
 )
 from workbench.logs.text import read_text_table
 

@@ -263,10 +263,8 @@ def _more_runs(
     """What is said of further lists that hold rows as the one that is read does."""
     more = [repr(".".join(other)) for one, other in lists
             if other != place and _shape(one[0]) == _shape(rows[0])]  # fmt: skip
-    if not more:
-        return ""
-    runs = f"{', '.join(more)} hold rows as {'.'.join(place)!r} does"
-    return f"{runs}, which the card reads; give another run by the card's [file] rows"
+    runs = f"{', '.join(more)} hold rows as {'.'.join(place)!r} does, which the card reads"
+    return f"{runs}; give another run by the card's [file] rows" if more else ""
 
 
 def _shape(row: Any) -> Any:

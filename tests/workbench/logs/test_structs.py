@@ -9,8 +9,7 @@ import scipy.io
 
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
-from workbench.logs.structs import vectors_of
-from workbench.logs.table import damaged
+from workbench.logs.table import damaged, vectors_of
 from workbench.logs.tables import read_table
 from workbench.logs.unknown import read_unknown
 

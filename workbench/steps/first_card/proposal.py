@@ -16,7 +16,7 @@ from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns, columns_of
-from workbench.steps.first_card.motion_guess import known_motion
+from workbench.steps.first_card.motion_guess import UnitGuess, factor, known_motion
 from workbench.steps.first_card.remarks import (
     BALANCED,
     SAID_SO,
@@ -31,7 +31,6 @@ from workbench.steps.first_card.remarks import (
     remarks_on,
 )
 from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
-from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.sums import with_position, without_names
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said

@@ -15,9 +15,9 @@ from workbench.cards.headers import words_of
 from workbench.steps.first_card.axes import is_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import NEARLY_ALIKE, PHASE_CURRENT, Columns
+from workbench.steps.first_card.motion_guess import UnitGuess, factor
 from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, are_constant
-from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
 from workbench.steps.first_card.weights import SURE, said, together
 

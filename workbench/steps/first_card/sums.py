@@ -10,8 +10,8 @@ from workbench.logs.times import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
+from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
 from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
-from workbench.steps.first_card.sizes import USUAL, factor, likeliest
 from workbench.steps.first_card.weights import said
 
 EXPLAINED = 0.9  # share of a drive, by inertia and friction along a sum that no name calls so

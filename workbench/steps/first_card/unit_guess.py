@@ -20,13 +20,18 @@ from workbench.logs.layout import NUMBER
 from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
+    USUAL,
     MotionGuess,
+    UnitGuess,
     counts_per_turn,
+    factor,
     is_count,
+    likeliest,
+    metre,
+    near,
     unit_by_turn,
 )
 from workbench.steps.first_card.roles import Roles
-from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
 
 EPOCHS = {"s": (1e9, 3e9), "ms": (1e12, 3e12), "us": (1e15, 3e15), "ns": (1e18, 3e18)}
 AGREES = 0.1  # relative error up to which a logged velocity is the position's derivative in SI

@@ -31,7 +31,6 @@ from workbench.steps.first_card.weights import (
 )
 
 MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
-FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
@@ -74,12 +73,7 @@ def bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
         found = [one for one in found if said(pairs.signals[one[1]], "y") >= 0.0]
     if not found:
         return []
-    first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
-    found = sorted(
-        ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)
-         for own, k in found),
-        reverse=True,
-    )  # fmt: skip
+    found.sort(reverse=True)
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
     pairs.bodies = {k: Seen(pairs, k) for _, k in likely}
     return [(pairs.bodies[k], score) for score, k in likely]
@@ -93,9 +87,6 @@ def ways_of(
     drive, acting: log-odds of each signal as either, by what it is of the others.
     """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
-    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_SAYS]
-    # what the velocity follows may well drive a valve, where nothing else is said to drive
-    alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
     places = [i for i, one in enumerate(pairs.signals) if said(one, "y") >= HEADER_SAYS]
     for k, law in enumerate(laws):
         one = pairs.signals[k]
@@ -104,9 +95,9 @@ def ways_of(
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
             continue
-        if one is not alone and np.max(pairs.rate[[seen.at, *places], k]) > EXACT_VELOCITY:
+        if np.max(pairs.rate[[seen.at, *places], k]) > EXACT_VELOCITY:
             continue  # the velocity of this position, or of what is called another
-        v_share = 0.0 if one is alone else float(seen.v_share[k])
+        v_share = float(seen.v_share[k])
         physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
         physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
         force = law.way * seen.smooth[:, k]
