@@ -101,8 +101,9 @@ def are_runs(blocks: Sequence[Block]) -> bool:
     return len(heads) == 1 and heads != {()} and any(one.width > PAIR for one in blocks)
 
 
-def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
-    """The columns of the blocks, a group each: its clock, and its variables.
+def block_table(path: Path, blocks: Sequence[Block], decimal: str | None) -> Table:
+    """The columns of the blocks, a group each: its clock, and its variables; decimal: the sign of
+    numbers, None: by looking.
 
     Raises BadLog where the blocks are of the same names, and not of the same columns.
     """
@@ -112,6 +113,8 @@ def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
             f"{path}: holds {len(blocks)} tables one below the other, of the same columns (rows"
             f" again from line {blocks[1].first + 1}): several runs, it seems; give each a file"
         )
+    middle = blocks[0].rows[len(blocks[0].rows) // 2]
+    sign = decimal or ("," if "," in middle and blocks[0].mark != "," else ".")
     columns, clocks = list[tuple[str, str, Block, int]](), dict[str, int]()
     for k, (block, own) in enumerate(zip(blocks, called, strict=True)):
         group = own if own not in clocks else f"{own} {k + 1}"
@@ -130,15 +133,9 @@ def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
     def fetch(number: int) -> RawColumn:
         *_, one, column = columns[number]
         cells = (one.fields(row)[column] for row in one.rows)
-        return np.array([float(cell.replace(decimal, ".")) if cell else np.nan for cell in cells])
+        return np.array([float(cell.replace(sign, ".")) if cell else np.nan for cell in cells])
 
     return Table(names, fetch, blocks[0].first + 1, True, groups, clocks)
-
-
-def decimal_of(blocks: Sequence[Block]) -> str:
-    """The decimal sign of the rows."""
-    row = blocks[0].rows[len(blocks[0].rows) // 2]
-    return "," if "," in row and blocks[0].mark != "," else "."
 
 
 def _may_have_blocks(text: str) -> bool:

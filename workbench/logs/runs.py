@@ -22,18 +22,19 @@ from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
-from workbench.logs.faulty_rows import (
+from workbench.logs.table import Table, number_of, text_of
+from workbench.logs.tables import read_table
+from workbench.logs.times import (
     at_rows,
     late_stamps,
     numbers_in,
+    seconds,
     several_axes,
     sound_rows,
     stretches,
+    summed,
     told_of_starts,
 )
-from workbench.logs.table import Table, number_of, text_of
-from workbench.logs.tables import read_table
-from workbench.logs.times import seconds, summed
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")

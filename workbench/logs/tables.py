@@ -349,10 +349,6 @@ def read_numpy(path: Path, spec: FileSpec) -> Table:
             f"{path}: holds Python objects (an array of dtype object), which are never unpickled;"
             " save the numbers alone: np.save(file, np.asarray(rows, dtype=float))"
         ) from None
-    return _of_archive(path, found, spec)
-
-
-def _of_archive(path: Path, found: dict[str, RawColumn], spec: FileSpec) -> Table:
     if spec.rows:
         if spec.rows not in found:
             raise BadLog(f"{path}: no array {spec.rows!r}{nearest(spec.rows, found)}")

@@ -15,13 +15,12 @@ from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
-from workbench.logs.blocks import Block, are_runs, block_table, blocks_of, decimal_of
+from workbench.logs.blocks import Block, are_runs, block_table, blocks_of
 from workbench.logs.clocks import clock_groups, topic_groups
-from workbench.logs.faulty_rows import are_few
 from workbench.logs.layout import Layout, as_table, find_layout, is_number
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table, of_array
-from workbench.logs.times import with_whole_seconds
+from workbench.logs.times import are_few, with_whole_seconds
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _BETWEEN_NAMES = re.compile(r"\t|\s{2,}")  # between names of several words
@@ -50,7 +49,7 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
     text = _decode(path, spec.encoding)
     if blocks := _blocks(text, spec):
-        return block_table(path, blocks, spec.decimal or decimal_of(blocks))
+        return block_table(path, blocks, spec.decimal)
     head = _head_of(path, text, spec)
     if not any(head.fields):
         raise BadLog(f"{path}: no rows after line {spec.skip_rows}; check skip_rows in the card")

@@ -19,11 +19,10 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header
 from workbench.files import refuse_larger
-from workbench.logs.faulty_rows import numbers_in
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
-from workbench.logs.times import seconds
+from workbench.logs.times import numbers_in, seconds
 
 FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
 LEAST_COMMON = 0.5  # of the clock's span, that another one shares

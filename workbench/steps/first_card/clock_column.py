@@ -12,8 +12,7 @@ from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
 from identification.thresholds import TWICE
 from workbench.cards.headers import read_header, words_of
-from workbench.logs.faulty_rows import MOST_STARTS, several_axes
-from workbench.logs.times import summed
+from workbench.logs.times import MOST_STARTS, several_axes, summed
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.column import Column
 

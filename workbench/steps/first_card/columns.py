@@ -15,7 +15,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
-from workbench.logs.faulty_rows import (
+from workbench.logs.times import (
     late_stamps,
     sound_rows,
     stretches,

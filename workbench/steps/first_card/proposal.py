@@ -40,6 +40,7 @@ CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
 )
+DRIVEN_THROUGH = {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",), "motor": ("u",)}
 DRIVEN_BY = {
     "electro-pneumatic": "F_e from two pressures",
     "force": "F_e is logged",
@@ -264,22 +265,17 @@ def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGues
 
 def _kind_guess(roles: Roles, other: Roles | None) -> RigGuess:
     """The kind of rig, by what drives the body; the next one with the column that would."""
-    drive = next(iter(_drives(roles)))
-    sure = bool(roles.ahead >= SURE and roles.odds[drive] >= SURE)
+    sure = bool(roles.ahead >= SURE and roles.odds[DRIVEN_THROUGH[roles.kind][0]] >= SURE)
     why = DRIVEN_BY[roles.kind]
     if not sure and other is not None:
-        why += f", by {drive_columns(roles)}; a {other.kind} rig would be driven by"
-        why += f" {drive_columns(other)}"
+        why += f", by {_drive_columns(roles)}; a {other.kind} rig would be driven by"
+        why += f" {_drive_columns(other)}"
     return RigGuess("kind", roles.kind, "", sure, why, "" if sure or other is None else other.kind)
 
 
-def _drives(roles: Roles) -> tuple[str, ...]:
-    return {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",)}.get(roles.kind, ("u",))
-
-
-def drive_columns(roles: Roles) -> str:
+def _drive_columns(roles: Roles) -> str:
     """The columns that drive the body, in words."""
-    return " and ".join(roles.columns[name].shown for name in _drives(roles))
+    return " and ".join(roles.columns[name].shown for name in DRIVEN_THROUGH[roles.kind])
 
 
 def _rig(

@@ -210,8 +210,9 @@ def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Colum
     if axis is None:
         return columns.signals, None
     name = axis.strip().casefold()
-    called = words_of(name)
-    places = [one.axis for one in columns.signals if one.axis and _has(one, called)]
+    called = " ".join(words_of(name))
+    said = ((one.axis, f" {' '.join(words_of(one.raw.header))} ") for one in columns.signals)
+    places = [axis for axis, text in said if axis and called and f" {called} " in text]
     own = {name} & set(columns.axes) or set(places)
     if len(own) == 1:
         (name,) = own
@@ -224,12 +225,6 @@ def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Colum
         f"{columns.log.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
         " a position"
     )
-
-
-def _has(one: Column, words: Sequence[str]) -> bool:
-    """Whether a header has these words one after the other."""
-    text = f" {' '.join(words_of(one.raw.header))} "
-    return bool(words) and f" {' '.join(words)} " in text
 
 
 def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:

@@ -43,12 +43,12 @@ def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles
         return None
     found = list[tuple[Columns, Roles]]()
     for own in signals:
-        summed, y = _summed(columns, [one for one in signals if one is not own], own)
-        roles = known_roles(summed.signals, y)
-        if roles and roles.law.share > 1.0 - HALF * left and abs(roles.law.work) > WORK_GIVES_SIGN:
-            found.append((summed, roles))
-    best = max(found, key=lambda one: one[1].law.share, default=None)
-    return best if best and best[1].law.share > EXPLAINED else None
+        whole, y = _summed(columns, [one for one in signals if one is not own], own)
+        roles = known_roles(whole.signals, y)
+        least = max(EXPLAINED, 1.0 - HALF * left)
+        if roles and roles.law.share > least and abs(roles.law.work) > WORK_GIVES_SIGN:
+            found.append((whole, roles))
+    return max(found, key=lambda one: one[1].law.share, default=None)
 
 
 def _summed(columns: Columns, kept: Sequence[Column], own: Column) -> tuple[Columns, Column]:

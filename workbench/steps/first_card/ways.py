@@ -15,6 +15,7 @@ from workbench.steps.first_card.weights import (
     AREA_RATIOS,
     EXACT_VELOCITY,
     FORCE_LIKENESS,
+    LEAST_WAY,
     MIRRORED,
     OF_A_CONTROLLER,
     RULED_OUT,
@@ -22,7 +23,6 @@ from workbench.steps.first_card.weights import (
     among_derivatives,
     driving,
     in_one_unit,
-    less_way,
     moves_like_a_body,
     of_a_motor,
     said,
@@ -98,7 +98,8 @@ def ways_of(
         if np.max(pairs.rate[[seen.at, *places], k]) > EXACT_VELOCITY:
             continue  # the velocity of this position, or of what is called another
         v_share = float(seen.v_share[k])
-        physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
+        less_way = one.way_gone < LEAST_WAY * y.way_gone  # which no force on it does
+        physics = driving(law, v_share, less_way) + together(y, one) + own
         physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:

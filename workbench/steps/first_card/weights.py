@@ -151,11 +151,9 @@ def among_derivatives(pairs: Pairs) -> Array:
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
     """Factors of two pressures to [Pa] where both headers give units of pressure, else 1."""
     units = [column.header.unit for column in (one, other)]
-    if any(unit is None or unit.quantity != "pressure" for unit in units):
-        return 1.0, 1.0
-    factors = [conversion(unit.card, "Pa") for unit in units if unit is not None]
-    first, second = (1.0 if of is None else of.factor for of in factors)
-    return first, second
+    factors = [conversion(u.card, "Pa") for u in units if u and u.quantity == "pressure"]
+    found = [one.factor for one in factors if one is not None]
+    return (found[0], found[1]) if len(found) == len(units) else (1.0, 1.0)
 
 
 def of_a_motor(one: Column) -> float:
@@ -223,11 +221,6 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     if law.way < 0.0:
         score -= 1.0
     return score - (3.0 if less_way else 0.0)
-
-
-def less_way(y: Column, one: Column) -> bool:
-    """Whether a signal goes less way than the position, which no force on it does."""
-    return one.way_gone < LEAST_WAY * y.way_gone
 
 
 def ahead_of(seen: Seen, k: int) -> float:
