@@ -60,11 +60,6 @@ def force_unit(motion: Motion) -> str:
     return _FORCE_UNIT[motion]
 
 
-def kind(signal: str, motion: Motion) -> str:
-    """What a canonical signal is, with units as examples."""
-    return _NAMES[si_unit(signal, motion) or ""]
-
-
 def commands(motion: Motion) -> tuple[str, ...]:
     """The units in which a command may be held: voltage, current, share, force."""
     return ("V", "A", "1", _FORCE_UNIT[motion])
@@ -232,7 +227,7 @@ def column_scale(
         raise BadCard(_mismatch(unit, number, per, signal, motion))
     if gain is not None and any(conversion(unit, output) for output in _OUTPUTS):
         return Scale(1.0 / number, 0.0)
-    text = f"signals.{signal}: unit {unit!r} is not {kind(signal, motion)}"
+    text = f"signals.{signal}: unit {unit!r} is not {_NAMES[si_unit(signal, motion) or '']}"
     if signal == "t":
         raise BadCard(text)
     shown = "<number>" if gain is None else f"{number:g}"
@@ -253,7 +248,7 @@ def _mismatch(unit: str, number: float, per: str, signal: str, motion: Motion) -
         right = f'gain = "<number> {unit}/{_per(signal, motion)}"'
     return (
         f"signals.{signal}: unit {unit!r} with gain '{number:g} {per}' does not give"
-        f" {kind(signal, motion)}; column = gain * signal, so write {right}"
+        f" {_NAMES[si_unit(signal, motion) or '']}; column = gain * signal, so write {right}"
     )
 
 

@@ -31,6 +31,7 @@ from workbench.steps.first_card.weights import (
 )
 
 MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
+FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
@@ -73,6 +74,9 @@ def bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
         found = [one for one in found if said(pairs.signals[one[1]], "y") >= 0.0]
     if not found:
         return []
+    axes = {k: pairs.signals[k].axis for _, k in found}
+    first = min(filter(None, axes.values()), default=None)
+    found = [(own + (FIRST_AXIS if axes[k] == first else 0.0), k) for own, k in found]
     found.sort(reverse=True)
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
     pairs.bodies = {k: Seen(pairs, k) for _, k in likely}
