@@ -168,9 +168,11 @@ def _no_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]) -
     least = _least_stick(name, values, sd)
     if limit not in values or abs(values[limit]) >= least:
         return None
+    found = abs(values[limit])
+    shown = "no stick limit found" if found <= AT_ZERO else f"found {limit} = {values[limit]:.3g}"
     return (
-        f"found {limit} = {values[limit]:.3g}, below the Coulomb level ({least:.3g} at least),"
-        f" which no stick limit is: not identifiable from these logs; {EXCITE}"
+        f"{shown}, below the Coulomb level ({least:.3g} at least), which none is: not identifiable"
+        f" from these logs; {EXCITE}"
     )
 
 

@@ -173,7 +173,7 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     found = recorded.halt.tried(
         LIKELIEST, lambda: prediction_error_fit(plant, names, recorded.logs, slowest), None
     )
-    if found is None or not found.is_likelier:
+    if found is None or not found.is_likelier or _bends(found.plant, fit, recorded):
         return fit
     more = between_samples_sd(found.names, values_of(found.plant, found.names), recorded, of=1.0)
     covariance = found.covariance + np.diag(more**2)
@@ -193,6 +193,16 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         covariance=block_diag(covariance, fit.covariance[np.ix_(at, at)]),
         remarks=(*fit.remarks, LIKELIEST_WHY),
     )
+
+
+def _bends(plant: Plant, fit: KarnoppFit, recorded: RecordedLogs) -> bool:
+    """Whether the numbers of a plant without effects leave clearly more of the equation of motion
+    than a fit's: then the force has not the noise by which they are likelier, as one that swings
+    with the body where it seems to be noise."""
+    if plant.effects:
+        return False
+    now, was = (left_by(p, recorded) for p in (plant.friction, fit.friction))
+    return now is not None and was is not None and now.by_plant > WORSE * was.by_plant
 
 
 def by_equation_if_surer(p: Karnopp, recorded: RecordedLogs) -> KarnoppFit | None:

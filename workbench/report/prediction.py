@@ -1,6 +1,7 @@
 """A prediction in words and as a picture."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes
 from workbench.steps.predict import Predicted, prediction_frame
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Columns = tuple[tuple[str, Colour, str], ...]
 POSITION_COLUMNS: Columns = (
@@ -61,9 +65,7 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
         [*more, notes(remarks, (Path(log).name,))],
         lambda: found.summary,
         {
-            "prediction.csv": lambda: prediction_frame(found.runs).to_csv(
-                index=False, float_format="%.10g"
-            )
+            "prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10),
         },
         sections,
         lambda: prediction_chart(found, rotary),
@@ -71,6 +73,18 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
         has_page=False,
         lead=first.rstrip(".") + ".",
     )
+
+
+def csv_text(frame: "pd.DataFrame", digits: int) -> str:
+    """A table with a time `t` [s] as CSV, its numbers with so many digits, the time with as many
+    decimals as its steps need: stamps count from 1970."""
+    t = np.asarray(frame["t"])
+    steps = np.abs(np.diff(t))
+    finest = float(np.min(steps[steps > 0.0], initial=1.0))
+    known = 15 - int(np.ceil(np.log10(max(float(np.max(np.abs(t))), 1.0))))  # of a double
+    decimals = min(known, digits - 5 - int(np.floor(np.log10(finest))))
+    times = [f"{x:.{decimals}f}".rstrip("0").rstrip(".") for x in t]
+    return str(frame.assign(t=times).to_csv(index=False, float_format=f"%.{digits}g"))
 
 
 def prediction_chart(found: Predicted, rotary: bool) -> Chart:

@@ -15,6 +15,7 @@ from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity
 from workbench.ending import Step, step
 from workbench.output import Row
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
+from workbench.report.prediction import csv_text
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, tabled
 from workbench.steps.velocity import (
@@ -169,7 +170,7 @@ def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
     columns = {
         name: np.concatenate([getattr(one, key) for one in runs]) for name, key in names.items()
     }
-    return str(pd.DataFrame(columns).to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+    return csv_text(pd.DataFrame(columns), 9)
 
 
 def velocity_prediction_view(
