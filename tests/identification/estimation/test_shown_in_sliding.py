@@ -121,4 +121,4 @@ def test_a_mass_is_as_unsure_as_the_instants_of_the_force(family: str, seed: int
     made = make(family, ("none",), seed, 0.2)
     one = fit_plant([made.train], np.random.default_rng(0), rig=made.machine.rig).estimates["m"]
     assert one.value is not None and one.sd is not None
-    assert abs(one.value - made.machine.nine.m) < 3.0 * one.sd < 0.03 * one.value
+    assert abs(one.value - made.machine.nine.m) < 3.0 * one.sd < 0.04 * one.value

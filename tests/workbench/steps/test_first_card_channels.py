@@ -114,11 +114,18 @@ def test_before_and_behind_a_gear_the_position_is_that_of_the_force(
     assert "u" not in own
 
 
-@pytest.mark.parametrize(("turn", "unit"), [(360.0, "deg"), (2.0 * np.pi, "rad")])
+@pytest.mark.parametrize(
+    ("step", "turn", "unit", "motion"),
+    [
+        (90.0, 360.0, "deg", "rotary"),
+        (0.5 * np.pi, 2.0 * np.pi, "rad", "rotary"),
+        (0.02, 0.08, "m", "linear"),  # next to no part of a degree, which was taken for none
+    ],
+)
 def test_a_reference_by_quarters_of_a_turn_is_an_angle(
-    tmp_path: Path, turn: float, unit: str
+    tmp_path: Path, step: float, turn: float, unit: str, motion: str
 ) -> None:
-    r = turn / 4.0 * np.repeat([0, 1, 2, 3, 1, 2, 0, 3, 2, 1], 500)
+    r = step * np.repeat([0, 1, 2, 3, 1, 2, 0, 3, 2, 1], 500)
     y, v, u = np.zeros(len(T)), 0.0, np.zeros(len(T))
     for k in range(1, len(T)):
         y[k] = y[k - 1] + 2e-3 * v
@@ -126,4 +133,4 @@ def test_a_reference_by_quarters_of_a_turn_is_an_angle(
         v += 2e-3 * (u[k] - 0.02 * turn * np.sign(v) - 0.5 * v)
     found = proposed(table(tmp_path, "t,r,y,u", T, r, y, u / turn))
     place = found.signal("y")
-    assert place is not None and (found.motion, place.unit, place.sure) == ("rotary", unit, False)
+    assert place is not None and (found.motion, place.unit, place.sure) == (motion, unit, False)

@@ -177,8 +177,10 @@ def _of_quarters(roles: Roles) -> str:
     they are not."""
     levels = roles.columns["r"].levels if "r" in roles.columns else np.zeros(0)
     for unit, turn in TURN_IN.items() if len(levels) < MOST_QUARTERS else ():
-        quarters = 4.0 * levels / turn
-        if np.any(levels) and np.allclose(quarters, np.round(quarters), rtol=0.0, atol=OFF_QUARTER):
+        quarters = 4.0 * levels[levels != 0.0] / turn
+        whole = np.round(quarters)
+        off = np.abs(quarters - whole)
+        if len(quarters) and np.all(whole) and np.all(off < OFF_QUARTER):
             return unit
     return ""
 
