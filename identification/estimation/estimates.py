@@ -169,7 +169,8 @@ def _no_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]) -
     if limit not in values or abs(values[limit]) >= least:
         return None
     found = abs(values[limit])
-    shown = "no stick limit found" if found <= AT_ZERO else f"found {limit} = {values[limit]:.3g}"
+    none = found <= AS_GOOD_AS_NONE * least
+    shown = "no stick limit found" if none else f"found {limit} = {values[limit]:.3g}"
     return (
         f"{shown}, below the Coulomb level ({least:.3g} at least), which none is: not identifiable"
         f" from these logs; {EXCITE}"
