@@ -48,10 +48,10 @@ from identification.thresholds import ADEQUATE
 # Relative deviations that the force between its samples adds where it drives the run (where it
 # corrects one, so much less as its gain squared), by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
-# Of a motor, whose stops come and go with the steps of its command, OF_STEPS of it, from clean
-# motors behind encoders of 500 to 8000 counts (tests/identification/estimation/test_counted.py).
-OF_STEPS = 0.1
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
+# Of these, what a motor has, whose stops come and go with the steps of its command: from clean ones
+# behind encoders (benchmarks/encoders.py).
+OF_STEPS = 0.1
 
 # What stops that come and go, in steps of the likelihood, add to deviations over whole runs; for
 # the coverage on seeds 5000 to 5004 of benchmarks/nine_parameters.py.

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from identification.estimation import settling
@@ -69,3 +70,15 @@ def test_the_motion_of_the_log_is_counted_beside_that_of_the_fitted_run() -> Non
     stuck = Karnopp(1.0, 900.0, 900.0, 1.0, 1.0, 1e-3, -1e-3, 1000.0, -1000.0)
     events = settling._events(Plant(stuck, Motor(K_A)), recorded, 0.5)
     assert max(events.sliding) < 50 <= min(events.moved)
+
+
+def test_stops_that_come_and_go_leave_no_number_of_a_motor_exact() -> None:
+    """A stick limit of a motor behind 8000 counts a turn was 0.02 % off, by 400 of its deviations;
+    an actuator's command, which is integrated, makes no steps of the force."""
+    quiet = SimpleNamespace(noise=SimpleNamespace(corrected=0.0))
+    names, values = ("F_cp", "F_sp"), np.array([8.0, 10.0])
+    motor: Any = SimpleNamespace(logs=(quiet,), held=True, drive="command")
+    actuator: Any = SimpleNamespace(logs=(quiet,), held=False, drive="command")
+    found = settling.between_samples_sd(names, values, motor)
+    assert 1e-4 < found[1] / values[1] < 1e-3 and 0.0 < found[0] / values[0] < found[1] / values[1]
+    assert not np.any(settling.between_samples_sd(names, values, actuator))
