@@ -59,9 +59,9 @@ class Minimum:
             moved = noise @ J[: noise.shape[1]] @ inverse
             return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
         if cluster is None:
-            n = 0 if alike is None else len(alike)
-            whole = J if alike is None else np.vstack([_sums(J[:n], alike), J[n:]])
-            return np.asarray(self.mean * (whole @ inverse).T @ (whole @ inverse))
+            if alike is not None:
+                J = np.vstack([_sums(J[: len(alike)], alike), J[len(alike) :]])
+            return np.asarray(self.mean * (J @ inverse).T @ (J @ inverse))
         pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
         moved = _sums(pull, cluster) @ inverse
         count = len(moved)

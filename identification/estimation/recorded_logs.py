@@ -88,7 +88,7 @@ class RecordedLogs:
     @property
     def instant_sd(self) -> float:
         """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
-        share above, of a measured one as likely anywhere up to where its lag would be seen."""
+        share above, of a measured one as likely anywhere within half a sample of its row."""
         h = self.logs[0].log.h
         return self.share_sd * h if self.held else unseen_lag(h)
 

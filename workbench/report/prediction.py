@@ -84,7 +84,8 @@ def csv_text(frame: "pd.DataFrame", digits: int) -> str:
     known = 15 - int(np.ceil(np.log10(max(float(np.max(np.abs(t))), 1.0))))  # of a double
     decimals = min(known, digits - 5 - int(np.floor(np.log10(finest))))
     times = [f"{x:.{decimals}f}".rstrip("0").rstrip(".") for x in t]
-    return str(frame.assign(t=times).to_csv(index=False, float_format=f"%.{digits}g"))
+    whole = frame.assign(t=times)
+    return str(whole.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def prediction_chart(found: Predicted, rotary: bool) -> Chart:

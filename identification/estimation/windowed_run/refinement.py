@@ -246,8 +246,8 @@ def refit(
         if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
         cluster = _windows(logs, drive) if drifts else None
-        covariance = inside.covariance(cluster, noise, _counts(logs, drive))
-        return factor * covariance * np.outer(size, size)
+        alike = None if drifts else _counts(logs, drive)
+        return factor * inside.covariance(cluster, noise, alike) * np.outer(size, size)
 
     names = tuple(unknowns.names[i] for i in unknowns.at)
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread, whole)

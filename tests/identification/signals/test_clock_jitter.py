@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.signals.clock_jitter import position_noise
+from identification.signals.clock_jitter import OF_HALF_A_COUNT, position_noise
 
 NOISE = 2e-7  # m
 
@@ -40,6 +40,18 @@ def test_an_even_clock_has_none(h: float, count: float) -> None:
     """Nor do an encoder's counts look like one, which slow motion seldom changes."""
     for seed in range(5):
         assert position_noise(*swinging(h, 0.0, seed, count)) is None
+
+
+def test_half_a_count_a_sample_leaves_most() -> None:
+    """Of a ramp the fifth differences of the counts, over those of white noise of a count."""
+    left = [
+        np.mean(
+            np.diff(np.round(0.3 + part * np.arange(20_000)) - part * np.arange(20_000), 5) ** 2
+        )
+        for part in (0.05, 0.2, 0.35, 0.5, 0.65, 0.8)
+    ]
+    most = np.array(left) / (252.0 / 12.0)
+    assert np.argmax(most) == 3 and most[3] == pytest.approx(OF_HALF_A_COUNT, rel=1e-6)
 
 
 @pytest.mark.parametrize("count", [4e-4, 1e-3])

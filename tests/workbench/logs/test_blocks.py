@@ -46,7 +46,7 @@ def test_each_block_is_a_variable(
 
 
 def test_runs_one_below_the_other_are_one_table(tmp_path: Path) -> None:
-    """Where each has the header; its clock then begins again (`faulty_rows`)."""
+    """Where each has the header; its clock then begins again (`times`)."""
     run = ["t;y;F", *(f"{k};{0.1 * k};{k % 7}" for k in range(ROWS))]
     path = tmp_path / "runs.csv"
     path.write_text("\n".join([*run, "", *run]), "utf-8")
