@@ -61,26 +61,28 @@ _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
     "position": "m: m meter metre meters 米; mm: mm millimeter millimetre ミリ 毫米; cm: cm 厘米;"
     " um: um µm micron microns mikrometer micrometer 微米; nm: nm 纳米;"
     " inch: in inch inches zoll; foot: ft",
-    "velocity": "m/s: m/s mps m/sec 米/秒; mm/s: mm/s mmps mm/sec 毫米/秒; um/s: um/s µm/s;"
-    " cm/s: cm/s; inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
+    "velocity": "m/s: m/s mps m/sec meters/sec 米/秒; mm/s: mm/s mmps mm/sec 毫米/秒;"
+    " um/s: um/s µm/s; cm/s: cm/s; inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
     "acceleration": "m/s^2: m/s^2 m/s² m/s2 m/s**2; mm/s^2: mm/s^2 mm/s² mm/s2",
     "force": "N: n newton newtons 牛 牛顿; kN: kn 千牛; mN: mn; lbf: lbf lb lbs;"
     " kip: kip; kgf: kgf kp",
     "pressure": "bar: bar barg bara bar(g) 巴; mbar: mbar 毫巴; Pa: pa pascal 帕;"
     " kPa: kpa 千帕; hPa: hpa; MPa: mpa 兆帕; psi: psi psig psia; atm: atm;"
     " kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
-    "command": "V: v volt volts 伏 伏特; mV: mv 毫伏; A: a amp amps ampere 安 安培;"
+    "command": "V: v volt volts 伏 伏特; mV: mv 毫伏; A: a amp amps ampere arms apk 安 安培;"
     " mA: ma 毫安; %: % pct percent prozent"
     " %pwm %duty; 1: 1 - dimensionless",
-    "count": "count: count counts cnt cnts inc incs ink inkremente increments pulse pulses pls"
+    "count": "count: count counts counts16bit counts32bit cnt cnts inc"
+    " incs ink inkremente increments pulse pulses pls"
     " パルス 脉冲 ticks tick digits digit dig lsb steps",
     "temperature": "degC: °c ℃ degc deg_c celsius c 摄氏度; degF: °f degf; K: k kelvin",
 }
 _SPELT_ROTARY: Mapping[Quantity, str] = {
     "position": "rad: rad radians 弧度; mrad: mrad; deg: deg degree degrees ° grad 度;"
-    " turn: turn turns rev revs rot u umdr umdrehungen 回転 转",
-    "velocity": "rad/s: rad/s rads radps; deg/s: deg/s °/s dps degps; rpm: rpm u/min 1/min min-1"
-    " 转/分 r/min rev/min upm; turn/s: rev/s turn/s rps",
+    " turn: turn turns rev revs rot rotation rotations u umdr umdrehungen 回転 转",
+    "velocity": "rad/s: rad/s rads radps rad/sec radians/sec; deg/s: deg/s °/s dps degps deg/sec"
+    " degrees/sec; rpm: rpm u/min 1/min min-1"
+    " 转/分 r/min rev/min upm; turn/s: rev/s turn/s rps rotations/sec rot/sec",
     "acceleration": "rad/s^2: rad/s^2 rad/s² rad/s2; deg/s^2: deg/s^2 deg/s² deg/s2 °/s² °/s^2",
     "force": "N m: nm n·m n.m n*m n-m newtonmeter 牛米 牛·米; mN m: mnm mn·m; N cm: ncm;"
     " lbf inch: lb-in lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft",
@@ -101,6 +103,8 @@ _UNITS = dict(_table())
 _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
+_HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])")
+_OF_TWO_LETTERS = ("Ms", "Us", "Mm", "Nm")  # units at the end of a name in humps
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
 _ADDRESS = re.compile(r"(?<!\w)0x[0-9a-f]+", re.I)
@@ -137,7 +141,7 @@ _SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each wi
     "position": "y 3 x 3 z 2 q 2 s 1.5 enc 2 alpha 1.5 beta 1.5 psi 1.5",
     "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 rpm 3 erpm 3",
     "acceleration": "a 1 acc 3 qdd 2 ddq 2",
-    "force": "f 3 m 0.5 tau 2 trq 3 tor 2",
+    "force": "f 3 m 0.5 tau 2 trq 3 tor 2 eff 2",
     "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
     "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
     "temperature": "t 0.5",
@@ -188,6 +192,7 @@ _ERRORS = (
 _FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
 _FILTERED_SHORT = ("filt", "lpf")
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
+_PARTS = re.compile(r"/|(?<=\w)[\"']?\.(?=[^\W\d])")  # of a path, and of a variable in a structure
 _PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
@@ -197,8 +202,9 @@ def read_header(text: str, unit_below: str = "") -> Header:
 
     Of a path, as a message's field has, the last part tells the quantity, all of it the purpose.
     """
-    whole, last = _read(text, unit_below), text.rpartition("/")[2]
-    if text.count("/") < _PATH or len("".join(words_of(last)[:1])) < _SPOKEN:
+    whole, last = _read(text, unit_below), _PARTS.split(text)[-1]
+    path = text.count("/") >= _PATH or "/" not in last != text.rpartition("/")[2]
+    if not path or len("".join(words_of(last)[:1])) < _SPOKEN:
         return whole
     own = _read(last, unit_below)
     return replace(whole, means=own.means, unit=own.unit) if own.means else whole
@@ -211,6 +217,8 @@ def _read(text: str, unit_below: str) -> Header:
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
     words = _telling(words_of(name))
+    if _INDEX.search(plain):  # of a robot's state, and no status
+        words = ["joint" if one == "state" else one for one in words]
     means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
@@ -218,8 +226,9 @@ def _read(text: str, unit_below: str) -> Header:
         doubtful = not means or not plain.endswith(unit.card)
     whole = " ".join(words)
     purpose = _purpose(words, whole, means)
-    lengths = unit is not None and unit.quantity == "position"
-    if lengths and any(one.startswith("command") for one in words) and not purpose:
+    lengths = unit is not None and unit.quantity in ("position", "count")
+    asked = any(one == "cmd" or one.startswith("command") for one in words)
+    if lengths and asked and (not purpose or "position" not in means):
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
         purpose = "demand"  # a voltage or current that is asked for is the command
@@ -277,6 +286,11 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
             return text, None, False
         letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
         return suffix[1], found, not parted and letter
+    humps = _HUMPS.split(text)  # "positionRad", "VelocityMetersPerSec"
+    for k in range(1, len(humps)):
+        unit = "/".join(humps[k:]).replace("/Per/", "/")
+        if (len(unit) >= _SPOKEN or unit in _OF_TWO_LETTERS) and (found := written_unit(unit)):
+            return "".join(humps[:k]), found, False
     return text, None, False
 
 

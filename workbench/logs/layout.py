@@ -2,23 +2,17 @@
 
 Scopes of PLCs and drives, data loggers and spreadsheets put lines of their own above the names:
 "key;value" lines, comments, a row of units or of types. A line is a list of its fields here.
-
-Lines of text whose cells hold more than a number (a label before it, "angle: 3.2", its unit behind
-it, "3.2deg", or before the line the time at which a serial monitor got it) are rewritten as a plain
-table: labels and units into the header, numbers into the cells.
 """
 
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import NamedTuple
 
-from workbench.cards.headers import written_unit
+from workbench.cards.headers import words_of, written_unit
 from workbench.logs.times import is_time
 
-NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 
 _IN_A_ROW = 3  # lines of data that show where it begins
 _DATA_SHARE = 0.5  # of a line's fields above which numbers and times make it a line of data
@@ -28,6 +22,11 @@ _TYPE_OR_UNIT = re.compile(
     r"(?:L?REAL|FLOAT|DOUBLE|U?[SDL]?INT|BOOL|BIT|BYTE|D?WORD|TIME)(?:8|16|32|64)?|"
     r"double|float|int(?:8|16|32|64)?"
 )
+_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "interval", "xincrement",
+            "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
+_TWO_OF_PERIODS = {("delta", "x"), ("delta", "t"), ("sample", "time"), ("sampling", "time")}
+_RATES = {"rate", "samplerate", "abtastrate", "fs"}
+_NO_COLUMN = ("", "comment", "comments", "remark", "remarks", "kommentar")  # behind the names
 _SCOPE_NAME = "name"
 _SCOPE_ROWS = 3  # of a block of keys, at least
 _SCOPE_TIME = "Time"
@@ -70,7 +69,8 @@ def find_layout(
         block = list[Sequence[str]]()
         for line in reversed(above):
             fitted = [*line, ""] if len(line) == width - 1 and not ends else line
-            fitted = fitted if any(fitted[width:]) else fitted[:width]
+            if all(one.casefold() in _NO_COLUMN for one in fitted[width:]):
+                fitted = fitted[:width]
             if not 1 < len(fitted) <= width or _is_data(fitted, width):
                 break
             block.insert(0, fitted)
@@ -80,6 +80,7 @@ def find_layout(
         whole = [line for line in block if len(line) == width]
         if whole and whole[-1] is block[-1]:
             names, units = _names_and_units(whole)
+            units = units or next(filter(None, map(_keyed_units, whole[:-1])), ())
     elif noted := [one for k, one in (comments or {}).items() if k < first and len(one) == width]:
         names, units = _names_and_units(noted)
         names = () if all(map(is_number, names)) else names
@@ -101,6 +102,35 @@ def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple
             joined.append(f"{group} {own}" if not plotted else group if k % 2 else own)
         names = joined
     return tuple(names), units
+
+
+def _keyed_units(line: Sequence[str]) -> tuple[str, ...]:
+    """The units of a line that begins with a key of that name, none of any other."""
+    own = tuple(map(_bare, line[1:]))
+    known = all(written_unit(one) for one in own if one) and any(own)
+    return ("", *own) if known and "unit" in line[0].casefold() else ()
+
+
+def says_period(name: str) -> bool:
+    """Whether a name is one of the time from row to row."""
+    words = words_of(name)
+    return bool(_PERIODS & set(words)) or tuple(words[:2]) in _TWO_OF_PERIODS
+
+
+def period_above(lines: Sequence[Sequence[str]]) -> tuple[str, float, str] | None:
+    """The time from row to row that one of these lines above the data gives, a key with a number:
+    the key, the number and its unit (empty: not given); None where none does."""
+    for key, *rest in filter(None, lines):
+        number, _, unit = " ".join(rest[:2]).strip().partition(" ")
+        rate = bool(_RATES & set(words_of(key))) and not rest[1:]
+        if not (rate or says_period(key)) or not NUMBER.fullmatch(number):
+            continue
+        value, found = float(number.replace(",", ".")), written_unit(unit)
+        if rate and value > 0.0 and unit in ("", "Hz", "kHz"):
+            return f"period by {key}", (1e-3 if unit == "kHz" else 1.0) / value, "s"
+        if not rate and value > 0.0:
+            return key, value, found.card if found and found.quantity == "time" else ""
+    return None
 
 
 def is_number(field: str) -> bool:
@@ -170,108 +200,3 @@ def _scope(
         names.append(_SCOPE_TIME if k in times else field)
         groups.append(group)
     return tuple(names), tuple(groups) if len(times) > 1 else ()
-
-
-_GOT_AT = re.compile(r"^((?:\d{4}-\d\d-\d\d )?\d\d:\d\d:\d\d[.,]\d{1,6}) -> ", re.MULTILINE)
-_CELL = re.compile(
-    r"(?P<label>[^\d\s:=][^:=]*[:=])?\s*"
-    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\s,;]*)?"
-)
-_SEPARATORS = (",", ";", "\t", "|")
-_LINES_SEEN, _FEWEST_LINES = 40, 5  # lines by which such a text is known
-_ABOVE = 3  # lines above the numbers at most, of which the last may be a header
-
-
-class _Part(NamedTuple):
-    """What stands around the numbers of a column; plain: nothing does."""
-
-    label: str
-    unit: str
-    plain: bool
-
-    def header(self, name: str) -> str:
-        """The column's header: its own name, else its label, with the unit."""
-        own = name.removesuffix(": None") or self.label.rstrip(" :=")
-        return f"{own} [{self.unit}]" if self.unit else own
-
-
-def as_table(text: str) -> str:
-    """The text as a plain table where its cells hold more than numbers; else as it is."""
-    lines = text[: 64 * 1024].splitlines()[:-1] or text.splitlines()
-    if len(_GOT_AT.findall("\n".join(lines))) > len(lines) / 2:
-        rest = [_GOT_AT.sub("", line) for line in lines]
-        sign = next((one for one in _SEPARATORS if one in rest[-1]), ",")
-        own = _has_clock([_split(line, sign) for line in rest[-_LINES_SEEN:]])
-        return as_table(_GOT_AT.sub("" if own else rf"\1{sign}", text))
-    filled = [line for line in lines if line.strip()]
-    for delimiter in _SEPARATORS:
-        rows = [_split(line, delimiter) for line in filled[-_LINES_SEEN:]]
-        if len(rows) > _FEWEST_LINES and (
-            parts := _parts(rows[-max(_FEWEST_LINES, len(rows) - _ABOVE) :])
-        ):
-            return _rewritten(text, delimiter, parts)
-    return text
-
-
-def _has_clock(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a column goes up from each line to the next: the machine's own time, beside which
-    that of the monitor is late."""
-    for cells in zip(*rows, strict=False):
-        numbers = [found["number"] for one in cells if (found := _CELL.fullmatch(one))]
-        x = [float(one) for one in numbers]
-        if len(x) == len(rows) > _FEWEST_LINES and all(a < b for a, b in pairwise(x)):
-            return True
-    return False
-
-
-def _parts(rows: Sequence[Sequence[str]]) -> list[_Part] | None:
-    """What stands around the numbers of each column, the same in all rows; None where something
-    else does, or nothing anywhere."""
-    width = len(rows[0])
-    if width < 2 or any(len(row) != width for row in rows):
-        return None
-    out = list[_Part]()
-    for cells in zip(*rows, strict=True):
-        if all(map(is_number, cells)) or all(map(is_time, cells)):
-            out.append(_Part("", "", True))
-            continue
-        found = [_CELL.fullmatch(cell) for cell in cells]
-        around = {(one["label"] or "", one["unit"] or "") for one in found if one is not None}
-        if len(around) != 1 or not all(found):
-            return None
-        label, unit = around.pop()
-        if not label and written_unit(unit) is None:
-            return None
-        out.append(_Part(label, unit, False))
-    return out if not all(one.plain for one in out) else None
-
-
-def _rewritten(text: str, delimiter: str, parts: Sequence[_Part]) -> str:
-    """The text as a table of numbers, in the header what stood around them."""
-    lines = text.splitlines()
-    body = [_numbers(line, delimiter, parts) for line in lines]
-    data = next(k for k, numbers in enumerate(body) if numbers is not None)
-    above = _split(lines[data - 1], delimiter) if data else []
-    names = above if len(above) == len(parts) and not any(map(is_number, above)) else ()
-    names = names or [""] * len(parts)
-    header = [one.header(name) for one, name in zip(parts, names, strict=True)]
-    if not all(header):  # a column without any name
-        header = [one or str(k) for k, one in enumerate(header)]
-    # A line that is laid out otherwise stays as it is.
-    rows = [numbers or line for numbers, line in zip(body[data:], lines[data:], strict=True)]
-    return "\n".join([delimiter.join(header), *rows, ""])
-
-
-def _numbers(line: str, delimiter: str, parts: Sequence[_Part]) -> str | None:
-    """A line with its numbers alone; None of one that has not these parts around them."""
-    bare, cells = list[str](), _split(line, delimiter)
-    for cell, one in zip(cells, parts, strict=False):
-        found = None if one.plain else _CELL.fullmatch(cell)
-        if found is None and not (one.plain and (is_number(cell) or is_time(cell))):
-            return None
-        bare.append(cell if found is None else found["number"])
-    return delimiter.join(bare) if len(cells) == len(parts) else None
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in line.split(delimiter)]

@@ -6,7 +6,7 @@ Tags of a MAT v5 file are followed before it is read: scipy's reader crashes Pyt
 
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +75,17 @@ class Table:
         if len(found) > 1:
             raise BadLog(f"{where}: {self._ambiguous(key, found)}")
         return found[0]
+
+    def beside(self, name: str, value: float, unit: str) -> "Table":
+        """The table with a single value as one more column."""
+        count, fetch = len(self.names), self.fetch
+        return replace(
+            self,
+            names=(*self.names, name),
+            fetch=lambda k: np.array([value]) if k == count else fetch(k),
+            groups=(*self.groups, "") if self.groups else (),
+            units=(*(self.units or ("",) * count), unit),
+        )
 
     def full_names(self) -> tuple[str, ...]:
         """The names with their groups, where there are groups."""

@@ -23,6 +23,7 @@ from workbench.logs.messages import read_bag, read_mcap
 from workbench.logs.packed import GZIP, ZIP, text_bytes
 from workbench.logs.table import (
     BINARY_BYTES,
+    WIDEST_ARRAY,
     RawColumn,
     Table,
     damaged,
@@ -178,17 +179,29 @@ def read_table(path: Path, spec: FileSpec) -> Table:
 
 
 def _read_parquet(path: Path, spec: FileSpec) -> Table:
+    """Columns of numbers, and of lists of a few numbers a column each: "state[0]"."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
-    names = tuple(str(name) for name in pq.read_schema(path).names)
     with pq.ParquetFile(path) as file:
         refuse_long(path, file.metadata.num_rows)
+        lists = [one.name for one in file.schema_arrow if pa.types.is_nested(one.type)]
+        first = next(file.iter_batches(1, columns=lists), None) if lists else None
+        places = list[tuple[str, int | None]]()
+        for name in map(str, file.schema_arrow.names):
+            one = first.column(name)[0].as_py() if first is not None and name in lists else None
+            wide = len(one) if isinstance(one, list) and len(one) <= WIDEST_ARRAY else 0
+            places += [(name, k) for k in range(wide)] if name in lists else [(name, None)]
 
     def fetch(number: int) -> RawColumn:
+        name, at = places[number]
         with pq.ParquetFile(path) as file:
-            column = file.read(columns=[names[number]]).column(0)
+            column = file.read(columns=[name]).column(name)
+        column = column if at is None else pc.list_element(column, at)
         return np.asarray(column.to_numpy())[spec.skip_rows :]
 
+    names = tuple(name if at is None else f"{name}[{at}]" for name, at in places)
     return Table(names, fetch, 1 + spec.skip_rows)
 
 

@@ -16,11 +16,12 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of
-from workbench.logs.clocks import clock_groups, topic_groups
-from workbench.logs.layout import Layout, as_table, find_layout, is_number
+from workbench.logs.clocks import clock_groups, long_groups, topic_groups
+from workbench.logs.layout import Layout, find_layout, is_number, period_above
 from workbench.logs.packed import TEXT_BYTES, text_bytes
+from workbench.logs.rewritten import as_table
 from workbench.logs.table import Table, of_array
-from workbench.logs.times import are_few, with_whole_seconds
+from workbench.logs.times import are_few, with_one_clock
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _BETWEEN_NAMES = re.compile(r"\t|\s{2,}")  # between names of several words
@@ -78,10 +79,14 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     headed = bool(found.names)
     table = Table(names, columns, first_row, headed, found.groups, units=found.units,
                   remarks=remarks)  # fmt: skip
+    if headed and (period := period_above(fields[: found.data])):
+        table = table.beside(*period)
     rows = fields[found.data : found.data + _COMPARED]
-    table = with_whole_seconds(table, rows)
-    if found.groups or not headed:
+    table = with_one_clock(table, rows)
+    if found.groups:
         return table
+    if (long := long_groups(table, rows)) or not headed:
+        return long or table
     return topic_groups(table, rows) or _grouped(table, rows, marks)
 
 
@@ -147,7 +152,8 @@ def _layout(head: _Head, spec: FileSpec) -> Layout | None:
             break
         if line.lstrip().startswith(spec.comment):
             bare = _split(line.lstrip().lstrip(f"{spec.comment} "), head.marks)
-            noted[k] = bare if bare and bare[0] else bare[1:]
+            key = bool(bare) and (not bare[0] or bare[0].endswith(":"))  # "columns: t y F"
+            noted[k] = bare[int(key) :]
     return find_layout(head.fields, noted)
 
 

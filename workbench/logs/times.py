@@ -26,17 +26,20 @@ _PER_SECOND = {
 }
 _DURATION = re.compile(rf"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) ?({'|'.join(_PER_SECOND)})")
 _OF_DAY = r"(\d{1,3}):(\d\d)(?::(\d\d)(?:[.,:](\d{1,9}))?)?"
-_DATE = r"\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4}|\d{1,2}-[A-Z][a-z]{2}-\d{4}|\d{4}/\d\d?/\d\d?"
+_DATE = (
+    r"\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4}|\d{1,2}-[A-Z][a-z]{2}-\d{4}|\d{4}/\d\d?/\d\d?|"
+    r"\d{1,2}/\d{1,2}/\d{4}"
+)
 _ZONE = r" ?(?:Z|UTC|([+-])(\d\d)(?::?(\d\d))?)"
 _MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?:{_ZONE})?")
-_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d")
+_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d", "%m/%d/%Y", "%d/%m/%Y")
 _DAY = 86400.0
-_NANO, _MILLI = 1e-9, 1e-3  # s
+_NANO, _MILLI, _FEWER = 1e-9, 1e-3, 1000  # s, and milliseconds of one
 
 
 def is_time(field: str) -> bool:
-    """Whether the text is a duration with its unit, a clock time, or a date with one."""
-    return bool(_DURATION.fullmatch(field) or _MOMENT.fullmatch(field))
+    """Whether the text is a duration with its unit, a clock time, or a date."""
+    return bool(_DURATION.fullmatch(field) or _MOMENT.fullmatch(field) or _day(field))
 
 
 def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
@@ -78,22 +81,39 @@ def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
     return out if begun is not None else _over_midnight(out, first)
 
 
-def with_whole_seconds(table: Table, rows: Sequence[Sequence[str]]) -> Table:
-    """The table with one clock where two columns beside each other hold its whole seconds and the
-    nanoseconds beyond them, as a message's stamp does: the first has both then, the second none.
+def with_one_clock(table: Table, rows: Sequence[Sequence[str]]) -> Table:
+    """The table with one clock where columns beside each other hold its parts: whole seconds and
+    the nanoseconds beyond them, as a message's stamp does; or date, time and milliseconds. The
+    first has all of it then, the others none.
 
     rows: the first of them, as text.
     """
     cells = list(zip(*rows, strict=False))
     for k in range(len(cells) - 1):
+        if all(map(_day, cells[k])) and all(map(_MOMENT.fullmatch, cells[k + 1])):
+            return _with_dates(table, k, cells)
         if not all(one.isdigit() for pair in cells[k : k + 2] for one in pair):
             continue
         if max(map(int, cells[k + 1])) <= _MILLI / _NANO or len(set(cells[k + 1])) == 1:
             continue
         whole, part = (np.asarray(table.fetch(at), dtype=np.float64) for at in (k, k + 1))
         if _counts_seconds(whole, part):
-            return _joined(table, k, whole + _NANO * part)
+            return _joined(table, k, 2, whole + _NANO * part, "seconds and nanoseconds")
     return table
+
+
+def _with_dates(table: Table, at: int, cells: Sequence[Sequence[str]]) -> Table:
+    """The table with the clock of its dates, times and, where a column holds them, milliseconds."""
+    beyond = cells[at + 2] if at + 2 < len(cells) else ("",)
+    parted = all(one.isdigit() and int(one) < _FEWER for one in beyond)
+    parted &= not any("." in one or "," in one for one in cells[at + 1]) and len(set(beyond)) > 1
+    texts = zip(*(table.fetch(k) for k in (at, at + 1)), strict=True)
+    t = seconds(np.array([f"{day} {time}" for day, time in texts], dtype=object), "", 0)
+    assert t is not None
+    if not parted:
+        return _joined(table, at, 2, t, "date and time")
+    t = t + _MILLI * np.asarray(table.fetch(at + 2), dtype=np.float64)
+    return _joined(table, at, 3, t, "date, time and milliseconds")
 
 
 def _counts_seconds(whole: Array, part: Array) -> bool:
@@ -108,14 +128,17 @@ def _counts_seconds(whole: Array, part: Array) -> bool:
     )  # fmt: skip
 
 
-def _joined(table: Table, at: int, seconds: Array) -> Table:
-    """The table with these seconds in one column, and nothing in the next."""
-    own = {at: seconds, at + 1: np.zeros(len(seconds))}
-    said = f"columns {at} and {at + 1} (from 0), seconds and nanoseconds, are one clock, the first"
+def _joined(table: Table, at: int, count: int, seconds: Array, of: str) -> Table:
+    """The table with these seconds in one column, and nothing in those behind it."""
+    own = {at: seconds, **dict.fromkeys(range(at + 1, at + count), np.zeros(len(seconds)))}
+    said = f"columns {at} to {at + count - 1} (from 0), {of}, are one clock, the first"
+    units = [*(table.units or ("",) * len(table.names))]
+    units[at : at + count] = ["s", *[""] * (count - 1)]
     fetch = table.fetch
     return replace(
         table,
         fetch=lambda k: own[k] if k in own else fetch(k),
+        units=tuple(units),
         remarks=(*table.remarks, said),
     )
 

@@ -106,6 +106,10 @@ ONE_ROW = 1  # by which vectors of one log may differ in length
 _OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
 _ONLY_NUMBER = ("data", "value")  # of a message that holds one number
 _DEEPEST = 5  # tables in each other, in which the rows are looked for
+_FRAMES = re.compile(  # as candump prints them, with and without -L
+    r"(?:^\s*(?:\(\d+\.\d+\)\s+)?[sv]*can\d+\s+[0-9A-F]{3,8}(?:\s*##?|\s+\[\d+\]).*\n){3}",
+    re.I | re.M,
+)
 _ONLY_DATES = "dates, not numbers"
 _ENCODINGS = ("utf-8", "gb18030", "cp932", "cp1252", "latin-1")
 _FIRST_LINES, _FEWEST_SPOKEN = 40, 2  # of a text, in which so many Chinese headers are known
@@ -134,6 +138,11 @@ def read_unknown(path: Path) -> UnknownLog:
     if form == "csv":
         refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
         spec = FileSpec(encoding=_encoding(path))
+        if _FRAMES.match(text_bytes(path, 1000).decode("latin-1")):
+            raise BadLog(
+                f"{path}: holds raw frames of a CAN bus, whose bytes only the bus's own description"
+                " tells apart; decode them by its DBC or EDS file, and give a column a signal"
+            )
     elif form == "json":
         rows, said = _rows_of(path)
         spec = FileSpec(rows=rows)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.cards.card_tables import FileSpec
-from workbench.logs.layout import as_table
+from workbench.logs.rewritten import as_table
 from workbench.logs.text import read_text_table
 
 ROWS = [(5 * k + 500, np.sin(0.1 * k), -2.5e-3 * k) for k in range(120)]

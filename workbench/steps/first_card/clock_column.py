@@ -11,14 +11,14 @@ from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
 from identification.thresholds import TWICE
-from workbench.cards.headers import read_header, words_of
+from workbench.cards.headers import read_header
+from workbench.logs.layout import says_period
 from workbench.logs.times import MOST_STARTS, several_axes, summed
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.column import Column
 
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
-PERIODS = {"ts", "dt", "timestep", "period", "tsample"}  # names of the time from row to row
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 
@@ -31,9 +31,10 @@ def clock_of(log: UnknownLog, usable: Sequence[Column], others: Sequence[Column]
     """
     steady = [one for one in others if "time" in one.header.means]
     rows = len(usable[0].values) if usable else 0
-    for one in (one for one in log.scalars if PERIODS & set(words_of(one.header))):
+    single = [] if any(map(ticks, usable)) else log.scalars
+    for one in (one for one in single if says_period(one.header)):
         values = np.full(rows, one.values[0])
-        steady.append(Column(one, read_header(one.header), values, values))
+        steady.append(Column(one, read_header(one.header, one.unit_below), values, values))
     steady = [one for one in steady if len(one.values) == rows]
     texts = [one for one in others if one.raw.unusable]
     return _of_steps(usable, steady) or _rising_one(log.path, usable, texts)

@@ -137,8 +137,8 @@ def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
 def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, ...]]:
     """The columns at the rows of one run, where a time among them goes up but for rows without a
     time, rows written twice, or a logger that was started anew; and what is said of it."""
-    if not any(map(ticks, columns)):
-        named = [one for one in columns if "time" in one.header.means]
+    named = [one for one in columns if "time" in one.header.means]
+    if not any(map(ticks, named or columns)):  # beside a time a number of rows is none
         for one in named or [one for one in columns if not one.header.means]:
             beside = [other.values for other in columns if other is not one]
             rows, said = sound_rows(one.values, beside)

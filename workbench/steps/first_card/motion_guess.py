@@ -11,6 +11,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadCard
 from identification.signals.relations import of_a_weight
+from workbench.cards.headers import words_of
 from workbench.cards.units import Motion, conversion
 from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.roles import Roles
@@ -138,8 +139,10 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
             motion: Motion = "rotary" if unit.rotary else "linear"
             sure = not column.header.doubtful or len(unit.card) > 1
             return MotionGuess(motion, f"the unit of column {column.shown}", sure, rotor)
-    if any(column.header.angle for column in roles.columns.values()):
-        return MotionGuess("rotary", "a header that speaks of an angle or a torque", True, rotor)
+    angles = {name for name, column in roles.columns.items() if column.header.angle}
+    if angles:  # a slide's motor has a torque too
+        why = "a header that speaks of an angle or a torque"
+        return MotionGuess("rotary", why, bool(angles & {"y", "r", "v"}), rotor)
     turn = unit_by_turn(roles.columns["y"])
     if turn is not None:
         return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
@@ -160,6 +163,9 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
         if (one.header.speed or force) and one.header.angle and one.axis in ("", y.axis):
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
+    if {"effort", "velocity"} <= {word for one in beside for word in words_of(one.header.name)}:
+        why = "position, velocity and effort are those of a robot's joints, which mostly turn"
+        return MotionGuess("rotary", why, False, rotor)
     if y.header.unit is None and (quarters := _of_quarters(roles)):
         why = f"its reference goes by quarters of a turn in {quarters}"
         return MotionGuess("rotary", why, False, rotor, quarters)

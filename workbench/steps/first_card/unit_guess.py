@@ -14,9 +14,9 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import derivative, lead
-from workbench.cards.headers import words_of
+from workbench.cards.headers import read_header
 from workbench.cards.units import Motion, force_unit
-from workbench.logs.layout import NUMBER
+from workbench.logs.layout import NUMBER, says_period
 from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
@@ -58,7 +58,6 @@ ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
 REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
 SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
-INCREMENTS = {"increment", "interval", "xincrement"}  # words of the time of a sample
 DATA_SHEET = "not in the log: see the sensor's data sheet"
 SENSOR_OUTPUTS = ("command", "count")
 
@@ -169,13 +168,16 @@ def _ticks(columns: Columns) -> UnitGuess | None:
 
 
 def _increment(columns: Columns) -> UnitGuess | None:
-    """The rate of a clock that counts by ones, of a scope that writes the time of one below a name
-    of its own beside the signals' units; None where none is written."""
+    """The rate of a clock that counts by ones, of a log that gives the time of one by itself: above
+    the table, or, as scopes do, below a name of its own; None where none is written."""
     counts = columns.clock.whole and columns.step == 1.0
-    for one in columns.read if counts else ():
-        step = one.raw.unit_below
-        if INCREMENTS & set(words_of(one.raw.header)) and NUMBER.fullmatch(step):
-            return UnitGuess("1", f"{1.0 / float(step):.9g} 1/s", True, f"by {one.raw.header!r}")
+    for one in (*columns.log.scalars, *(one.raw for one in columns.read)) if counts else ():
+        if not says_period(one.header):
+            continue
+        unit = read_header(one.header, one.unit_below).unit
+        step = float(one.unit_below) if NUMBER.fullmatch(one.unit_below) else float(one.values[0])
+        step *= factor(unit.card) if unit and unit.quantity == "time" else 1.0
+        return UnitGuess("1", f"{1.0 / step:.9g} 1/s", True, f"by {one.header!r}")
     return None
 
 
