@@ -4,6 +4,7 @@ it is of, and brought to the clock of one."""
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from identification.errors import BadLog
 from identification.remarks import MinorRemark
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP, at_times
-from identification.thresholds import HALF
+from identification.thresholds import HALF, TWICE
 from workbench.cards.headers import read_header
 from workbench.logs.layout import is_number
 from workbench.logs.table import RawColumn, Table, number_of
@@ -26,7 +27,7 @@ STEPS_ALIKE = 0.5  # of the median step, that most steps of a clock are off it a
 MOSTLY_EVEN = 0.8  # of the steps of a clock
 IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
 _SENSED = ("y", "F", "p_p", "p_n")
-MOST_SIGNALS = 500  # that a column names
+MOST_NAMES, FEW_NAMES = 500, 3  # in a column that says of what each row is; shown
 FEW_ROWS = 3  # at the end, by which columns of one clock may differ
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
@@ -97,66 +98,67 @@ def topic_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
 
 
 def long_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
-    """The table in a group a signal where each row has one value, of the signal that a column of
-    text names, each on the clock of its own rows; None of other tables.
+    """The table with a column for each signal of each name, where rows are of several signals or
+    axes in turn that one column names, on the clock of its own rows; None of other tables.
 
     rows: the first of them, as text, which spare reading the others.
     """
-    cells = [[cell for cell in own if cell] for own in zip(*rows, strict=False)]
-    texts = [k for k, own in enumerate(cells)
-             if own and not any(is_number(one) or is_time(one) for one in own)]  # fmt: skip
-    for k in texts:
-        names, of = np.unique(np.asarray(table.fetch(k), dtype=str), return_inverse=True)
-        if 1 < len(names) <= MOST_SIGNALS and (made := _by_name(table, k, names.tolist(), of)):
-            return made
+    for k, own in enumerate(zip(*rows, strict=False)):
+        text = any(own) and not any(is_number(one) or is_time(one) for one in own if one)
+        if text or (all(map(str.isdigit, own)) and 1 < len(set(own)) < HALF * len(own)):
+            raw = np.asarray(table.fetch(k), dtype=str if text else float)
+            names, of = np.unique(raw, return_inverse=True)
+            called = [one if text else f"{one:g}" for one in names.tolist()]
+            if 1 < len(names) <= MOST_NAMES and (made := _by_name(table, k, called, of)):
+                return made
     return None
 
 
 def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> Table | None:
-    """The table in groups by the names in a column `at`, of which `of` (n,) says each row's; None
-    where not one other column has values that change within the rows of a name, beside a clock."""
+    """The table by the names in a column `at`, of which `of` (n,) says each row's; None where these
+    do not come in turn, or one after the other over the same times."""
     rows = [own for k in range(len(names)) if len(own := np.flatnonzero(of == k)) >= SHORTEST_LOG]
-    called = [names[of[own[0]]] for own in rows]
     clocks, values = list[tuple[int, Array]](), list[tuple[int, Array]]()
-    for k in range(len(table.names)):
-        x = _cells(np.asarray(table.fetch(k))) if k != at else np.full(len(of), np.nan)
+    for k in (k for k in range(len(table.names)) if k != at):
+        x = _numbers_or_times(np.asarray(table.fetch(k)))
         steps = [np.diff(x[own][np.isfinite(x[own])]) for own in rows]
         if any(np.any(one != 0.0) for one in steps):
             rises = np.all(np.isfinite(x)) and all(np.all(one >= 0.0) for one in steps)
             (clocks if rises else values).append((k, x))
-    if len(values) != 1 or not clocks:
+    if not clocks or not values:
         return None
-    (clock, t), (_, x) = clocks[0], values[0]
-    if np.all(np.diff(t) > 0.0) and np.mean(np.diff(of) != 0) < HALF:  # states, one after another
+    (clock, t), changes = clocks[0], int(np.sum(np.diff(of) != 0))
+    in_turn = changes >= HALF * len(of) and not (names[0].isdigit() and np.all(np.diff(t) > 0.0))
+    in_blocks = changes < TWICE * len(names) and len(values) == 1 and np.any(np.diff(t) < 0.0)
+    if not (in_turn or in_blocks):
         return None
-    columns = dict[str, tuple[Array, Array]]()
-    groups = dict[bytes, list[str]]()  # of the same times
-    for name, own in zip(called, rows, strict=True):
-        known = own[np.isfinite(x[own])]
+    groups = dict[bytes, list[tuple[str, Array]]]()  # of the same times
+    for (k, x), own in product(values, rows):
+        known, name = own[np.isfinite(x[own])], names[of[own[0]]]
         if len(known) >= SHORTEST_LOG:
-            columns[name] = t[known], x[known]
-            groups.setdefault(t[known].tobytes(), []).append(name)
-    if len(columns) < FEWEST_GROUPS:
+            called = name if len(values) == 1 else f"{name} {table.names[k]}"
+            groups.setdefault(t[known].tobytes(), []).append((called, x[known]))
+    columns, clocks_at = list[tuple[str, str, Array]](), dict[str, int]()
+    for times, own_columns in groups.items():
+        group = own_columns[0][0]
+        clocks_at[group] = len(columns)
+        columns += [(group, table.names[clock], np.frombuffer(times))]
+        columns += [(group, name, x) for name, x in own_columns]
+    if len(columns) - len(groups) < FEWEST_GROUPS:
         return None
-    made, of_made, own_names = list[Array](), list[str](), list[str]()
-    clocks_at = dict[str, int]()
-    for first, *more in groups.values():
-        clocks_at[first] = len(made)
-        made += [columns[first][0], *(columns[name][1] for name in (first, *more))]
-        own_names += [table.names[clock], first, *more]
-        of_made += [first] * (2 + len(more))
-    shown = ", ".join(map(repr, [*columns][:FEW_ROWS])) + ", ..." * (len(columns) > FEW_ROWS)
-    said = f"each row has one value, of the signal that {table.names[at]!r} names ({shown})"
-    unit = "s" if table.fetch(clock).dtype.kind not in "fiu" else ""
-    unit = table.units[clock] if table.units else unit
-    units = [unit if k in clocks_at.values() else "" for k in range(len(made))]
+    in_groups, called_by, made = zip(*columns, strict=True)
+    shown = ", ".join(map(repr, names[:FEW_NAMES])) + ", ..." * (len(names) > FEW_NAMES)
+    said = f"rows are of {len(names)} in turn, which column {table.names[at]!r} names ({shown})"
+    unit = table.units[clock] if table.units else ""
+    unit = unit if table.fetch(clock).dtype.kind in "fiu" else "s"
+    units = tuple(unit if k in clocks_at.values() else "" for k in range(len(made)))
     return replace(
-        table, names=tuple(own_names), fetch=made.__getitem__, headed=True, groups=tuple(of_made),
-        clocks=clocks_at, units=tuple(units), remarks=(*table.remarks, said),
+        table, names=called_by, fetch=made.__getitem__, headed=True, groups=in_groups,
+        clocks=clocks_at, units=units, remarks=(*table.remarks, f"{said}: a column each"),
     )  # fmt: skip
 
 
-def _cells(raw: RawColumn) -> Array:
+def _numbers_or_times(raw: RawColumn) -> Array:
     """A column as numbers or as times [s], NaN where a cell is neither."""
     with suppress(BadLog):
         if (times := seconds(raw, "", 0)) is not None:

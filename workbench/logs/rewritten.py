@@ -29,6 +29,7 @@ _BRACES = re.compile(r"[^\s,;|]*\{|[}'\"]")
 _VECTOR = re.compile(r'(?<!\w)"?[\[(]([^\[\](){}"]*)[\])]"?')
 _BETWEEN = re.compile(r"[\s,;]+")
 _NEXT_DOCUMENT = re.compile(r"^---[ \t]*\r?$", re.MULTILINE)
+_POINT_OF_NAN = re.compile(r"\.(?=nan|inf)", re.I)
 _KEY = re.compile(r"([^\W\d][^:]*):(?:\s+|$)")
 _HEXADECIMAL = re.compile(r"(?<![^\s,;|])0[xX]([0-9a-fA-F]{1,8})(?![^\s,;|])")
 _OF_HEXADECIMALS = re.compile(r"^[\d+-].*(?<![^\s,;|])0[xX].*$", re.MULTILINE)
@@ -127,11 +128,11 @@ def _leaves(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
         if key := _KEY.match(body):
             path.append((indent, key[1]))
             body = body[key.end() :]
-        if body.startswith("[") and body.endswith("]"):
-            own = enumerate(one for one in _BETWEEN.split(body[1:-1].strip()) if is_number(one))
-            yield from ((f"{_joined(path)}[{k}]", one) for k, one in own)
-        elif body and is_number(body := body.removeprefix(".")):
-            yield _joined(path), body
+        inline = body.startswith("[") and body.endswith("]")
+        for k, cell in enumerate(_BETWEEN.split(body[1:-1].strip()) if inline else (body,)):
+            number = _POINT_OF_NAN.sub("", cell)
+            if number and is_number(number):
+                yield _joined(path) + (f"[{k}]" if inline else ""), number
 
 
 def _joined(path: Sequence[tuple[int, str]]) -> str:

@@ -26,10 +26,9 @@ from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import (
     at_rows,
-    late_stamps,
+    even_stamps,
     numbers_in,
     seconds,
-    several_axes,
     sound_rows,
     stretches,
     summed,
@@ -147,12 +146,9 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole = _same_length(signals, path)
         if card.signals["t"].summed:
             whole["t"] = summed(whole["t"])
-        cells = ((repr(key), np.asarray(table.fetch(k))) for k, key in enumerate(table.names))
-        if in_turn := several_axes(whole["t"], cells):
-            raise BadLog(f"{path}: {in_turn}")
         rows, said = sound_rows(whole["t"], [x for key, x in whole.items() if key != "t"])
         whole = whole if np.all(rows) else at_rows(whole, rows)
-        whole["t"], late = late_stamps(whole["t"])
+        whole["t"], late = even_stamps(whole["t"])
         said = (*said, late) if late else said
         whole, of_speeds = _with_sums(whole, card.signals)
         told = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))

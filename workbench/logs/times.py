@@ -3,7 +3,7 @@ what a log has the steps of; rows that are no samples of its run (a logger's mes
 twice, a number that is text); and a clock that begins again where the logger was started anew."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date, datetime, time, timedelta
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from identification.arrays import Array, BoolArray, frozen
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
+from identification.signals.differentiate import resolution
 from identification.signals.even_clock import LONGEST_GAP, told_of_hours
 from identification.thresholds import HALF, OF_ACCOUNT
 from workbench.logs.table import RawColumn, Table, number_of, text_of
@@ -215,8 +216,10 @@ def summed(x: Array, step: Array | None = None) -> Array:
 
 MOST_FAULTY = 0.01  # of the rows: more is a file that is laid out otherwise
 MOST_STARTS = 50  # of a clock in one file
+_MOST_OF_A_TICK = 1.01  # that a rounded stamp is off
+_MOST_DIGITS = 15
+_OF_ROUNDING = 8.0  # times the step between two numbers, that differences of times are rounded to
 _ROWS_OF_A_MEAN = 50  # over which the jitter of stamps is gone, and a lost row is not
-_MOST_AXES, _SHOWN_AXES, _LOOKED_AT = 50, 4, 1000  # axes of one file, named; rows looked at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,61 +283,48 @@ def sound_rows(t: Array, others: Sequence[Array]) -> tuple[BoolArray, tuple[str,
     return timed & ~twice, tuple(remarks)
 
 
-def late_stamps(t: Array) -> tuple[Array, str]:
-    """The times (n,) of even rows of which some were stamped late, together with the next, and what
-    is said of that; other times as they are.
+def even_stamps(t: Array) -> tuple[Array, str]:
+    """The times (n,) of even rows whose stamps are rounded to whole ticks, or of which some came
+    late, together with the next, and what is said of that; other times as they are.
 
-    The rows are even where their stamps follow the count of the rows without a step: a row that
-    was lost would shift all behind it by a period.
+    Rows are even where their stamps follow the count of the rows: but for a tick; or without a
+    step, as a row that was lost would shift all behind it by a period.
     """
     step = np.diff(t)
-    same = step == 0.0
-    if not np.any(same) or np.any(step < 0.0) or np.mean(same) >= OF_ACCOUNT:
+    if len(t) < SHORTEST_LOG or not np.all(step >= 0.0):
         return t, ""
-    row = np.arange(len(t))
-    period, start = np.polyfit(row, t, 1)
+    same = step == 0.0
+    if not np.any(same):
+        return _without_rounding(t, step)
+    if np.mean(same) >= OF_ACCOUNT:
+        return t, ""
+    line = _line(t)
     blocks = max(1, len(t) // _ROWS_OF_A_MEAN)
-    late = [float(np.mean(one)) for one in np.array_split(t - start - period * row, blocks)]
-    if np.ptp(late) > HALF * period:
+    late = [float(np.mean(one)) for one in np.array_split(t - line, blocks)]
+    if np.ptp(late) > HALF * (line[1] - line[0]):
         return t, ""
     said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"
-    return start + period * row, f"{said}: stamped late, taken as even rows"
+    return line, f"{said}: stamped late, taken as even rows"
 
 
-def several_axes(t: Array, columns: Iterable[tuple[str, NDArray[Any]]]) -> str:
-    """What is said of a log whose rows are of several axes in turn, by a column that names the axis
-    of each row: the times (n,) go up in the rows of each; else empty.
-
-    columns: what each is called, and its cells (n,).
-    """
-    if np.all(np.diff(t) > 0.0):
-        return ""
-    for name, cells in columns:
-        axes = _axes_in_turn(t, cells) if len(cells) == len(t) else ()
-        if axes:
-            shown = ", ".join(repr(one) for one in axes[:_SHOWN_AXES])
-            return (
-                f"the rows are of {len(axes)} axes in turn ({shown} in column {name}); give each"
-                " axis a file of its own rows"
-            )
-    return ""
+def _without_rounding(t: Array, step: Array) -> tuple[Array, str]:
+    """As `even_stamps`, of stamps in whole ticks that are off even rows by one at most."""
+    digits = min(int(-np.log10(_OF_ROUNDING * np.spacing(np.max(np.abs(t))))), _MOST_DIGITS)
+    tick, usual = resolution(np.round(step, digits)), float(np.median(step))
+    pieces = np.split(t, np.flatnonzero(step > LONGEST_GAP * usual) + 1)
+    lines = [_line(one) if len(one) > 2 else one for one in pieces]
+    off = max(float(np.ptp(one - line)) for one, line in zip(pieces, lines, strict=True))
+    lost = tick > HALF * usual and are_few(int(np.sum(step > HALF * tick + usual)), len(step))
+    if not 0.0 < off < _MOST_OF_A_TICK * tick or tick > usual or lost:
+        return t, ""
+    return np.concatenate(lines), f"stamps in whole ticks of {tick:.3g}: taken as even rows"
 
 
-def _axes_in_turn(t: Array, cells: NDArray[Any]) -> tuple[str, ...]:
-    """The axes that cells name, where rows of each come again and again, in the order of time."""
-
-    def texts(some: NDArray[Any]) -> list[str]:
-        return [str(text_of(cell)) for cell in some.tolist()]
-
-    first, apart = cells[:_LOOKED_AT], cells[:: 1 + len(cells) // _LOOKED_AT]
-    if len(set(texts(first))) < 2 or len(set(texts(first) + texts(apart))) > _MOST_AXES:
-        return ()
-    axes, of = np.unique(np.asarray(texts(cells)), return_inverse=True)
-    again = np.sum(of[1:] != of[:-1]) >= len(axes)  # else they are runs
-    if not again or len(axes) > _MOST_AXES or np.min(np.bincount(of)) < SHORTEST_LOG:
-        return ()
-    rise = all(np.all(np.diff(t[of == k]) > 0.0) for k in range(len(axes)))
-    return tuple(axes.tolist()) if rise else ()
+def _line(t: Array) -> Array:
+    """Even times as near to these (n,) as can be."""
+    row = np.arange(len(t))
+    period, start = np.polyfit(row, t - t[0], 1)
+    return np.asarray(t[0] + start + period * row)
 
 
 def rows_of(count: int) -> str:

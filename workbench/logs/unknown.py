@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
@@ -31,8 +30,8 @@ LEAST_COMMON = 0.5  # of the clock's span, that another one shares
 @dataclass(frozen=True, eq=False)
 class RawColumn:
     """One column: its number from 0, what a card calls it, its header and the unit below it, its
-    values (n,) (NaN where there is no number), why they cannot be used (else empty), its group,
-    where the file has several, and its cells (n,), where they are text."""
+    values (n,) (NaN where there is no number), why they cannot be used (else empty), and its group,
+    where the file has several."""
 
     number: int
     key: str | int
@@ -41,7 +40,6 @@ class RawColumn:
     values: Array
     unusable: str = ""
     group: str = ""
-    cells: NDArray[Any] | None = None
 
 
 def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) -> list[RawColumn]:
@@ -166,8 +164,7 @@ def read_unknown(path: Path) -> UnknownLog:
                 if times is not None:
                     values, why, below = times, "", "s"
         group = table.groups[number] if table.groups else ""
-        cells = np.asarray(table.fetch(number)) if why.startswith("text") else None
-        one = RawColumn(number, key, text, below, values, why, group, cells)
+        one = RawColumn(number, key, text, below, values, why, group)
         (scalars if len(values) == 1 else found).append(one)
     found = on_clock_of_most(found, table.clocks)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)

@@ -41,6 +41,14 @@ READ = [
     ("erpm", None, "velocity", ""),
     ("/joint_states/hip/effort", None, "force", ""),
     ("/cmd/hip/position", None, "position", "reference"),
+    ("PositionRad", "rad", "position", ""),
+    ("/RealOutputs/Arm/VelocityRadPerSec", "rad/s", "velocity", ""),
+    ("elevatorPositionMm", "mm", "position", ""),
+    ("AxisStatus.Drive.ActualTorque", None, "force", "measured"),
+    ("joints.elbow.eff", None, "force", ""),
+    ("observation.state[3]", None, "position", ""),
+    ("PL.CMD (Counts16Bit)", "count", "position", "reference"),
+    ("IL.CMD (Arms)", "A", "command", "demand"),
 ]
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.errors import BadLog
 from tests.workbench.log_files import card, signals, write_csv
 from workbench.logs.runs import read_runs
 from workbench.logs.unknown import read_unknown
@@ -65,17 +64,17 @@ def test_runs_between_gaps_are_not_called_resampled(tmp_path: Path) -> None:
     assert "in 2 runs" in found.remarks[-1]
 
 
-def test_rows_of_several_axes_in_turn_are_refused_by_that_name(tmp_path: Path) -> None:
+@pytest.mark.parametrize("names", [("X", "Y"), ("1", "2")])
+def test_rows_of_several_axes_in_turn_are_a_column_for_each(
+    tmp_path: Path, names: tuple[str, str]
+) -> None:
     own, lines = signals(), ["t,axis,y,F"]
     for t, y, F in zip(own["t"], own["y"], own["F"], strict=True):
-        lines += [f"{t},X,{y},{F}", f"{t},Y,{-y},{-F}"]
-    path = tmp_path / "a.csv"
-    path.write_text("\n".join(lines), "utf-8")
-    said = "the rows are of 2 axes in turn \\('X', 'Y' in column 'axis'\\); give each axis a file"
-    with pytest.raises(BadLog, match=said):
-        read_runs(path, card(tmp_path))
-    with pytest.raises(BadLog, match=said):
-        columns_of(read_unknown(path))
+        lines += [f"{t},{names[0]},{y},{F}", f"{t},{names[1]},{-y},{-F}"]
+    (tmp_path / "a.csv").write_text("\n".join(lines), "utf-8")
+    found = {one.header: one.values for one in read_unknown(tmp_path / "a.csv").columns}
+    assert list(found) == ["t", *(f"{name} {key}" for key in "yF" for name in names)]
+    np.testing.assert_allclose(found[f"{names[1]} y"], -own["y"])
 
 
 def test_runs_with_a_number_are_no_axes(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import BadLog
 from tests.workbench.log_files import card, signals
-from workbench.logs.layout import find_layout
+from workbench.logs.layout import find_layout, period_above
 from workbench.logs.runs import read_log
 from workbench.logs.unknown import read_unknown
 
@@ -176,3 +176,55 @@ def test_names_of_several_words_stand_apart(tmp_path: Path) -> None:
     names = [one.header for one in found.columns]
     assert names == ["[ Sample", "Time", "Commanded Pos", "Encoder 1 Pos", "Control Effort"]
     assert {len(one.values) for one in found.columns} == {120}
+
+
+LABVIEW = [
+    *[
+        "LabVIEW Measurement\t",
+        "Separator\tTab",
+        "***End_of_Header***\t",
+        "\t",
+        "Channels\t2\t\t\t",
+    ],
+    *["Y_Unit_Label\tmm\tN\t", "X0\t0.0\t0.0\t", "Delta_X\t0.005000\t0.005000\t"],
+    *["***End_of_Header***\t\t\t", "X_Value\tActPos\tForce\tComment"],
+]
+
+
+def test_units_and_the_period_may_stand_above_the_names(tmp_path: Path) -> None:
+    """As LabVIEW writes a measurement without its column of times."""
+    own = columns()
+    rows = [f"\t{y}\t{F}" for y, F in zip(own["ActPos"], own["Force"], strict=True)]
+    path = tmp_path / "a.lvm"
+    path.write_text("\n".join([*LABVIEW, *(row.replace(",", ".") for row in rows)]))
+    found = read_unknown(path)
+    assert [one.header for one in found.columns] == ["X_Value", "ActPos", "Force"]
+    assert [one.unit_below for one in found.columns] == ["", "mm", "N"]
+    assert [(one.header, one.values[0]) for one in found.scalars] == [("Delta_X", 0.005)]
+
+
+@pytest.mark.parametrize(
+    ("line", "period"),
+    [
+        (["Sampling Period [us]", "500"], ("Sampling Period [us]", 500.0, "")),
+        (["Sampling interval", "2", "ms"], ("Sampling interval", 2.0, "ms")),
+        (["Takt", "2,5 ms"], ("Takt", 2.5, "ms")),
+        (["Sample rate", "2 kHz"], ("period by Sample rate", 5e-4, "s")),
+        (["Sample rate", "fast"], None),
+        (["Samples", "400"], None),
+        (["dt", "0"], None),
+    ],
+)
+def test_a_line_above_gives_the_period(
+    line: list[str], period: tuple[str, float, str] | None
+) -> None:
+    assert period_above([["Device", "X7"], [], line]) == period
+
+
+def test_names_may_stand_behind_a_key_in_a_comment(tmp_path: Path) -> None:
+    body = [" ".join(row).replace(",", ".") for row in zip(*columns().values(), strict=True)]
+    above = ["# run 7 of stage LM", "# columns: t ActPos Force", "# units: ms mm N"]
+    (tmp_path / "a.dat").write_text("\n".join([*above, *body]))
+    found = read_unknown(tmp_path / "a.dat").columns
+    assert [one.header for one in found] == ["t", "ActPos", "Force"]
+    assert [one.unit_below for one in found] == ["ms", "mm", "N"]

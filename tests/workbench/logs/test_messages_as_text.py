@@ -1,6 +1,7 @@
 """Messages written as text: a stamp in two columns, rows with the values of one topic alone, a row
 a signal."""
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +73,56 @@ def test_a_few_empty_cells_make_no_groups(tmp_path: Path) -> None:
     ]
     path.write_text("t,y,F\n" + "\n".join(rows))
     assert read_table(path, FileSpec()).groups == ()
+
+
+def long_rows(blocks: bool) -> list[str]:
+    """A row a value, of three signals in turn, or of one after the other."""
+    signals = {"hip/pos": Y, "hip/effort": 2.0 * Y, "mode": 0.0 * Y}
+    own = [
+        [f"{t:.6f},{name},{x:.6f},0" for t, x in zip(T, values, strict=True)]
+        for name, values in signals.items()
+    ]
+    own[2][7] = f"{T[7]:.6f},mode,auto,0"
+    return [one for rows in (own if blocks else zip(*own, strict=True)) for one in rows]
+
+
+@pytest.mark.parametrize("blocks", [False, True])
+def test_rows_of_one_value_each_have_a_column_for_each_signal(tmp_path: Path, blocks: bool) -> None:
+    """As databases of series export them (blocks), and loggers of robots."""
+    path = tmp_path / "log.csv"
+    path.write_text("Timestamp,Key,Value,Quality\n" + "\n".join(long_rows(blocks)))
+    found = {one.header: one for one in read_unknown(path).columns if not one.unusable}
+    assert found["hip/pos"].values == pytest.approx(Y, abs=1e-6)
+    assert found["hip/effort"].values == pytest.approx(2.0 * Y, abs=1e-6)
+    assert found["Timestamp"].values == pytest.approx(T)
+    table = read_table(path, FileSpec())
+    assert "which column 'Key' names" in table.remarks[-1]
+    assert table.clocks["hip/effort"] != table.clocks["mode"]  # of other times: one is a text
+
+
+@pytest.mark.parametrize("name", ["{k}", "run {half}", "{state}"])
+def test_other_texts_beside_numbers_are_no_names(tmp_path: Path, name: str) -> None:
+    path, half = tmp_path / "log.csv", len(T) // 2
+    rows = [
+        f"{t - T[half if k >= half else 0]:.6f}," + name.format(
+            k=f"k{k}", half=k // half, state="on" if 50 < k < 250 else "off"
+        ) + f",{y:.6f},{2.0 * y:.6f}"
+        for k, (t, y) in enumerate(zip(T, Y, strict=True))
+    ]  # fmt: skip
+    path.write_text("t,note,y,F\n" + "\n".join(rows))
+    assert read_table(path, FileSpec()).groups == ()
+
+
+@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%m/%d/%Y"])
+@pytest.mark.parametrize("parted", [True, False])
+def test_date_time_and_milliseconds_are_one_clock(tmp_path: Path, day: str, parted: bool) -> None:
+    begun = datetime(2024, 5, 3, 23, 59, 59)
+    moments = [begun + timedelta(milliseconds=5 * k) for k in range(N)]
+    form = f"{day};%H:%M:%S" + ("" if parted else ".%f")
+    part = [f";{one.microsecond // 1000}" if parted else "" for one in moments]
+    rows = [f"{one:{form}}{ms};{y:.6f}" for one, ms, y in zip(moments, part, Y, strict=True)]
+    head = "Datum;Uhrzeit;ms;Weg" if parted else "Datum;Uhrzeit;Weg"
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows]))
+    t = read_unknown(tmp_path / "log.csv").columns[0]
+    assert t.unit_below == "s"
+    assert t.values - t.values[0] == pytest.approx(H * np.arange(N), abs=1e-6)

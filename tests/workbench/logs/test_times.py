@@ -15,7 +15,7 @@ from identification.errors import BadLog
 from tests.workbench.channel_files import write_sheet
 from tests.workbench.log_files import CARD, card, signals
 from workbench.logs.runs import read_log
-from workbench.logs.times import seconds
+from workbench.logs.times import even_stamps, seconds
 
 MILLISECONDS = st.lists(st.integers(0, 86_399_999), min_size=1, max_size=20).map(sorted)
 
@@ -124,3 +124,18 @@ def test_times_in_words_need_the_unit_of_seconds(tmp_path: Path) -> None:
     text = CARD.replace('{ column = "t", unit = "s" }', '{ column = "Time", unit = "ms" }')
     with pytest.raises(BadLog, match='read in seconds; write unit = "s"'):
         read_log(tmp_path / "a.csv", card(tmp_path, text))
+
+
+@pytest.mark.parametrize("begun", [0.0, 1_715_000_000.123])
+def test_stamps_in_whole_milliseconds_are_those_of_even_rows(begun: float) -> None:
+    t = 2.3e-3 * np.arange(3000)
+    t[1500:] += 18.0  # a logger that paused
+    found, said = even_stamps(begun + np.floor(1e3 * t) / 1e3)
+    np.testing.assert_allclose(np.diff(found)[:1499], 2.3e-3, rtol=1e-3)
+    assert "whole ticks of 0.001: taken as even rows" in said
+
+
+def test_stamps_that_are_off_by_more_are_as_they_are() -> None:
+    t = np.cumsum(np.random.default_rng(2).integers(1, 4, 2000)) * 1e-3
+    for times in (t, 2e-3 * np.arange(500), np.where(t > 1.0, np.nan, t)):
+        assert even_stamps(times) == (pytest.approx(times, nan_ok=True), "")

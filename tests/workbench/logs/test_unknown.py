@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import scipy.io
 
@@ -147,3 +149,21 @@ def test_damage_that_shows_only_in_a_column_is_said_in_one_line(tmp_path: Path) 
     with pytest.raises(BadLog, match="cannot be read as a parquet file") as refused:
         read_unknown(path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("frame", [" (1436509052.25)  can0  181   [6]  4E 0A 00 00 7A FF",
+                                   "(1436509052.25) can0 181#4E0A00007AFF"])  # fmt: skip
+def test_raw_frames_of_a_bus_are_called_so(tmp_path: Path, frame: str) -> None:
+    with pytest.raises(BadLog, match=r"raw frames of a CAN bus.*by its DBC or EDS file"):
+        read_unknown(write(tmp_path, f"{frame}\n" * 200))
+
+
+def test_lists_in_parquet_have_a_column_for_each_number(tmp_path: Path) -> None:
+    """As robots' policies are recorded, with an image of which nothing is read."""
+    state = pa.array(TABLE[:, 1:].tolist(), pa.list_(pa.float32(), 2))
+    image = pa.array([[0.0] * 64] * len(TABLE), pa.list_(pa.float32()))
+    content = {"observation.state": state, "image": image, "timestamp": pa.array(TABLE[:, 0])}
+    pq.write_table(pa.table(content), tmp_path / "a.parquet")
+    found = {one.header: one.values for one in read_unknown(tmp_path / "a.parquet").columns}
+    assert list(found) == ["observation.state[0]", "observation.state[1]", "timestamp"]
+    np.testing.assert_allclose(found["observation.state[1]"], S["F"], rtol=1e-6)

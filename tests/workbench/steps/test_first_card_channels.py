@@ -134,3 +134,79 @@ def test_a_reference_by_quarters_of_a_turn_is_an_angle(
     found = proposed(table(tmp_path, "t,r,y,u", T, r, y, u / turn))
     place = found.signal("y")
     assert place is not None and (found.motion, place.unit, place.sure) == (motion, unit, False)
+
+
+def test_a_command_in_counts_is_where_the_position_goes(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    y, r = (np.round(65536.0 * joint[name] / (2.0 * np.pi)) for name in "yr")
+    head = "Time (ms),IL.CMD (Arms),PL.FB (Counts16Bit),PL.CMD (Counts16Bit)"
+    found = checked_proposal(proposed(table(tmp_path, head, 1e3 * T, joint["F"], y, r)))
+    assert columns_of(found) == {
+        "t": "Time (ms)", "y": "PL.FB (Counts16Bit)", "r": "PL.CMD (Counts16Bit)",
+        "u": "IL.CMD (Arms)",
+    }  # fmt: skip
+    u = found.signal("u")
+    assert u is not None and (u.unit, u.sure) == ("A", True)
+
+
+def test_a_current_about_the_middle_of_a_converter_gets_an_offset(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    adc = np.round(512.0 + 30.0 * joint["F"])
+    path = table(tmp_path, "t_s,position_rad,current", T, joint["y"], adc)
+    (said,) = (one for one in proposed(path).remarks if "converter" in one)
+    assert "about 51" in said and "write offset = 51" in said
+
+
+def test_a_time_that_begins_again_stands_before_a_number_of_rows(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    episode = np.arange(len(T)) // 3000
+    t = T - T[3000 * episode]
+    head = "observation.state[0],observation.effort[0],timestamp,frame_index,episode_index,index"
+    columns = (joint["y"], joint["F"], t, np.arange(len(T)) % 3000, episode, np.arange(len(T)))
+    found = checked_proposal(proposed(table(tmp_path, head, *columns)))
+    assert columns_of(found)["t"] == "timestamp"
+    assert any("begins again: 2 runs" in one for one in found.remarks)
+    assert found.motion == "rotary"
+
+
+@pytest.mark.parametrize("index", [True, False])
+def test_the_period_above_the_table_gives_the_clock(
+    joint: dict[str, Array], tmp_path: Path, index: bool
+) -> None:
+    columns = ([np.arange(len(T))] if index else []) + [joint["y"], joint["F"]]
+    head = "Device,X7\nSampling interval,2,ms\n" + "Sample," * index + "angle [rad],torque [Nm]"
+    t = checked_proposal(proposed(table(tmp_path, head, *columns))).signal("t")
+    assert t is not None
+    expected = ("Sample", "500 1/s", False) if index else ("Sampling interval", None, True)
+    assert (t.column, t.gain, t.summed) == expected
+    assert t.sure or not index
+
+
+def test_stamps_in_whole_milliseconds_have_the_period_of_the_rows(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    stamps = 7e4 + np.floor(1.15e3 * T)  # every 2.3 ms
+    path = table(tmp_path, "time_ms,angle_rad,torque_Nm", stamps, joint["y"], joint["F"])
+    found = checked_proposal(proposed(path))
+    assert any("rows every 0.0023 s, an even clock" in one for one in found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("head", "motion", "sure"),
+    [
+        ("t_s,position,velocity,effort", "rotary", False),
+        ("t_s,position,velocity,force", "linear", False),
+        ("t_s,position,velocity,ActualTorque", "rotary", False),
+        ("t_s,angle,velocity,ActualTorque", "rotary", True),
+    ],
+)
+def test_a_motors_torque_alone_is_no_proof_of_a_turn(
+    joint: dict[str, Array], tmp_path: Path, head: str, motion: str, sure: bool
+) -> None:
+    y = joint["y"] + 1e-5 * np.random.default_rng(3).standard_normal(len(T))  # no encoder's steps
+    found = proposed(table(tmp_path, head, T, y, joint["v"], joint["F"]))
+    assert found.motion == motion
+    assert next(one.sure for one in found.rig if one.key == "motion") is sure

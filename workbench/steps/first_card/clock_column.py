@@ -13,7 +13,7 @@ from identification.signals.even_clock import LONGEST_GAP
 from identification.thresholds import TWICE
 from workbench.cards.headers import read_header
 from workbench.logs.layout import says_period
-from workbench.logs.times import MOST_STARTS, several_axes, summed
+from workbench.logs.times import MOST_STARTS, summed
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.column import Column
 
@@ -95,11 +95,6 @@ def _rising_one(path: Path, columns: Sequence[Column], texts: Sequence[Column]) 
     if not ticking and rising and same:  # a clock that is uneven, or called something else
         return rising[0]
     if not ticking:
-        cells = [(one.shown, one.values if one.raw.cells is None else one.raw.cells)
-                 for one in (*columns, *texts)]  # fmt: skip
-        for one in columns:
-            if "time" in one.header.means and (said := several_axes(one.values, cells)):
-                raise BadLog(f"{path}: {said}")
         named = [one for one in columns if "time" in one.header.means]
         found = "no column goes up evenly from row to row"
         if named:

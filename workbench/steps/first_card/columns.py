@@ -16,7 +16,7 @@ from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, n
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.times import (
-    late_stamps,
+    even_stamps,
     sound_rows,
     stretches,
     told_of_starts,
@@ -77,6 +77,10 @@ def columns_of(log: UnknownLog) -> Columns:
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     log = replace(log, notes=(*log.notes, *said))
     clock = clock_of(log, usable, [one for one in read if one.raw.number in left_out])
+    even, said_of_it = even_stamps(clock.values)
+    if said_of_it:
+        log = replace(log, notes=(*log.notes, said_of_it))
+        clock = replace(clock, values=even, x=even)
     left_out.pop(clock.raw.number, None)
     usable = [one for one in usable if one.raw.number != clock.raw.number] + [clock]
     if (piece := _longest_piece(clock.values)) is not None:
@@ -145,7 +149,7 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             runs = stretches(one.values[rows])
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = np.flatnonzero(rows)[longest]
-            even, late = late_stamps(one.values[at])
+            even, late = even_stamps(one.values[at])
             if late:
                 clock = replace(one, values=even, x=even)
                 return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])

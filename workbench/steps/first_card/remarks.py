@@ -55,6 +55,13 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
             " spring is in it, or it is not what drives this position"
         )
     if "u" in roles.columns and (unsigned := without_sign([roles.columns[k] for k in "uy"])):
+        middle, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
+        never = np.min(roles.columns["u"].x) > OF_ACCOUNT * middle  # near 0, be it at rest
+        if both and never and middle > BALANCED * coulomb:
+            unsigned = (
+                f"{roles.columns['u'].shown} goes up and down about {middle:.4g}, as what a"
+                f" converter makes of a signal with a sign: write offset = {middle:.4g} in its line"
+            )
         yield unsigned
     if "u" in roles.columns and set(words_of(roles.columns["u"].raw.header)) & CONTROLLERS:
         yield (
