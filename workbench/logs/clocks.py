@@ -28,7 +28,6 @@ MOSTLY_EVEN = 0.8  # of the steps of a clock
 IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
 _SENSED = ("y", "F", "p_p", "p_n")
 MOST_NAMES, FEW_NAMES = 500, 3  # in a column that says of what each row is; shown
-FEW_ROWS = 3  # at the end, by which columns of one clock may differ
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
 Clock = Callable[[str], Array]
@@ -86,15 +85,10 @@ def topic_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
     of = [(own, there[own[0]] if key else there[0]) for key, own in members.items()]
     if len(of) < FEWEST_GROUPS or min(int(at.sum()) for _, at in of) < SHORTEST_LOG:
         return None
-    names, groups, made, clocks = list[str](), list[str](), list[RawColumn](), dict[str, int]()
-    for own, at in of:
-        clocks[table.names[own[0]]] = len(names)
-        for k in (0, *own):
-            names.append(table.names[k])
-            groups.append(table.names[own[0]])
-            made.append(columns[k][at])
-    return replace(table, names=tuple(names), fetch=made.__getitem__, groups=tuple(groups),
-                   clocks=clocks)  # fmt: skip
+    return _in_groups(
+        table, table.names[0],
+        [(columns[0][at], [(table.names[k], columns[k][at]) for k in own]) for own, at in of],
+    )  # fmt: skip
 
 
 def long_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
@@ -138,24 +132,30 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
         if len(known) >= SHORTEST_LOG:
             called = name if len(values) == 1 else f"{name} {table.names[k]}"
             groups.setdefault(t[known].tobytes(), []).append((called, x[known]))
-    columns, clocks_at = list[tuple[str, str, Array]](), dict[str, int]()
-    for times, own_columns in groups.items():
-        group = own_columns[0][0]
-        clocks_at[group] = len(columns)
-        columns += [(group, table.names[clock], np.frombuffer(times))]
-        columns += [(group, name, x) for name, x in own_columns]
-    if len(columns) - len(groups) < FEWEST_GROUPS:
+    if sum(map(len, groups.values())) < FEWEST_GROUPS:
         return None
-    in_groups, called_by, made = zip(*columns, strict=True)
     shown = ", ".join(map(repr, names[:FEW_NAMES])) + ", ..." * (len(names) > FEW_NAMES)
     said = f"rows are of {len(names)} in turn, which column {table.names[at]!r} names ({shown})"
-    unit = table.units[clock] if table.units else ""
-    unit = unit if table.fetch(clock).dtype.kind in "fiu" else "s"
-    units = tuple(unit if k in clocks_at.values() else "" for k in range(len(made)))
-    return replace(
-        table, names=called_by, fetch=made.__getitem__, headed=True, groups=in_groups,
-        clocks=clocks_at, units=units, remarks=(*table.remarks, f"{said}: a column each"),
-    )  # fmt: skip
+    unit = "s" if table.fetch(clock).dtype.kind not in "fiu" else ""
+    unit = table.units[clock] if table.units and not unit else unit
+    found = [(np.frombuffer(times), own) for times, own in groups.items()]
+    table = replace(table, headed=True, remarks=(*table.remarks, f"{said}: a column each"))
+    return _in_groups(table, table.names[clock], found, unit)
+
+
+def _in_groups(
+    table: Table, clock: str, parts: Sequence[tuple[Array, Sequence[tuple[str, Array]]]],
+    unit: str = "",
+) -> Table:  # fmt: skip
+    """The table of these times, each with the columns that are on them: a group by the first."""
+    columns, clocks = list[tuple[str, str, Array, str]](), dict[str, int]()
+    for times, own in parts:
+        group = own[0][0]
+        clocks[group] = len(columns)
+        columns += [(group, clock, times, unit), *((group, name, x, "") for name, x in own)]
+    groups, names, made, units = zip(*columns, strict=True)
+    return replace(table, names=names, fetch=made.__getitem__, groups=groups, clocks=clocks,
+                   units=units)  # fmt: skip
 
 
 def _numbers_or_times(raw: RawColumn) -> Array:

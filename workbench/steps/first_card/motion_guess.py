@@ -101,6 +101,7 @@ def likeliest(
 WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one
 TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
+FAR_FOR_A_SLIDE = 0.5  # m, that a sliding joint of a robot hardly goes
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 MOST_QUARTERS, OFF_QUARTER = 20, 1e-3  # levels of a reference by quarters of a turn, and off one
@@ -163,7 +164,8 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
         if (one.header.speed or force) and one.header.angle and one.axis in ("", y.axis):
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
-    if {"effort", "velocity"} <= {word for one in beside for word in words_of(one.header.name)}:
+    names = {word for one in beside for word in words_of(one.header.name)}
+    if {"effort", "velocity"} <= names and np.ptp(y.x) > FAR_FOR_A_SLIDE:
         why = "position, velocity and effort are those of a robot's joints, which mostly turn"
         return MotionGuess("rotary", why, False, rotor)
     if y.header.unit is None and (quarters := _of_quarters(roles)):
