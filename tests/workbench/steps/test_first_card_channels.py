@@ -210,3 +210,14 @@ def test_a_motors_torque_alone_is_no_proof_of_a_turn(
     found = proposed(table(tmp_path, head, T, y, joint["v"], joint["F"]))
     assert found.motion == motion
     assert next(one.sure for one in found.rig if one.key == "motion") is sure
+
+
+@pytest.mark.parametrize(("size", "unit"), [(400.0, "mA"), (4.0, "A")])
+def test_a_current_of_large_whole_numbers_is_not_in_amperes(
+    joint: dict[str, Array], tmp_path: Path, size: float, unit: str
+) -> None:
+    u = np.round(size * joint["F"] / np.max(np.abs(joint["F"])))
+    position = np.round(4096.0 * joint["y"] / (2.0 * np.pi))
+    found = proposed(table(tmp_path, "t_s,present_position,present_current", T, position, u))
+    one = found.signal("u")
+    assert one is not None and (one.unit, one.sure) == (unit, False)

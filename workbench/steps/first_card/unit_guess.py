@@ -50,6 +50,7 @@ FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pre
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
 SHARES = ("pwm", "duty", "tastgrad")  # words of a share
+MOST_AMPERES = 100.0  # of a current in whole numbers
 NEARLY_ALL_OF_IT, ALL_OF_IT = 95.0, 100.0  # the whole, in %
 USUAL_COMMANDS = {"V": "A", "A": "V", "1": "%", "%": "1"}  # and what it is otherwise
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
@@ -286,6 +287,9 @@ def _of_command(column: Column) -> UnitGuess:
     text = column.header.name.casefold()
     if column.bits is not None:
         return UnitGuess("1", None, False, "a register: its full scale is in no log")
+    if column.current and column.whole and peak > MOST_AMPERES:
+        why = "whole numbers too large for A: see the drive's manual for what one is"
+        return UnitGuess("mA", None, False, why, "1")
     if column.current:
         return _command("A", "the header speaks of a current")
     share = any(one in text for one in SHARES)
