@@ -28,6 +28,7 @@ MOSTLY_EVEN = 0.8  # of the steps of a clock
 IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
 _SENSED = ("y", "F", "p_p", "p_n")
 MOST_NAMES, FEW_NAMES = 500, 3  # in a column that says of what each row is; shown
+LOOKED_AT = 200  # cells of a column of text, among which one is a number
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
 Clock = Callable[[str], Array]
@@ -111,6 +112,10 @@ def long_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
 def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> Table | None:
     """The table by the names in a column `at`, of which `of` (n,) says each row's; None where these
     do not come in turn, or one after the other over the same times."""
+    changes = int(np.sum(np.diff(of) != 0))
+    in_turn, in_blocks = changes >= HALF * len(of), changes < TWICE * len(names)
+    if not (in_turn or in_blocks):
+        return None
     rows = [own for k in range(len(names)) if len(own := np.flatnonzero(of == k)) >= SHORTEST_LOG]
     clocks, values = list[tuple[int, Array]](), list[tuple[int, Array]]()
     for k in (k for k in range(len(table.names)) if k != at):
@@ -121,9 +126,9 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
             (clocks if rises else values).append((k, x))
     if not clocks or not values:
         return None
-    (clock, t), changes = clocks[0], int(np.sum(np.diff(of) != 0))
-    in_turn = changes >= HALF * len(of) and not (names[0].isdigit() and np.all(np.diff(t) > 0.0))
-    in_blocks = changes < TWICE * len(names) and len(values) == 1 and np.any(np.diff(t) < 0.0)
+    (clock, t), *_ = clocks
+    in_turn &= not names[0].isdigit() or bool(np.any(np.diff(t) <= 0.0))
+    in_blocks &= len(values) == 1 and bool(np.any(np.diff(t) < 0.0))
     if not (in_turn or in_blocks):
         return None
     groups = dict[bytes, list[tuple[str, Array]]]()  # of the same times
@@ -160,6 +165,10 @@ def _in_groups(
 
 def _numbers_or_times(raw: RawColumn) -> Array:
     """A column as numbers or as times [s], NaN where a cell is neither."""
+    if raw.dtype.kind in "fiu":
+        return np.asarray(raw, dtype=np.float64)
+    if not any(map(_has_number, raw[:: 1 + len(raw) // LOOKED_AT].tolist())):
+        return np.full(len(raw), np.nan)
     with suppress(BadLog):
         if (times := seconds(raw, "", 0)) is not None:
             return times
@@ -168,6 +177,10 @@ def _numbers_or_times(raw: RawColumn) -> Array:
         with suppress(TypeError, ValueError):
             out[k] = number_of(cell)
     return out
+
+
+def _has_number(cell: object) -> bool:
+    return isinstance(cell, str) and bool(cell) and (is_number(cell) or is_time(cell))
 
 
 def _numbers(raw: RawColumn) -> Array:

@@ -17,7 +17,6 @@ from workbench.steps.first_card.weights import (
     FORCE_LIKENESS,
     LEAST_WAY,
     MIRRORED,
-    OF_A_CONTROLLER,
     RULED_OUT,
     ahead_of,
     among_derivatives,
@@ -104,7 +103,6 @@ def ways_of(
         v_share = float(seen.v_share[k])
         less_way = one.way_gone < LEAST_WAY * y.way_gone  # which no force on it does
         physics = driving(law, v_share, less_way) + together(y, one) + own
-        physics += OF_A_CONTROLLER if k in seen.controlled else 0.0
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])

@@ -38,7 +38,6 @@ NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 EXACT_VELOCITY = 0.9995  # the same, from which it was made of the position, whatever its name
-FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
 MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
 BEHIND = -6.0  # for a reference that is behind the position, as another sensor or a model is
 ROUGHER = 3.0  # times the position's noise, that a reference hardly has
@@ -51,7 +50,6 @@ ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
-OF_A_CONTROLLER = -6.0  # for a drive whose difference from the position another column follows
 STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
 OF_A_COPY = -5.0  # for a reference that is filtered from a position, or filtered to one
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
@@ -165,7 +163,7 @@ def of_a_motor(one: Column) -> float:
 
 
 def limits(pairs: Pairs) -> dict[int, int]:
-    """Commands before a limiter or a sum: what comes out of it, each by its place."""
+    """Commands before a limiter: what comes out of it, each by its place."""
     likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
@@ -241,13 +239,9 @@ def ahead_of(seen: Seen, k: int) -> float:
     rough = one.noise / max(float(np.std(one.x)), 1e-300)
     rough /= max(y.noise / max(float(np.std(y.x)), 1e-300), 1e-300)
     score += 1.0 if rough < 1.0 else -1.0 if rough < ROUGHER else -2.0
-    if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
-        score = min(score, 0.0)
     pair = (min(k, seen.at), max(k, seen.at))
     if k in seen.controlled or any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
-    if y.header.purpose == "filtered" and one.header.purpose != "reference" and said(one, "y") > 0:
-        score += OF_A_COPY
     return score + _named_for(seen, k)
 
 
