@@ -22,8 +22,8 @@ _TYPE_OR_UNIT = re.compile(
     r"(?:L?REAL|FLOAT|DOUBLE|U?[SDL]?INT|BOOL|BIT|BYTE|D?WORD|TIME)(?:8|16|32|64)?|"
     r"double|float|int(?:8|16|32|64)?"
 )
-_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "interval", "xincrement",
-            "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
+_WORDS_OF_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "xincrement",
+                     "interval", "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
 _TWO_OF_PERIODS = {("delta", "x"), ("delta", "t"), ("sample", "time"), ("sampling", "time")}
 _RATES = {"rate", "samplerate", "abtastrate", "fs"}
 _NO_COLUMN = ("", "comment", "comments", "remark", "remarks", "kommentar")  # behind the names
@@ -114,7 +114,7 @@ def _keyed_units(line: Sequence[str]) -> tuple[str, ...]:
 def says_period(name: str) -> bool:
     """Whether a name is one of the time from row to row."""
     words = words_of(name)
-    return bool(_PERIODS & set(words)) or tuple(words[:2]) in _TWO_OF_PERIODS
+    return bool(_WORDS_OF_PERIODS & set(words)) or tuple(words[:2]) in _TWO_OF_PERIODS
 
 
 def period_above(lines: Sequence[Sequence[str]]) -> tuple[str, float, str] | None:

@@ -30,7 +30,7 @@ _VECTOR = re.compile(r'(?<!\w)"?[\[(]([^\[\](){}"]*)[\])]"?')
 _BETWEEN = re.compile(r"[\s,;]+")
 _NEXT_DOCUMENT = re.compile(r"^---[ \t]*\r?$", re.MULTILINE)
 _POINT_OF_NAN = re.compile(r"\.(?=nan|inf)", re.I)
-_KEY = re.compile(r"([^\W\d][^:]*):(?:\s+|$)")
+_KEY_OF_DOCUMENT = re.compile(r"([^\W\d][^:]*):(?:\s+|$)")
 _HEXADECIMAL = re.compile(r"(?<![^\s,;|])0[xX]([0-9a-fA-F]{1,8})(?![^\s,;|])")
 _OF_HEXADECIMALS = re.compile(r"^[\d+-].*(?<![^\s,;|])0[xX].*$", re.MULTILINE)
 _CELLS = r'(?<=[;\t|"\n]){}(?=[;\t|"\r\n])'  # whole ones; between commas in quotes alone
@@ -125,7 +125,7 @@ def _leaves(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
             counts[place] = counts.get(place, -1) + 1
             path.append((indent + 1, f"[{counts[place]}]"))
             indent, body = indent + 2, body[2:].lstrip()
-        if key := _KEY.match(body):
+        if key := _KEY_OF_DOCUMENT.match(body):
             path.append((indent, key[1]))
             body = body[key.end() :]
         inline = body.startswith("[") and body.endswith("]")

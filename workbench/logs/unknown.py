@@ -138,8 +138,8 @@ def read_unknown(path: Path) -> UnknownLog:
         spec = FileSpec(encoding=_encoding(path))
         if _FRAMES.match(text_bytes(path, 1000).decode("latin-1")):
             raise BadLog(
-                f"{path}: holds raw frames of a CAN bus, whose bytes only the bus's own description"
-                " tells apart; decode them by its DBC or EDS file, and give a column a signal"
+                f"{path}: holds raw frames of a CAN bus, of which only its description says what"
+                " the bytes mean; decode them by its DBC or EDS file, and give a column a signal"
             )
     elif form == "json":
         rows, said = _rows_of(path)

@@ -162,10 +162,11 @@ def test_a_current_about_the_middle_of_a_converter_gets_an_offset(
 def test_a_time_that_begins_again_stands_before_a_number_of_rows(
     joint: dict[str, Array], tmp_path: Path
 ) -> None:
-    episode = np.arange(len(T)) // 3000
-    t = T - T[3000 * episode]
+    row = np.arange(len(T), dtype=np.float64)
+    episode = row // 3000.0
+    t = T - T[3000 * episode.astype(int)]
     head = "observation.state[0],observation.effort[0],timestamp,frame_index,episode_index,index"
-    columns = (joint["y"], joint["F"], t, np.arange(len(T)) % 3000, episode, np.arange(len(T)))
+    columns = (joint["y"], joint["F"], t, row % 3000.0, episode, row)
     found = checked_proposal(proposed(table(tmp_path, head, *columns)))
     assert columns_of(found)["t"] == "timestamp"
     assert any("begins again: 2 runs" in one for one in found.remarks)
@@ -176,7 +177,7 @@ def test_a_time_that_begins_again_stands_before_a_number_of_rows(
 def test_the_period_above_the_table_gives_the_clock(
     joint: dict[str, Array], tmp_path: Path, index: bool
 ) -> None:
-    columns = ([np.arange(len(T))] if index else []) + [joint["y"], joint["F"]]
+    columns = [*([500.0 * T] if index else []), joint["y"], joint["F"]]
     head = "Device,X7\nSampling interval,2,ms\n" + "Sample," * index + "angle [rad],torque [Nm]"
     t = checked_proposal(proposed(table(tmp_path, head, *columns))).signal("t")
     assert t is not None
