@@ -28,6 +28,7 @@ MOSTLY_EVEN = 0.8  # of the steps of a clock
 IN_COMMON = 0.8  # of the longer clock's span, that two clocks of one recording share
 _SENSED = ("y", "F", "p_p", "p_n")
 MOST_NAMES, FEW_NAMES = 500, 3  # in a column that says of what each row is; shown
+FIRST_ROWS = 40  # of a table, by which it is known whether it may be one of several in turn
 LOOKED_AT = 200  # cells of a column of text, among which one is a number
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
@@ -107,6 +108,20 @@ def long_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
             if 1 < len(names) <= MOST_NAMES and (made := _by_name(table, k, called, of)):
                 return made
     return None
+
+
+def in_turn(table: Table) -> Table | None:
+    """As `long_groups`, of a table that is no text and has one clock."""
+    columns = [np.asarray(table.fetch(k)) for k in range(len(table.names))]
+    if table.groups or any(len(one) != len(columns[0]) for one in columns):
+        return None
+    return long_groups(
+        table,
+        [
+            list(map(str, row))
+            for row in zip(*(x[:FIRST_ROWS].tolist() for x in columns), strict=True)
+        ],
+    )
 
 
 def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> Table | None:

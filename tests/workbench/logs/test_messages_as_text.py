@@ -5,8 +5,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from tests.workbench.channel_files import write_sheet
 from workbench.cards.card_tables import FileSpec
 from workbench.logs.tables import read_table
 from workbench.logs.unknown import read_unknown
@@ -98,6 +100,25 @@ def test_rows_of_one_value_each_have_a_column_for_each_signal(tmp_path: Path, bl
     table = read_table(path, FileSpec())
     assert "which column 'Key' names" in table.remarks[-1]
     assert table.clocks["hip/effort"] != table.clocks["mode"]  # of other times: one is a text
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".xlsx", ".json"])
+def test_other_formats_of_one_value_a_row_are_read_so_too(tmp_path: Path, suffix: str) -> None:
+    own = [
+        (t, name, x) for t, y in zip(T, Y, strict=True) for name, x in (("pos", y), ("F", 2 * y))
+    ]
+    times, names, values = (list(one) for one in zip(*own, strict=True))
+    frame = pd.DataFrame({"time": times, "signal": names, "value": values})
+    path = tmp_path / f"log{suffix}"
+    if suffix == ".parquet":
+        frame.to_parquet(path)
+    elif suffix == ".json":
+        frame.to_json(path, orient="records")
+    else:
+        write_sheet(path, [list(frame.columns), *frame.to_numpy().tolist()])
+    found = {one.header: one.values for one in read_unknown(path).columns}
+    assert found["pos"] == pytest.approx(Y, abs=1e-6)
+    assert found["F"] == pytest.approx(2.0 * Y, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["{k}", "run {half}", "{state}"])
