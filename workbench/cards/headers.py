@@ -203,7 +203,7 @@ def read_header(text: str, unit_below: str = "") -> Header:
     Of a path, as a message's field has, the last part tells the quantity, all of it the purpose.
     """
     whole, last = _read(text, unit_below), _PARTS.split(text)[-1]
-    path = text.count("/") >= _PATH or "/" not in last != text.rpartition("/")[2]
+    path = text.count("/") >= _PATH or last != text.rpartition("/")[2]
     if not path or len("".join(words_of(last)[:1])) < _SPOKEN:
         return whole
     own = _read(last, unit_below)

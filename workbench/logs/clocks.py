@@ -110,18 +110,13 @@ def long_groups(table: Table, rows: Sequence[Sequence[str]]) -> Table | None:
     return None
 
 
-def in_turn(table: Table) -> Table | None:
+def named_in_turn(table: Table) -> Table | None:
     """As `long_groups`, of a table that is no text and has one clock."""
     columns = [np.asarray(table.fetch(k)) for k in range(len(table.names))]
     if table.groups or any(len(one) != len(columns[0]) for one in columns):
         return None
-    return long_groups(
-        table,
-        [
-            list(map(str, row))
-            for row in zip(*(x[:FIRST_ROWS].tolist() for x in columns), strict=True)
-        ],
-    )
+    first = zip(*(one[:FIRST_ROWS].tolist() for one in columns), strict=True)
+    return long_groups(table, [list(map(str, row)) for row in first])
 
 
 def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> Table | None:

@@ -170,13 +170,13 @@ def _size(vector: str) -> int:
 
 
 def _parted(text: str) -> str:
-    """The text with commas between its labels and no braces, where each line is of labels."""
-    lines = [_BRACES.sub("", line) for line in _seen(text)]
-    if lines and all(line.count(":") + line.count("=") > 1 for line in lines):
+    """The text with commas between its labels, and without the braces around them."""
+    if (lines := _seen(text)) and all("{" in line for line in lines):
         text = _BRACES.sub("", text)
-        if not any(sign in line for line in lines for sign in _SEPARATORS):
-            return _NEXT_LABEL.sub(", ", text)
-    return text
+    lines = _seen(text)
+    apart = any(sign in line for line in lines for sign in _SEPARATORS)
+    labels = lines and not apart and all(map(_NEXT_LABEL.search, lines))
+    return _NEXT_LABEL.sub(", ", text) if labels else text
 
 
 class _Part(NamedTuple):

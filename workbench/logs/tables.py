@@ -18,7 +18,7 @@ from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.nearest import nearest
 from workbench.files import broken_link, refuse_larger, refuse_special
 from workbench.logs.channels import read_mdf, read_tdms, read_ulog
-from workbench.logs.clocks import in_turn
+from workbench.logs.clocks import named_in_turn
 from workbench.logs.excel import read_excel
 from workbench.logs.messages import read_bag, read_mcap
 from workbench.logs.packed import GZIP, ZIP, text_bytes
@@ -176,7 +176,7 @@ def read_table(path: Path, spec: FileSpec) -> Table:
 
     table = guarded(lambda: readers[form](path, spec))
     if form in ("excel", "json") or (form == "parquet" and _has_texts(path)):
-        table = guarded(lambda: in_turn(table) or table)
+        table = guarded(lambda: named_in_turn(table) or table)
     # Columns are read late, so damage may show only there.
     return replace(table, fetch=lambda number: guarded(lambda: table.fetch(number)))
 

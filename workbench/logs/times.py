@@ -315,7 +315,7 @@ def _without_rounding(t: Array, step: Array) -> tuple[Array, str]:
     lines = [_line(one) if len(one) > 2 else one for one in pieces]
     off = max(float(np.ptp(one - line)) for one, line in zip(pieces, lines, strict=True))
     lost = tick > HALF * usual and are_few(int(np.sum(step > HALF * tick + usual)), len(step))
-    if not 0.0 < off < _MOST_OF_A_TICK * tick or tick > usual or lost:
+    if not 0.0 < off < _MOST_OF_A_TICK * tick or not MOST_FAULTY * usual < tick <= usual or lost:
         return t, ""
     return np.concatenate(lines), f"stamps in whole ticks of {tick:.3g}: taken as even rows"
 

@@ -55,6 +55,7 @@ def test_a_monitors_time_stays_where_the_machine_has_none() -> None:
         "id,code\n" + "1,A3\n" * 50,
         "2025-07-29 11:38:05.949,6553.00,6537.00\n" * 50,
         "1.0 s;2 mm\n",
+        '12:34:56.7,"a, b: 1",2\n' * 50,
         "",
     ],
 )
