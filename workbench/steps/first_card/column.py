@@ -22,6 +22,9 @@ NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign chang
 # ways, and times all magnitudes that the bit is far above them.
 FEWEST_LEAPS, OFTEN_NEAR, BOTH_WAYS, FAR_ABOVE = 4, 0.25, 0.25, 2.0
 SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
+COUNT_PARTS = 256.0  # of a count that is halved again and again
+LONG_WAY_OF_COUNTS = 1000.0  # that such a position covers at least
+OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 
 
 class Register(NamedTuple):
@@ -74,6 +77,17 @@ def _sign_and_magnitude(x: Array) -> Register | None:
     if slow or (both and (np.mean(near) >= OFTEN_NEAR or apart)):
         return Register(read, None, bit, int(leaps[0]) + 2)
     return None
+
+
+def halved_counts(x: Array) -> bool:
+    """Whether steps are counts that a drive interpolates, in parts of a power of two."""
+    if float(np.ptp(x)) < LONG_WAY_OF_COUNTS:
+        return False
+    parts = COUNT_PARTS * np.diff(x)
+    off = np.abs(parts - np.round(parts))
+    decimal = 1000.0 * np.diff(x)  # millimetres, or degrees, to three places have such steps too
+    return bool(np.mean(off < OFF_PART) > MOSTLY and np.mean(
+        np.abs(decimal - np.round(decimal)) < OFF_PART) < MOSTLY)  # fmt: skip
 
 
 COLUMN = "column"

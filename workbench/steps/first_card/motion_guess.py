@@ -13,7 +13,7 @@ from identification.errors import BadCard
 from identification.signals.relations import of_a_weight
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion, conversion
-from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.roles import Roles
 
 USUAL: Mapping[str, Mapping[str, float]] = {  # signal: unit and how usual it is
@@ -200,7 +200,7 @@ def is_count(y: Column) -> bool:
         return unit.quantity == "count"
     if len(y.levels) <= COUNTED_LEVELS:
         return False
-    return y.whole
+    return y.whole or halved_counts(y.numbers)
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:

@@ -12,7 +12,7 @@ from identification.arrays import Array
 from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
-from workbench.steps.first_card.column import Column
+from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.pairs import Pairs, Seen
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
@@ -49,6 +49,7 @@ ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
+STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
 OF_A_COPY = -5.0  # for a reference that is filtered from a position, or filtered to one
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
@@ -129,7 +130,8 @@ def moves_like_a_body(y: Column) -> float:
     v_noise = max(y.motion.v_noise, 1e-300)
     clear = float(np.sqrt(np.mean(y.motion.v**2))) / v_noise
     few = len(y.levels) < 20
-    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
+    counted = STEPS_OF_COUNTS if not y.header.means and halved_counts(y.numbers) else 0.0
+    return counted + float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
 def among_derivatives(pairs: Pairs) -> Array:
