@@ -114,6 +114,11 @@ def as_position(head: Header) -> Header:
     return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
 
 
+def stem(head: Header) -> tuple[str, ...]:
+    """What a header says beside what its signal is for: "theta" of "target_theta"."""
+    return tuple(word for word in words_of(head.name) if not says_purpose(word))
+
+
 def normed(x: Array) -> Array:
     """Columns (n, k) without their mean, of length one."""
     a = x - x.mean(axis=0)

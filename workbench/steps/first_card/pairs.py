@@ -16,7 +16,7 @@ from identification.signals.relations import (
     force_laws,
     lead,
 )
-from workbench.steps.first_card.axes import correlation, normed
+from workbench.steps.first_card.axes import correlation, normed, stem
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
@@ -45,6 +45,7 @@ class Pairs:
         self.x = np.column_stack([one.x for one in signals])
         self.alike = correlation(self.x)
         self.rate, self.rate_but_constant = _rates(self.x)
+        self.stems = [stem(one.header) for one in signals]
         self.bodies = dict[int, Seen]()
 
     @cached_property

@@ -45,6 +45,7 @@ SAME_UNIT = 0.15  # that the slope between reference and position is off a power
 FORCE_LIKENESS = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
 SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
+SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
@@ -241,10 +242,20 @@ def ahead_of(seen: Seen, k: int) -> float:
     pair = (min(k, seen.at), max(k, seen.at))
     if k in seen.controlled or any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
-    return score
+    return score + _named_for(seen, k)
 
 
 def _alike_then(y: Array, r: Array, ahead: int) -> float:
     """Correlation of a position with what is ahead of it by so many samples."""
     late, early = (y[ahead:], r[: len(r) - ahead]) if ahead >= 0 else (y[:ahead], r[-ahead:])
     return float(np.corrcoef(late, early)[0, 1])
+
+
+def _named_for(seen: Seen, k: int) -> float:
+    """Log-odds that a reference is that of y, where its header repeats a position's name."""
+    stems = seen.pairs.stems
+    if not stems[k]:
+        return 0.0
+    if stems[k] == stems[seen.at]:
+        return SAME_STEM
+    return OTHER_STEM if stems.count(stems[k]) > 1 else 0.0
