@@ -25,11 +25,12 @@ MOST_CONSTANT = 0.3  # of a signal's spread, that a derivative is off the change
 DIFFERENCE, SAME_FACTOR = 0.9995, 0.02  # share of an error that two signals' difference explains
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
+SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
 OF_TWO, OF_ONE = 0.9, 0.5  # share of a controller's output that its error explains, and one of both
 LIKE_GAINS = 2.0  # times the one's gain in it, that the other's is at most
 ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
-MAYBE_ONE = 0.5  # correlation of a command before a limiter and behind it, at least
+MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
 class Pairs:
@@ -81,7 +82,7 @@ class Pairs:
         return out
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:
-        """Commands before a limiter, by their place: the place of what comes out of it.
+        """Commands before a limiter or a sum, by their place: the place of what comes out of it.
 
         commands: places of the columns that may be such.
         """
@@ -89,8 +90,11 @@ class Pairs:
         for i, j in permutations(commands, 2):
             if abs(self.alike[i, j]) < MAYBE_ONE or self.signals[j].flag:
                 continue
-            if _clipped(self.signals[i], self.signals[j]):
+            before, after = self.signals[i], self.signals[j]
+            if _clipped(before, after):
                 out[i] = j
+            elif i not in out and (part := _added(self.signals, i, j)) is not None:
+                out |= {i: j, part: j}
         return out
 
 
@@ -146,6 +150,22 @@ def _clipped(before: Column, behind: Column) -> bool:
         and bool(past > MOSTLY_PAST * np.sum(at))
         and float(np.ptp(a)) > PASSES * (high - low)
     )
+
+
+def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
+    """The place of the column that, added to one, makes the other; None where there is none."""
+    a, b = _both(signals[i], signals[j])
+    width = float(np.ptp(b))
+    for k, part in enumerate(signals):
+        if k in (i, j) or part.flag or len(part.values) != len(signals[i].values):
+            continue
+        c = part.values[:MOST_ROWS_READ]
+        if len(c) != len(a) or float(np.ptp(c)) > width:
+            continue
+        same = np.abs(b - a - c) < SAME_SUM * width
+        if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > SAME_SUM * width) > SELDOM:
+            return k
+    return None
 
 
 def _both(one: Column, other: Column) -> tuple[Array, Array]:

@@ -163,7 +163,7 @@ def of_a_motor(one: Column) -> float:
 
 
 def limits(pairs: Pairs) -> dict[int, int]:
-    """Commands before a limiter: what comes out of it, each by its place."""
+    """Commands before a limiter or a sum: what comes out of it, each by its place."""
     likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
