@@ -213,7 +213,7 @@ def test_a_motors_torque_alone_is_no_proof_of_a_turn(
     assert next(one.sure for one in found.rig if one.key == "motion") is sure
 
 
-@pytest.mark.parametrize(("size", "unit"), [(400.0, "mA"), (4.0, "A")])
+@pytest.mark.parametrize(("size", "unit"), [(400.0, "1"), (4.0, "A")])
 def test_a_current_of_large_whole_numbers_is_not_in_amperes(
     joint: dict[str, Array], tmp_path: Path, size: float, unit: str
 ) -> None:

@@ -289,7 +289,7 @@ def _of_command(column: Column) -> UnitGuess:
         return UnitGuess("1", None, False, "a register: its full scale is in no log")
     if column.current and column.whole and peak > MOST_AMPERES:
         why = "whole numbers too large for A: see the drive's manual for what one is"
-        return UnitGuess("mA", None, False, why, "1")
+        return UnitGuess("1", None, False, why, "mA")
     if column.current:
         return _command("A", "the header speaks of a current")
     share = any(one in text for one in SHARES)
