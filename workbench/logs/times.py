@@ -35,7 +35,7 @@ _ZONE = r" ?(?:Z|UTC|([+-])(\d\d)(?::?(\d\d))?)"
 _MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?:{_ZONE})?")
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d", "%m/%d/%Y", "%d/%m/%Y")
 _DAY = 86400.0
-_NANO, _MILLI, _FEWER = 1e-9, 1e-3, 1000  # s, and milliseconds of one
+_NANO, _MILLI, _MILLIS = 1e-9, 1e-3, 1000  # s, and milliseconds of one
 
 
 def is_time(field: str) -> bool:
@@ -106,13 +106,15 @@ def with_one_clock(table: Table, rows: Sequence[Sequence[str]]) -> Table:
 def _with_dates(table: Table, at: int, cells: Sequence[Sequence[str]]) -> Table:
     """The table with the clock of its dates, times and, where a column holds them, milliseconds."""
     beyond = cells[at + 2] if at + 2 < len(cells) else ("",)
-    parted = all(one.isdigit() and int(one) < _FEWER for one in beyond)
+    parted = all(one.isdigit() and int(one) < _MILLIS for one in beyond)
     parted &= not any("." in one or "," in one for one in cells[at + 1]) and len(set(beyond)) > 1
-    texts = zip(*(table.fetch(k) for k in (at, at + 1)), strict=True)
-    t = seconds(np.array([f"{day} {time}" for day, time in texts], dtype=object), "", 0)
-    assert t is not None
-    if not parted:
-        return _joined(table, at, 2, t, "date and time")
+    pairs = zip(*(table.fetch(k) for k in (at, at + 1)), strict=True)
+    texts = [f"{day} {time}" if day and time else None for day, time in pairs]
+    t = None
+    with suppress(BadLog):  # of a row that is no time
+        t = seconds(np.array(texts, dtype=object), "", 0)
+    if t is None or not parted:
+        return table if t is None else _joined(table, at, 2, t, "date and time")
     t = t + _MILLI * np.asarray(table.fetch(at + 2), dtype=np.float64)
     return _joined(table, at, 3, t, "date, time and milliseconds")
 
