@@ -45,7 +45,6 @@ def drift_view(found: Drifted, model_name: str) -> View:
         f"Drift test of {found.model.card}",
         drift_sentence(found),
         drift_parts(found),
-        lambda: drift_document(found, model_name),
         {"drift.json": lambda: drift_document(found, model_name)},
         lambda: _sections(found),
         lambda: drift_chart(found, (_judged(found) or found.tests)[-1]),

@@ -43,7 +43,6 @@ def traced_view(traced: Traced) -> View:
         f"Trace of {traced.model.card}",
         trace_sentence(traced),
         trace_parts(traced),
-        lambda: trace_document(traced),
         {
             "trace.json": lambda: trace_document(traced),
             "model.json": lambda: model_document(traced.model),

@@ -58,7 +58,6 @@ def validation_view(
         f"Validation for {found.card}",
         validation_sentence(found),
         validation_parts(found, rotary),
-        lambda: validation_document(found),
         {"validation.json": lambda: validation_document(found)},
         sections,
         lambda: _step_chart(found, traces, "model", rotary),

@@ -119,8 +119,7 @@ def velocity_view(
                 sentence = f"Passed: the loop meets every limit on {many} plants."
             files = {"validation.json": partial(velocity_validation_document, found)}
             parts, sections = [loops], [Section("The loop", loops)]
-    content = next(iter(files.values()))
-    return View(f"{what} {model.card}", sentence, parts, content, files, lambda: sections)
+    return View(f"{what} {model.card}", sentence, parts, files, lambda: sections)
 
 
 def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
@@ -188,9 +187,9 @@ def velocity_prediction_view(
         "Prediction",
         f"position by the command alone{anew}: within {off} rms, {worst} at most",
         [],
-        lambda: summary,
         {"prediction.csv": lambda: velocity_csv(runs)},
         has_page=False,
+        content=lambda: summary,
     )
 
 

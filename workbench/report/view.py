@@ -103,8 +103,9 @@ class View:
     """A result: what was found in a sentence, what is advised next, and what stands below.
 
     parts: tables, lines and notes in their order. sections, chart: of the page, and the main
-    picture, drawn when they are asked for. content: the document by which other programs read it;
-    files: what the command writes, by name, a text or a document, and the page where it has_page.
+    picture, drawn when they are asked for. files: what the command writes, by name, a text or a
+    document, and the page where it has_page. content: the document by which other programs read it,
+    where it is not the first of the files.
     step: what to type next, which its command says with the names of the files at hand.
     lead: of the page, where that is another sentence.
     """
@@ -112,19 +113,20 @@ class View:
     title: str
     sentence: str
     parts: Sequence[Part | str]
-    content: Callable[[], Mapping[str, Any]]
-    files: Mapping[str, Callable[[], object]]
+    files: Mapping[str, Callable[[], Any]]
     sections: Callable[[], Sequence[Section]] = tuple
     chart: Callable[[], Chart] | None = None
     then: Sequence[str] = ()
     step: Step | None = None
     has_page: bool = True
     lead: str = ""
+    content: Callable[[], Mapping[str, Any]] | None = None
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
         """The result as plain values."""
-        return self.content()
+        made: Mapping[str, Any] = (self.content or next(iter(self.files.values())))()
+        return made
 
     @property
     def names(self) -> tuple[str, ...]:
