@@ -84,12 +84,12 @@ class Asked:
 
     def drop_of(self, upload: str) -> Drop:
         """The files of an upload."""
-        return Drop(self.server.settings.root, upload)
+        return Drop(self.root, upload)
 
     @property
     def root(self) -> Path:
         """The folder of machines."""
-        return self.server.settings.root
+        return self.server.settings.machines
 
     def __getitem__(self, name: str) -> Any:
         """A part of the address."""
