@@ -42,10 +42,8 @@ def command(
         options.refuse_for_velocity("force", "card", "effects")
         return _velocity((model_file, design_file, plant_file), limits, seed, out)
     model = with_card(load_model(model_file, effects), card)
-    design, plant = (
-        read_design(design_file),
-        load_model(plant_file, effects) if plant_file else None,
-    )
+    design = read_design(design_file)
+    plant = load_model(plant_file, effects) if plant_file else None
     with results("validate", out) as folder:
         found = validate(model, design, plant=plant, limits=limits, seed=seed)
         found.view.write(folder)

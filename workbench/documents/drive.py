@@ -151,12 +151,6 @@ class FiltersFile:
     h: Annotated[float, InUnit("s", above_0=True)]
 
 
-def filters_file(filters: CompensatorFilters, h: float) -> FiltersFile:
-    """The compensator's filters as a result writes them; h [s]."""
-    slope = slope_filter(h, filters.N_d).b
-    return FiltersFile(filters.velocity, filters.error, filters.force, slope, h)
-
-
 def filters_of(written: FiltersFile) -> CompensatorFilters:
     """The compensator's filters of a file; raises BadModel where they are none."""
     found = CompensatorFilters(written.A, written.B, written.C, len(written.slope))

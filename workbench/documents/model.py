@@ -161,14 +161,6 @@ class Identifiable:
     only_if: str = ""
 
 
-def _nine(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
-    return in_units(found, info.context.units.friction)
-
-
-def _actuator(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
-    return in_units(found, info.context.actuator)
-
-
 def _effects(found: Mapping[str, Mapping[str, Estimate]], info: Any) -> Any:
     """Effects in SI; raises BadModel where one is not in the library, or a unit of another kind."""
     around = info.context
@@ -210,7 +202,11 @@ def _library(found: Any, info: Any) -> Any:
 
 
 Parameters = Mapping[str, Parameter]
-Nine = Annotated[Mapping[str, Estimate], Through(Parameters, _nine)]
+Nine = Annotated[
+    Mapping[str, Estimate],
+    Through(Parameters, lambda found, info: in_units(found, info.context.units.friction)),
+]
+OF_ACTUATOR = Through(Parameters, lambda found, info: in_units(found, info.context.actuator))
 
 
 @dataclass(frozen=True)
@@ -233,7 +229,7 @@ class Model:
     card: str
     rig: Rig
     friction: Nine
-    actuator: Annotated[Mapping[str, Estimate] | None, Through(Parameters, _actuator)]
+    actuator: Annotated[Mapping[str, Estimate] | None, OF_ACTUATOR]
     plant: ArxPlant | None
     plant_reason: str | None
     fit: FitSummary

@@ -71,12 +71,6 @@ def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
     )
 
 
-def refuse_name(folder: MachineFolder) -> None:
-    """Raises BadName where the folder's name is not UTF-8."""
-    if folder.card.parent.name != folder.name:
-        raise BadName("the folder's name is not UTF-8; rename the folder")
-
-
 def scan(
     folder: MachineFolder,
     known: Known,

@@ -14,7 +14,7 @@ from workbench.page.dropped import Drop
 from workbench.page.helpers import Helpers
 from workbench.page.pages import environment
 from workbench.page.settings import PageSettings
-from workbench.registry.access import audit
+from workbench.registry.access import note
 from workbench.registry.bench import Bench
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
@@ -133,7 +133,8 @@ class Asked:
 
     def audit(self, kind: str, subject: str, detail: str) -> None:
         """Write what the visitor has changed into the audit."""
-        audit(self.database, kind, subject, detail, by=self.visitor.name, now=clock())
+        with self.database.writing() as session:
+            note(session, kind, subject, detail, by=self.visitor.name, now=clock())
 
 
 def download(content: str | bytes, name: str, media_type: str) -> Response:

@@ -76,8 +76,10 @@ def _summary(model: VelocityModel) -> str:
 
 def _valve(model: VelocityModel) -> Part:
     """The numbers: value, unit, 95 % interval (or why there is none), at length what each is."""
-    every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
-    rows = [(key, *estimate_cells(one), VALVE_MEANING.get(key, "")) for key, one in every.items()]
+    rows = [
+        (key, *estimate_cells(one), VALVE_MEANING.get(key, ""))
+        for key, one in model.numbers.items()
+    ]
     short = tabled(MODEL_HEAD, [row[:4] for row in rows], whole=rows)
     return replace(short, whole_head=(*MODEL_HEAD, "meaning"))
 
