@@ -10,7 +10,7 @@ from workbench.cards.readable import as_shown, in_digits, number, shown_unit
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import not_identified
-from workbench.report.trace_tables import errors_table, logs_of_trace
+from workbench.report.trace import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation import (
     error_cells,

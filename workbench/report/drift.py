@@ -190,17 +190,14 @@ def _all_that_moved(test: DriftTest) -> str:
     if not test.found_by:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = [_from_to(one) for one in _as_in_table(test)]
+    moved = []
+    for one in _as_in_table(test):
+        unit, factor = shown_unit(one.unit)
+        before, after = (number(factor * value, 4) for value in (one.before, one.after))
+        moved.append(f"{one.name} {before} -> {after} {unit}")
     if test.unsure:
         moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
-
-
-def _from_to(shift: Shift) -> str:
-    """A parameter before and after, in the unit in which tables show it."""
-    unit, factor = shown_unit(shift.unit)
-    before, after = (number(factor * value, 4) for value in (shift.before, shift.after))
-    return f"{shift.name} {before} -> {after} {unit}"
 
 
 def _percent(value: float) -> str:

@@ -26,7 +26,6 @@ from workbench.report.design_tables import (
     drive_lines,
     drive_table,
     margins_table,
-    polynomial_lines,
 )
 from workbench.report.fit import fit_chart, residual
 from workbench.report.friction import friction_curve
@@ -132,9 +131,14 @@ def controllers(found: Design, rotary: bool = False) -> Section:
 
 
 def program_sections(found: Design) -> tuple[Section, Section]:
-    """The polynomials, for whoever programs the controller, and the same as difference equations,
-    in the unit that the drive takes."""
-    text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
+    """The polynomials in ascending powers of z^-1, for whoever programs the controller, and the
+    same as difference equations, in the unit that the drive takes."""
+    polynomials = [
+        f"{name.upper()} {letter}: [{', '.join(f'{v:.7g}' for v in getattr(one, letter))}]"
+        for name, one in found.controllers.items()
+        for letter in "RST"
+    ]
+    text = [*polynomials, "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
     return Section("Coefficients", text), Section("As the drive runs it", drive_lines(found))
 
 

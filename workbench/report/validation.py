@@ -48,8 +48,11 @@ def validation_view(
     """Whether the design holds in simulation, and what the loop does."""
 
     def sections() -> Sequence[Section]:
-        places = dict.fromkeys(place for _, place in traces)
-        drawn = [one for place in places for one in _loop(found, traces, place, rotary)]
+        drawn = list[Section]()
+        for place in dict.fromkeys(place for _, place in traces):
+            on = "the identified plant" if place == "model" else "the other plant"
+            steps = Section(f"Steps on {on}", _step_chart(found, traces, place, rotary))
+            drawn += [steps, Section(f"Error on {on}", _error_chart(found, traces, place, rotary))]
         lines = validation_lines(found, rotary)
         verdict = Section("Verdict", validation_table(found, rotary), lines)
         return (*drawn[:1], verdict, *drawn[1:])
@@ -183,17 +186,6 @@ def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str
         *(more(listed(_missed(found, name))) for name in found.figures),
         columns_line(found, rotary),
         notes(found.remarks),
-    ]
-
-
-def _loop(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
-) -> list[Section]:
-    """The loop on one plant, all controllers over each other: after steps, then where they rest."""
-    on = "the identified plant" if place == "model" else "the other plant"
-    return [
-        Section(f"Steps on {on}", _step_chart(found, traces, place, rotary)),
-        Section(f"Error on {on}", _error_chart(found, traces, place, rotary)),
     ]
 
 

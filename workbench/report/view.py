@@ -15,7 +15,7 @@ from workbench.output import OutputFolder, dumps, emit, next_step, written
 from workbench.remarks import Merged, merged, printed_once
 from workbench.report.chart import Chart, chart_assets, chart_html
 from workbench.report.templating import render, safe, used_symbols
-from workbench.screen import Part, Screen, instead, listed, screen
+from workbench.screen import Part, Screen, instead, screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,12 +67,6 @@ def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str]
         "page", title=title, lead=lead, then=then, sections=sections, styles=styles,
         scripts=scripts, symbols=used_symbols(lead + body + "".join(then)),
     )  # fmt: skip
-
-
-def texts_of(parts: Iterable[Part | str]) -> list[str]:
-    """All lines of the parts, as --verbose prints them, tables left out."""
-    every = [one if isinstance(one, Part) else listed([one]) for one in parts]
-    return [str(line) for one in every if not one.full_head for line in one.whole]
 
 
 MOST_NOTES = 6
