@@ -35,7 +35,6 @@ def command(
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate, as_code
-    from workbench.report.view import show
     from workbench.steps.present import with_card
 
     if is_velocity_model(model_file):
@@ -48,7 +47,7 @@ def command(
         found = validate(model, design, plant=plant, limits=limits, seed=seed)
         found.view.write(folder)
     then = after_validate(found.found, design, model, model_file, plant_file, card)
-    show(found.view, folder.final, then or as_code(design_file))
+    found.view.show(folder.final, then or as_code(design_file))
     return 0 if found.passed else 1
 
 
@@ -61,7 +60,6 @@ def _velocity(
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
     from workbench.report.velocity import after_velocity_validation, velocity_view
-    from workbench.report.view import show
     from workbench.steps.velocity_loop import validate_velocity
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
@@ -72,5 +70,5 @@ def _velocity(
             found = validate_velocity(model, design, rng, limits, plant)
         view = velocity_view(found)
         view.write(folder)
-    show(view, folder.final, after_velocity_validation(found, files[0]))
+    view.show(folder.final, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

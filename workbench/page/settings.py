@@ -1,6 +1,7 @@
 """How the page is served, as the command line says it and every process of it reads it."""
 
 import os
+import re
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,12 +21,7 @@ MEGA = 1e6
 
 def _prefix(ctx: click.Context, param: click.Parameter, value: str) -> str:
     text = value.rstrip("/")
-    if text and (
-        not text.startswith("/")
-        or "//" in text
-        or not text.isascii()
-        or any(c in text for c in " ?#%\\\"'<>")
-    ):
+    if not (text.isascii() and re.fullmatch(r"(/[^/ ?#%\\\"'<>]+)*", text)):
         raise click.UsageError(f"--prefix {value!r}: a path needed, as /servo.", ctx)
     return text
 

@@ -254,8 +254,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = [_shift_row(shift) for shift in one.test.shifts.values()]
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
-    once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
-    return tabled(head, once, right=(1, 2), whole=rows)
+    return tabled(head, reasons_once(rows, logs, (4, 3, 5)), right=(1, 2), whole=rows)
 
 
 def _shift_row(shift: Shift) -> Row:
@@ -328,9 +327,3 @@ def drift_parts(found: Drifted) -> list[Part | str]:
         instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True),
         notes(found.remarks, logs),
     ]
-
-
-def _swapped(row: Row) -> Row:
-    """A row of `shift_table` with the unit after the change, as `reasons_once` has it; or back."""
-    first, second = row[3:5]
-    return (*row[:3], second, first, *row[5:])

@@ -21,8 +21,7 @@ from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel,
 from workbench.report.chart_figure import SHOWN_SHARE
 from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
-from workbench.steps.predict import FORCE_WINDOW, in_windows
-from workbench.steps.predicted_force import force_by_model
+from workbench.steps.predict import FORCE_WINDOW, force_by_model, in_windows
 
 NOISE_BAND = "±2σ of the sensor's noise"
 Which = Literal["training", "test"]

@@ -45,8 +45,7 @@ from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
-from workbench.steps.predict import fitted_run
-from workbench.steps.predicted_force import missing_force
+from workbench.steps.predict import fitted_run, missing_force
 
 
 def identified_view(found: Identified) -> View:

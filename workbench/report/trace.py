@@ -149,7 +149,7 @@ def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
         else:
             (said,) = in_digits((was.value,), was.value, was.sd)
             out.append((name, said, value, unit, interval, percent(was.value, now)))
-    shortened = reasons_once(out, logs, 2 if found.effects else 1)
+    shortened = reasons_once(out, logs, (2, 3, 4) if found.effects else (1, 2, 3))
     return tabled(CHANGE_HEAD if found.effects else SAME_HEAD, shortened, whole=out)
 
 

@@ -72,21 +72,16 @@ def validation_view(
 
 def validation_table(found: Validation, rotary: bool = False) -> Part:
     """A row a controller and plant."""
-    alone = len(found.figures[found.judged]) == 1
+    alone, units, one = len(found.figures[found.judged]) == 1, shown(rotary), _any(found)
+    command = () if one.command_peak is None else (f"command {one.command_unit}",)
+    figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
+    head = ("loop", *(() if alone else ("on",)), *figures, f"force {units.force}", *command)
     rows = [
-        (loop_name(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        (loop_name(name), *(() if alone else (place,)), *_row(one, units))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
-    return tabled(_head(found, rotary), rows, right=())
-
-
-def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
-    units, one = shown(rotary), _any(found)
-    where = ("on",) if len(found.figures[found.judged]) > 1 else ()
-    command = () if one.command_peak is None else (f"command {one.command_unit}",)
-    figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
-    return ("loop", *where, *figures, f"force {units.force}", *command, "limit cycle")
+    return tabled((*head, "limit cycle"), rows, right=())
 
 
 def _any(found: Validation) -> LoopFigures:

@@ -170,14 +170,13 @@ class View:
         if self.has_page:
             folder.write_text(page_name, self.page())
 
+    def show(self, folder: Path, then: Step | None = None, **more: object) -> None:
+        """Print the result that lies in the folder: as JSON, with `more` in it, or on one screen.
+
+        then: the command to type next.
+        """
+        emit({**self.document, **more, "out": folder}, lambda: self.screen(folder), then)
+
     @property
     def _then(self) -> list[str]:
         return [*self.then, *([f"`{self.step.command}` ({self.step.why})"] if self.step else ())]
-
-
-def show(view: View, folder: Path, then: Step | None = None, **more: object) -> None:
-    """Print a result that lies in the folder: as JSON, with `more` in it, or on one screen.
-
-    then: the command to type next.
-    """
-    emit({**view.document, **more, "out": folder}, lambda: view.screen(folder), then)
