@@ -58,7 +58,6 @@ class Around(NamedTuple):
 
     @property
     def limit(self) -> float | None:
-        """The limit of the command."""
         return self.command.limit if self.command else None
 
 

@@ -64,7 +64,6 @@ class LawFile:
 
 
 def law_file(law: DriveLaw, around: Around) -> LawFile:
-    """The law as a result writes it."""
     units, output = around.units, around.output
     limit = around.limit if output == "command" else None
     lines = equation_lines(law, output, around.limit, units)

@@ -67,7 +67,6 @@ class Declared:
 
     @property
     def line(self) -> str:
-        """The declaration."""
         kind = f"ARRAY[0..{self.size - 1}] OF {self.type}" if self.size else self.type
         start = ""
         if self.values:

@@ -52,7 +52,6 @@ class InRegistry:
 
     @property
     def queue(self) -> Queue:
-        """The logs that wait for a result."""
         return Queue(self.registry.database)
 
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:

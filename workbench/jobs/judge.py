@@ -21,8 +21,8 @@ from workbench.logs.sources import Source, Sources, read_sources
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
+from workbench.steps.drift import moved_between, no_wear
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.moved_scale import moved_between, no_wear
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate, validation_document
 

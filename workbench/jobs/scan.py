@@ -26,11 +26,7 @@ Known = Mapping[tuple[str, int, int], str]
 
 
 class BadRoot(UserError):
-    """A folder of machines that is none."""
-
-
-class BadName(UserError):
-    """A machine whose folder has a name that no registry can hold."""
+    """A folder of machines that is none, or of a machine whose name no registry can hold."""
 
 
 @dataclass(frozen=True)

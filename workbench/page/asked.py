@@ -64,12 +64,10 @@ class Asked:
 
     @property
     def registry(self) -> Registry:
-        """The registry that the page is of."""
         return self.server.registry
 
     @property
     def database(self) -> Database:
-        """The registry's database."""
         return self.server.registry.database
 
     @property
@@ -83,7 +81,6 @@ class Asked:
         return self.drop_of(self["upload"])
 
     def drop_of(self, upload: str) -> Drop:
-        """The files of an upload."""
         return Drop(self.root, upload)
 
     @property

@@ -166,7 +166,6 @@ def numbered(session: Session, machine: str, number: int) -> VersionRow:
 
 
 def active_version(session: Session, machine: str) -> VersionRow | None:
-    """The row of the active version."""
     pointer = session.get(ActiveVersionRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
 
@@ -233,7 +232,6 @@ def versions(session: Session, *where: ColumnElement[bool]) -> Sequence[Version]
 
 
 def version_value(session: Session, row: VersionRow) -> Version:
-    """The version as a value."""
     return versions(session, VersionRow.id == row.id)[0]
 
 

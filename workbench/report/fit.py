@@ -49,7 +49,6 @@ class InARow:
 
     @property
     def label(self) -> str:
-        """Name of the axis."""
         return "time [s]" if len(self.parts) == 1 else "time, logs in a row [s]"
 
 

@@ -163,7 +163,6 @@ class View:
         return chart_figure(self.chart())
 
     def write(self, folder: OutputFolder, page_name: str = REPORT_FILE) -> None:
-        """Write the files of the result."""
         for name, content in self.files.items():
             made = content()
             folder.write_text(name, made if isinstance(made, str) else dumps(made) + "\n")
