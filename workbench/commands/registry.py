@@ -26,7 +26,7 @@ def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
 
 
 MACHINE_ARGUMENT = argument()
-YOU: dict[str, Any] = {"metavar": "NAME", "default": getpass.getuser, "show_default": False}
+YOU: dict[str, Any] = {"metavar": "NAME", "callback": lambda _c, _p, by: by or getpass.getuser()}
 BY_OPTION = option("Who decides.  [default: you]", **YOU)
 REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 

@@ -206,12 +206,7 @@ def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
             LogRow.machine == machine, or_(LogRow.id.in_(promoted), LogRow.sha256.in_(fitted))
         )
     )
-    return tuple(seen(row) for row in rows)
-
-
-def seen(row: LogRow) -> SeenLog:
-    """The log file as it was found."""
-    return of_row(SeenLog, row)
+    return tuple(of_row(SeenLog, row) for row in rows)
 
 
 def versions(session: Session, *where: ColumnElement[bool]) -> Sequence[Version]:

@@ -114,8 +114,8 @@ def _effects(found: Demonstration) -> list[Row]:
 def _beside(e: Estimate, true: str) -> Row:
     """Value, unit and interval of an estimate, and the truth."""
     value, unit, interval = estimate_cells(e, "")
-    if e.value is None:
-        interval = not_identified(interval.partition(";")[0].partition(":")[0])
+    if None in (e.value, e.low, e.high):
+        value, interval = "-", not_identified(interval.partition(";")[0].partition(":")[0])
     return (value, "" if unit == "1" else unit, interval, true)
 
 
