@@ -24,7 +24,7 @@ from design.servo import Compensation
 from identification.model.karnopp import NAMES
 from identification.signals.filters import slope_filter
 from workbench.export.exported import Exported
-from workbench.export.filled import heading_of, title_of
+from workbench.export.filled import lead_of, title_of
 from workbench.output import dumps
 
 PROGRAM_SCHEMA = "program/1"
@@ -35,8 +35,11 @@ def json_file(what: Exported) -> dict[str, str]:
     program = what.program
     document = {
         "schema": PROGRAM_SCHEMA,
-        **heading_of(what),
+        "title": title_of(what),
+        "lead": lead_of(what),
+        "name": program.name,
         "controller": what.controller,
+        "h": program.h,
         "ratio": program.ratio,
         "inputs": program.inputs,
         "output": program.output,
