@@ -22,8 +22,7 @@ from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
 from identification.simulation.inverse_dynamics import of_body
 from workbench.documents.model import Model, used
-from workbench.steps.predict import predict
-from workbench.steps.predicted_force import force_by_model, refuse_missing
+from workbench.steps.predict import force_by_model, predict, refuse_missing
 
 ROUNDS = 8  # of friction by load, each with the force of the last
 MOST = 1e6  # times the signal, beyond which a prediction runs away

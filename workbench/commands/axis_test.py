@@ -40,14 +40,13 @@ def command(
     """
     from workbench.interface.logs import axis_test
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.view import show
 
     if where is None and machine is not None:
         raise click.UsageError("--machine is a name in a registry; give --registry too.")
     with results("axis-test", out, check_of_refused([log], card)) as folder:
         found = axis_test(log, card, registry=where, machine=machine, seed=seed)
         found.view.write(folder)
-    show(found.view, folder.final, after_axis_test(found.found, log, card, where))
+    found.view.show(folder.final, after_axis_test(found.found, log, card, where))
     return 0 if found.light == "green" else 1
 
 

@@ -106,7 +106,6 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
     from design.tune import Asked, Goals
     from workbench.interface.loops import design
     from workbench.report.next_steps import after_design, without_design
-    from workbench.report.view import show
     from workbench.steps.design import effort_limit
     from workbench.steps.elastic import beyond_response
 
@@ -122,7 +121,7 @@ def _nominal(given: DesignOptions, model: "Model") -> int:
     options_kept = _repeated_options(given)
     asked_poles, out = given.poles is not None, folder.final
     then = after_design(found.design, given.model_file, asked_poles, options_kept, out)
-    show(found.view, out, then)
+    found.view.show(out, then)
     return 1 if found.recommended == "none" else 0
 
 
@@ -142,7 +141,6 @@ def _velocity(given: DesignOptions) -> int:
     from workbench.documents.velocity import read_velocity_model
     from workbench.report.next_steps import in_simulation, without_design
     from workbench.report.velocity import velocity_view
-    from workbench.report.view import show
     from workbench.steps.velocity_loop import design_velocity
 
     model = read_velocity_model(given.model_file)
@@ -152,7 +150,7 @@ def _velocity(given: DesignOptions) -> int:
         )
         view = velocity_view(found)
         view.write(folder)
-    show(view, folder.final, in_simulation(given.model_file, folder.final))
+    view.show(folder.final, in_simulation(given.model_file, folder.final))
     return 0
 
 
@@ -172,7 +170,6 @@ def _robust(given: DesignOptions, model: "Model") -> int:
     from workbench.documents.design_file import design_document
     from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
-    from workbench.report.view import show
 
     drift = _drift(given.where, given.machine) if given.machine else None
     wanted = replace(given.wanted, drift=drift)
@@ -180,7 +177,7 @@ def _robust(given: DesignOptions, model: "Model") -> int:
         found = robust_design(model, wanted, **_asked(given))
         found.view.write(folder)
     then = after_robust(found.found, given.model_file, folder.final)
-    show(found.view, folder.final, then, design=design_document(found.found.design))
+    found.view.show(folder.final, then, design=design_document(found.found.design))
     return 0 if found.passed else 1
 
 

@@ -49,7 +49,6 @@ def command(
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_view
     from workbench.report.next_steps import after_drift, check_of_refused
-    from workbench.report.view import show
     from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
@@ -67,5 +66,5 @@ def command(
     if state_file:
         write_stream(state_file, found.stream)
     then = after_drift(found, logs, card)
-    show(view, folder.final, then)
+    view.show(folder.final, then)
     return 0 if then is None else 1

@@ -43,7 +43,6 @@ def command(
     """
     from workbench.interface.loops import experiment
     from workbench.interface.models import load_model
-    from workbench.report.view import show
     from workbench.steps.present import with_card
 
     model = with_card(load_model(model_file, effects), card)
@@ -52,4 +51,4 @@ def command(
             model, design=design_file, wanted=wanted, rivals=trace_file, budget=budget
         )
         found.view.write(folder)
-    show(found.view, folder.final)
+    found.view.show(folder.final)

@@ -165,7 +165,6 @@ def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
 
 
 def _tables(given: ExportOptions) -> int:
-    """The tables of a model."""
     from workbench.documents.model_file import read_model
     from workbench.export.compensation import Compensation
     from workbench.export.table_targets import tables, tables_asked, tables_document, tables_view

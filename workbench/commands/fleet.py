@@ -70,7 +70,7 @@ def command(given: FleetOptions) -> int:
     """
     from workbench.cards.card import load_card
     from workbench.fleet.finding import find_logs
-    from workbench.fleet.run import FleetRun, FleetSettings
+    from workbench.fleet.run import FleetRun
     from workbench.fleet.store import ResultStore
     from workbench.logs.sources import card_path
 
@@ -90,8 +90,8 @@ def command(given: FleetOptions) -> int:
         recorder = stack.enter_context(_recorder(where))
         cluster = stack.enter_context(_cluster(given))
         advance = stack.enter_context(progress("fleet", float(len(found))))
-        settings = FleetSettings(logs, text, given.seed)
-        done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
+        run = FleetRun(cluster, store, recorder, logs, clock, text, given.seed, advance)
+        done = run(found)
     bad = [
         {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
          "reason": one.reason}

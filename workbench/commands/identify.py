@@ -33,7 +33,6 @@ def command(
     from workbench.interface.models import identify
     from workbench.logs.sources import card_of_velocity
     from workbench.report.next_steps import after_identify, check_of_refused
-    from workbench.report.view import show
 
     if card_of_velocity(card):
         options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
@@ -45,7 +44,7 @@ def command(
         found = identify(logs, card, options=wanted, posterior=posterior, budget=budget, seed=seed)
         found.view.write(folder)
     then = after_identify(found.model, logs, card, folder.final)
-    show(found.view, folder.final, then, remarks=found.found.remarks)
+    found.view.show(folder.final, then, remarks=found.found.remarks)
 
 
 def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None) -> None:
@@ -53,7 +52,6 @@ def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None)
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
     from workbench.report.velocity import after_velocity, velocity_view
-    from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
     with results("identify", out, check_of_refused(logs, card)) as folder:
@@ -62,7 +60,7 @@ def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None)
             valve = identify_velocity(sources, keep_going=course.keep_going)
         view = velocity_view(valve)
         view.write(folder)
-    show(view, folder.final, after_velocity(valve, logs, card, folder.final))
+    view.show(folder.final, after_velocity(valve, logs, card, folder.final))
 
 
 def _refuse_force_of_motor(card: str) -> None:

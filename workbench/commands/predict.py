@@ -39,7 +39,6 @@ def command(
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_predict
     from workbench.report.prediction import prediction_view
-    from workbench.report.view import show
 
     with results("predict", out) as folder:
         if is_velocity_model(model_file):
@@ -50,7 +49,7 @@ def command(
             found = predict(model, log, card, drive=drive, window=window)
             view = prediction_view(found.found, found.rotary, log)
         view.write(folder)
-    show(view, folder.final, after_predict(log, card))
+    view.show(folder.final, after_predict(log, card))
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":

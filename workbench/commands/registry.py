@@ -3,14 +3,14 @@
 import getpass
 import json
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from workbench import options
 from workbench.ending import StatusGroup
+from workbench.jobs.options import clock
 from workbench.output import emit, results
 from workbench.signature import argument, option
 
@@ -26,7 +26,8 @@ def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
 
 
 MACHINE_ARGUMENT = argument()
-BY_OPTION = option("Who decides.  [default: you]", metavar="NAME")
+YOU: dict[str, Any] = {"metavar": "NAME", "callback": lambda _c, _p, by: by or getpass.getuser()}
+BY_OPTION = option("Who decides.  [default: you]", **YOU)
 REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 
 
@@ -71,7 +72,10 @@ def show(
             version = _version(found, machine, number)
             decisions = tuple(d for d in decisions if number is None or d.number == number)
             if out is not None:
-                _write(found, version, out)
+                with results("registry", out) as folder:
+                    for kind, document in found.documents(version).items():
+                        if document is not None:
+                            folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
     number_accepted = None if accepted is None else accepted.number
     shown = {"machine": state, "decisions": decisions, "logs": outcomes,
              "accepted": number_accepted}  # fmt: skip
@@ -119,7 +123,7 @@ def add(
     promote: bool = option("Make it the active version as well."),
     effects: tuple[Path, ...] = options.EFFECTS_OPTION,
     reason: str = REASON_OPTION,
-    by: str | None = BY_OPTION,
+    by: str = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
@@ -141,12 +145,12 @@ def add(
         None if design_file is None else read_document(design_file),
         None if validation is None else read_raw(validation, "validation/1"),
     )
-    who, now = by or getpass.getuser(), datetime.now(UTC)
+    now = clock()
     with opened(where, create=True) as found:
-        version = found.add(machine, candidate, reason=reason, by=who, now=now)
+        version = found.add(machine, candidate, reason=reason, by=by, now=now)
         current = found.active_version(machine)
         if promote and (current is None or current.number != version.number):
-            found.promote(machine, version.number, reason=reason, by=who, now=now)
+            found.promote(machine, version.number, reason=reason, by=by, now=now)
     state = "active" if promote else "not active yet: 'workbench registry promote'"
     said = [f"{machine}: version {version.number}, {state}", *(f"note: {r}" for r in remarks)]
     emit({**asdict(version), "remarks": remarks}, lambda: "\n".join(said))
@@ -159,16 +163,15 @@ def promote(
     machine: str = MACHINE_ARGUMENT,
     number: int = argument(type=click.IntRange(min=1)),
     reason: str = REASON_OPTION,
-    by: str | None = BY_OPTION,
+    by: str = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Activate a version of a machine, or accept the one that a worker has activated.
 
     The limits of `axis-test` by the machine's own logs begin anew with its model.
     """
-    who, now = by or getpass.getuser(), datetime.now(UTC)
     with opened(where) as found:
-        decision = found.promote(machine, number, reason=reason, by=who, now=now)
+        decision = found.promote(machine, number, reason=reason, by=by, now=clock())
     emit(decision, lambda: _said(decision))
 
 
@@ -176,13 +179,12 @@ def promote(
 def rollback(
     machine: str = MACHINE_ARGUMENT,
     reason: str = REASON_OPTION,
-    by: str | None = BY_OPTION,
+    by: str = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Activate the version before the present one; again goes one further back."""
-    who, now = by or getpass.getuser(), datetime.now(UTC)
     with opened(where) as found:
-        decision = found.rollback(machine, reason=reason, by=who, now=now)
+        decision = found.rollback(machine, reason=reason, by=by, now=clock())
     emit(decision, lambda: _said(decision))
 
 
@@ -193,7 +195,7 @@ def retry(
     machine: str = MACHINE_ARGUMENT,
     logs: tuple[str, ...] = argument("[LOG...]"),
     reason: str = REASON_OPTION,
-    by: str | None = BY_OPTION,
+    by: str = BY_OPTION,
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Have logs tested again by the next pass; their earlier results stay on record.
@@ -202,9 +204,8 @@ def retry(
     """  # fmt: skip
     from workbench.registry.queue import Queue
 
-    who, now = by or getpass.getuser(), datetime.now(UTC)
     with opened(where) as found:
-        files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
+        files = Queue(found.database).reopen(machine, logs, reason=reason, by=by, now=clock())
     said = f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none excluded"
     emit({"machine": machine, "logs": files}, lambda: said)
 
@@ -226,13 +227,6 @@ def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     if version is None:
         raise BadRegistry(f"{machine}: no active version; name a version's number")
     return version
-
-
-def _write(found: "Registry", version: "Version", out: Path) -> None:
-    with results("registry", out) as folder:
-        for kind, document in found.documents(version).items():
-            if document is not None:
-                folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
 
 
 def _said(decision: "Decision") -> str:

@@ -39,11 +39,10 @@ def command(
     from workbench.interface.models import load_model
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.view import show
 
     known = None if model_file is None else load_model(model_file, effects)
     left_in = "asked for" if friction_left_in else None
     with results("response", out, check_of_refused(logs, card)) as folder:
         found = responded(read_sources(logs, card), known, left_in, lowest, seed, budget)
         found.view.write(folder)
-    show(found.view, folder.final)
+    found.view.show(folder.final)

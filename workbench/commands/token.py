@@ -1,14 +1,13 @@
 """`workbench token`: who may read and change through the page."""
 
-import getpass
-from datetime import UTC, datetime
 from typing import Literal
 
 import click
 
 from workbench import options
-from workbench.commands.registry import opened
+from workbench.commands.registry import YOU, opened
 from workbench.ending import StatusGroup
+from workbench.jobs.options import clock
 from workbench.output import emit
 from workbench.signature import argument, option
 
@@ -26,16 +25,14 @@ def command() -> None:
 def add_token(
     name: str = argument(),
     role: Literal["read", "change"] = option("", default="read"),
-    by: str | None = option("Who makes it.  [default: you]", metavar="NAME"),
+    by: str = option("Who makes it.  [default: you]", **YOU),
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Make a token and show it, this once."""
     from workbench.registry.access import Access
 
     with opened(where, create=True) as found:
-        secret = Access(found.database).add(
-            name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
-        )
+        secret = Access(found.database).add(name, role, by=by, now=clock())
     shown = f"{secret}\nThe token of {name} ({role}); it is shown only now and stored nowhere."
     emit({"name": name, "role": role, "token": secret}, lambda: shown)
 
@@ -62,12 +59,12 @@ def list_tokens(where: str | None = options.REGISTRY_OPTION) -> None:
 @options.command(command, "revoke", epilog="Example: workbench token revoke anna")
 def revoke_token(
     name: str = argument(),
-    by: str | None = option("Who revokes it.  [default: you]", metavar="NAME"),
+    by: str = option("Who revokes it.  [default: you]", **YOU),
     where: str | None = options.REGISTRY_OPTION,
 ) -> None:
     """Take a token no more; its name stays taken."""
     from workbench.registry.access import Access
 
     with opened(where, create=True) as found:
-        Access(found.database).revoke(name, by=by or getpass.getuser(), now=datetime.now(UTC))
+        Access(found.database).revoke(name, by=by, now=clock())
     emit({"name": name, "revoked": True}, lambda: f"{name}: revoked")

@@ -40,7 +40,6 @@ def command(
     from workbench.interface.models import trace
     from workbench.logs.sources import card_of_velocity
     from workbench.report.next_steps import after_trace, check_of_refused
-    from workbench.report.view import show
     from workbench.steps.trace import named_logs
 
     with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
@@ -53,7 +52,7 @@ def command(
             view, verdict, named = found.view, found.verdict, found.effects
         view.write(folder)
     newer = held_out or names
-    show(view, folder.final, after_trace(verdict, named, newer, card, folder.final))
+    view.show(folder.final, after_trace(verdict, named, newer, card, folder.final))
 
 
 def _of_velocity(

@@ -35,22 +35,19 @@ def command(
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate, as_code
-    from workbench.report.view import show
     from workbench.steps.present import with_card
 
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")
         return _velocity((model_file, design_file, plant_file), limits, seed, out)
     model = with_card(load_model(model_file, effects), card)
-    design, plant = (
-        read_design(design_file),
-        load_model(plant_file, effects) if plant_file else None,
-    )
+    design = read_design(design_file)
+    plant = load_model(plant_file, effects) if plant_file else None
     with results("validate", out) as folder:
         found = validate(model, design, plant=plant, limits=limits, seed=seed)
         found.view.write(folder)
     then = after_validate(found.found, design, model, model_file, plant_file, card)
-    show(found.view, folder.final, then or as_code(design_file))
+    found.view.show(folder.final, then or as_code(design_file))
     return 0 if found.passed else 1
 
 
@@ -63,7 +60,6 @@ def _velocity(
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
     from workbench.report.velocity import after_velocity_validation, velocity_view
-    from workbench.report.view import show
     from workbench.steps.velocity_loop import validate_velocity
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
@@ -74,5 +70,5 @@ def _velocity(
             found = validate_velocity(model, design, rng, limits, plant)
         view = velocity_view(found)
         view.write(folder)
-    show(view, folder.final, after_velocity_validation(found, files[0]))
+    view.show(folder.final, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

@@ -27,5 +27,5 @@ def command(
     from workbench.page.worker import run_worker
     from workbench.registry.database import location
 
-    settings = PageSettings(location(where), str(machines.absolute()))
+    settings = PageSettings(location(where), machines.absolute())
     run_worker(settings, reporter(sys.stderr, "work"), once=once)

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, SerializationInfo, TypeAdapter
+from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -58,7 +58,6 @@ class Around(NamedTuple):
 
     @property
     def limit(self) -> float | None:
-        """The limit of the command."""
         return self.command.limit if self.command else None
 
 
@@ -67,11 +66,8 @@ def entry(one: Estimate, around: Around) -> dict[str, Any]:
     return asdict(one) if around.in_full else as_number(one)
 
 
-def _entry(one: Estimate, info: SerializationInfo[Around]) -> dict[str, Any]:
-    return entry(one, info.context)
-
-
-Parameter = Annotated[Estimate, PlainSerializer(_entry)]  # in the unit that it has
+# A parameter in the unit that it has.
+Parameter = Annotated[Estimate, PlainSerializer(lambda one, info: entry(one, info.context))]
 
 
 def around_in(table: object, motion: str, other: object, command: str) -> Around:

@@ -32,6 +32,7 @@ from design.series_filters import FilterKind, SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
+from identification.signals.filters import slope_filter
 from workbench.cards.parameter_units import in_unit
 from workbench.cards.units import Motion
 from workbench.documents.codec import (
@@ -55,7 +56,6 @@ from workbench.documents.drive import (
     ForceLoop,
     LawFile,
     Present,
-    filters_file,
     filters_of,
     law_file,
     law_of,
@@ -288,7 +288,10 @@ class CompensatorFile:
 
 
 def _compensator_file(one: CompensatorValues, _around: Around) -> CompensatorFile:
-    filters = None if one.filters is None or one.h is None else filters_file(one.filters, one.h)
+    filters, own = None, one.filters
+    if own is not None and one.h is not None:
+        slope = slope_filter(one.h, own.N_d).b
+        filters = FiltersFile(own.velocity, own.error, own.force, slope, one.h)
     return CompensatorFile(one.N_c, one.e_T, one.friction, filters, one.excess)
 
 

@@ -35,7 +35,6 @@ def design_digest(found: Design) -> str:
 
 
 def units_of(found: Design) -> Shown:
-    """Units of a design's numbers."""
     return shown(found.motion == "rotary", found.command.unit if found.command else "V")
 
 

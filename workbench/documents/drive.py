@@ -64,7 +64,6 @@ class LawFile:
 
 
 def law_file(law: DriveLaw, around: Around) -> LawFile:
-    """The law as a result writes it."""
     units, output = around.units, around.output
     limit = around.limit if output == "command" else None
     lines = equation_lines(law, output, around.limit, units)
@@ -149,12 +148,6 @@ class FiltersFile:
     C: Filter
     slope: tuple[float, ...]
     h: Annotated[float, InUnit("s", above_0=True)]
-
-
-def filters_file(filters: CompensatorFilters, h: float) -> FiltersFile:
-    """The compensator's filters as a result writes them; h [s]."""
-    slope = slope_filter(h, filters.N_d).b
-    return FiltersFile(filters.velocity, filters.error, filters.force, slope, h)
 
 
 def filters_of(written: FiltersFile) -> CompensatorFilters:

@@ -15,6 +15,7 @@ from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
+from identification.thresholds import ADEQUATE, MATERIAL
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit, shown
@@ -161,14 +162,6 @@ class Identifiable:
     only_if: str = ""
 
 
-def _nine(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
-    return in_units(found, info.context.units.friction)
-
-
-def _actuator(found: Mapping[str, Estimate], info: Any) -> Mapping[str, Estimate]:
-    return in_units(found, info.context.actuator)
-
-
 def _effects(found: Mapping[str, Mapping[str, Estimate]], info: Any) -> Any:
     """Effects in SI; raises BadModel where one is not in the library, or a unit of another kind."""
     around = info.context
@@ -210,7 +203,11 @@ def _library(found: Any, info: Any) -> Any:
 
 
 Parameters = Mapping[str, Parameter]
-Nine = Annotated[Mapping[str, Estimate], Through(Parameters, _nine)]
+Nine = Annotated[
+    Mapping[str, Estimate],
+    Through(Parameters, lambda found, info: in_units(found, info.context.units.friction)),
+]
+OF_ACTUATOR = Through(Parameters, lambda found, info: in_units(found, info.context.actuator))
 
 
 @dataclass(frozen=True)
@@ -233,7 +230,7 @@ class Model:
     card: str
     rig: Rig
     friction: Nine
-    actuator: Annotated[Mapping[str, Estimate] | None, Through(Parameters, _actuator)]
+    actuator: Annotated[Mapping[str, Estimate] | None, OF_ACTUATOR]
     plant: ArxPlant | None
     plant_reason: str | None
     fit: FitSummary
@@ -329,6 +326,22 @@ class Model:
     def by_equation(self) -> bool:
         """Whether the equation of motion was fitted alone, since no free run follows the logs."""
         return all(entry.position_rms is None for entry in self.log)
+
+    @property
+    def lacks(self) -> str:
+        """What it leaves of its logs beside noise, in words; "" where nothing.
+
+        Of that its margins say nothing. The share of the force is that of the equation of motion.
+        """
+        if self.fit.adequate or self.resonance is not None:
+            return ""
+        left, near = self.fit.force_relative, self.fit.chi_square <= ADEQUATE
+        if near and self.by_equation:
+            return "no free run of the model follows its logs, its equation of motion alone does"
+        if near and (left is None or left <= MATERIAL):
+            return ""
+        share = "" if left is None else f" ({100 * left:.2g} % of the force)"
+        return f"the model lacks a force, it leaves more of its logs than noise{share}"
 
     @property
     def prescribed_motion(self) -> bool:

@@ -68,12 +68,16 @@ class VelocityModel:
         for name in NUMBERS:
             if name not in self.valve:
                 raise BadModel(f"[valve] has no {name!r}; add it with a value, or null")
-        numbers = {**self.valve, **{k: v for own in self.effects.values() for k, v in own.items()}}
-        for name, one in numbers.items():
+        for name, one in self.numbers.items():
             if name not in NAMES_OF_VALVE:
                 raise BadModel(f"[valve] unknown key {name!r}{nearest(name, NAMES_OF_VALVE)}")
             if one.value is None and (one.reason is None or one.assumed is None):
                 raise BadModel(f"[valve.{name}] is null; it needs a 'reason' and 'assumed'")
+
+    @property
+    def numbers(self) -> dict[str, Estimate]:
+        """Those of the valve, and of its effects."""
+        return {**self.valve, **{k: v for own in self.effects.values() for k, v in own.items()}}
 
     @property
     def simulated(self) -> Valve:
@@ -92,8 +96,7 @@ class VelocityModel:
         return replace(self._with(ends))
 
     def _with(self, value_of: Any) -> Valve:
-        numbers = {**self.valve, **{k: v for own in self.effects.values() for k, v in own.items()}}
-        return Valve(**{name: float(value_of(one) or 0.0) for name, one in numbers.items()})
+        return Valve(**{name: float(value_of(one) or 0.0) for name, one in self.numbers.items()})
 
     @property
     def travel(self) -> tuple[float, float]:

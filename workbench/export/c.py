@@ -11,7 +11,7 @@ from typing import Any
 
 from design.program import Program, Variable
 from workbench.export.exported import Exported, Precision
-from workbench.export.filled import filled, lead_of, rows, title_of
+from workbench.export.filled import filled, heading_of, rows
 from workbench.export.syntax import INDENT, Syntax, braced
 
 # Python's names that are keywords of C, and one of a function of its library.
@@ -69,10 +69,7 @@ def c_files(what: Exported) -> dict[str, str]:
     c = c_syntax(program, what.precision)
     test = what.test
     common: dict[str, Any] = {
-        "title": title_of(what),
-        "lead": lead_of(what),
-        "name": program.name,
-        "h": program.h,
+        **heading_of(what),
         "period": c.number(program.h),
         "real": "float" if what.precision == "single" else "double",
         "inputs": program.inputs,
@@ -180,9 +177,7 @@ def fmu_file(what: Exported) -> dict[str, bytes]:
     variables = tuple(_variables(what))
     token = hashlib.sha256("".join(files.values()).encode()).hexdigest()
     common: dict[str, Any] = {
-        "title": title_of(what),
-        "name": program.name,
-        "h": program.h,
+        **heading_of(what),
         "inputs": program.inputs,
         "variables": variables,
         "token": token,
@@ -193,7 +188,6 @@ def fmu_file(what: Exported) -> dict[str, bytes]:
         "modelDescription.xml",
         markup=True,
         **common,
-        lead=lead_of(what),
         version=version("servo-workbench"),
         units={unit: base for unit, base in BASE_UNITS.items() if unit in used},
     )

@@ -96,7 +96,6 @@ class Compensation:
 
     @property
     def rotary(self) -> bool:
-        """Whether the axis turns."""
         return self.model.rotary
 
     @property
@@ -296,7 +295,6 @@ class AtMotor:
 
     @property
     def turns(self) -> bool:
-        """Whether the motor turns."""
         return self.rotary or self.per_turn is not None
 
     @property

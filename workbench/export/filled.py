@@ -35,6 +35,12 @@ def title_of(what: Exported) -> str:
     return f"{what.design.card}: {kind} controller{beside}"
 
 
+def heading_of(what: Exported) -> dict[str, Any]:
+    """What every file says of a controller."""
+    program = what.program
+    return {"title": title_of(what), "lead": lead_of(what), "name": program.name, "h": program.h}
+
+
 def lead_of(what: Exported) -> Sequence[str]:
     """What to know of a file, in lines."""
     program = what.program

@@ -6,7 +6,7 @@ from importlib.metadata import version
 
 from design.program import Kind
 from workbench.export.exported import Exported, Precision
-from workbench.export.filled import filled, lead_of, rows, title_of
+from workbench.export.filled import filled, heading_of, rows
 from workbench.export.syntax import AT_POSITION_1, INDENT, Syntax, braced
 
 # Words of the standard, and operators of its Instruction List, that a name here may meet.
@@ -67,7 +67,6 @@ class Declared:
 
     @property
     def line(self) -> str:
-        """The declaration."""
         kind = f"ARRAY[0..{self.size - 1}] OF {self.type}" if self.size else self.type
         start = ""
         if self.values:
@@ -94,14 +93,7 @@ class Block:
 
 def st_file(what: Exported) -> dict[str, str]:
     """The controller's block and the one that tests it, in one file."""
-    text = filled(
-        "blocks.st",
-        title=title_of(what),
-        lead=lead_of(what),
-        name=what.program.name,
-        h=what.program.h,
-        blocks=blocks(what),
-    )
+    text = filled("blocks.st", **heading_of(what), blocks=blocks(what))
     return {f"{what.program.name}.st": text}
 
 
@@ -199,9 +191,7 @@ def plcopen_file(what: Exported, now: datetime) -> dict[str, str]:
     text = filled(
         "project.xml",
         markup=True,
-        title=title_of(what),
-        lead=lead_of(what),
-        name=what.program.name,
+        **heading_of(what),
         version=version("servo-workbench"),
         now=now.isoformat(timespec="seconds"),
         elementary=ELEMENTARY,

@@ -23,6 +23,7 @@ from workbench.registry.store import Registry
 from workbench.registry.values import SeenLog
 
 LEASE = timedelta(minutes=2)
+LONGEST_ALONE = timedelta(minutes=2)  # for which the cluster may be without any worker
 
 
 class NoRegistry:
@@ -52,7 +53,6 @@ class InRegistry:
 
     @property
     def queue(self) -> Queue:
-        """The logs that wait for a result."""
         return Queue(self.registry.database)
 
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
@@ -105,19 +105,6 @@ FLEET_POLL = 1.0  # s between looks at the cluster
 CARDS_CHECKED = 20  # logs whose card is searched before a run begins
 
 
-@dataclass(frozen=True)
-class FleetSettings:
-    """url of the logs; card: text of the one for all, None: one a machine beside its logs.
-
-    alone: how long the cluster may be without any worker.
-    """
-
-    url: str
-    card: str | None = None
-    seed: int = 0
-    alone: timedelta = timedelta(minutes=2)
-
-
 @dataclass
 class Report:
     """What a run has done so far: logs found, done by an earlier run, and results by verdict.
@@ -139,13 +126,18 @@ class Report:
 
 @dataclass(frozen=True)
 class FleetRun:
-    """A run over the logs of a fleet."""
+    """A run over the logs of a fleet.
+
+    url of the logs; card: text of the one for all, None: one a machine beside its logs.
+    """
 
     cluster: Cluster
     store: ResultStore
     recorder: Recorder
-    settings: FleetSettings
+    url: str
     clock: Clock
+    card: str | None = None
+    seed: int = 0
     advance: Callable[[float], None] = lambda _step: None
     work: Work = default_work
     listed: int = 1000
@@ -158,7 +150,7 @@ class FleetRun:
         todo = [log for log in logs if log.key not in self.store.done]
         done = Report(len(logs), len(logs) - len(todo))
         self.advance(done.before)
-        if self.settings.card is None:
+        if self.card is None:
             self._refuse_cardless(todo)
         try:
             for result in self._results(todo):
@@ -224,27 +216,25 @@ class FleetRun:
 
     def _given(self, log: LogFile) -> Any:
         """The future of a log handed over; a result where it cannot be."""
-        settings = self.settings
         try:
-            card = settings.card or card_text(settings.url, log)
+            card = self.card or card_text(self.url, log)
         except BadLogs as error:
             return Result(log, "waits", str(error))
         if card is None:
             return Result(log, "waits", f"{log.name}: no card.toml beside or above it")
-        item = self.recorder.item(settings.url, log, card, settings.seed)
+        item = self.recorder.item(self.url, log, card, self.seed)
         return self.cluster.submit(self.work, item)
 
     def _refuse_cardless(self, logs: Sequence[LogFile]) -> None:
-        url = self.settings.url
         looked = logs[:CARDS_CHECKED]
-        if looked and not any(card_text(url, log) for log in looked):
+        if looked and not any(card_text(self.url, log) for log in looked):
             raise BadLogs(
-                f"{shown(url)}: no card.toml beside or above {looked[0].name!r} and the logs after"
-                " it; put one there, or give --card for all"
+                f"{shown(self.url)}: no card.toml beside or above {looked[0].name!r} and the logs"
+                " after it; put one there, or give --card for all"
             )
 
     def _refuse_empty(self, time: timedelta) -> None:
-        if time > self.settings.alone:
+        if time > LONGEST_ALONE:
             raise BadCluster(
                 f"the cluster has had no worker for {time.total_seconds():.0f} s; results so far"
                 " are kept, start workers and run again"

@@ -25,12 +25,7 @@ from workbench.interface.inputs import (
     read_card,
     sources,
 )  # fmt: skip
-from workbench.interface.models import (
-    IdentifyResult,
-    ModelLike,
-    TraceResult,
-    model_of,
-)  # fmt: skip
+from workbench.interface.models import IdentifyResult, ModelLike, TraceResult, model_of
 from workbench.interface.result import Result
 from workbench.logs.sources import Sources, card_path
 from workbench.output import dumps

@@ -119,15 +119,9 @@ class Delivery:
 
 def alarm_document(alarm: Alarm) -> dict[str, str | int | None]:
     """What a webhook is sent."""
-    return {
-        "machine": _readable(alarm.machine),
-        "log": _readable(alarm.log),
-        "sha256": alarm.sha256,
-        "verdict": alarm.verdict,
-        "reason": _readable(alarm.reason),
-        "version": alarm.version,
-        "at": alarm.at.isoformat(),
-    }
+    sent = {key: one for key, one in vars(alarm).items() if key not in ("log_id", "turn")}
+    readable = {key: _readable(sent[key]) for key in ("machine", "log", "reason")}
+    return {**sent, **readable, "at": alarm.at.isoformat()}
 
 
 def key(alarm: Alarm) -> str:

@@ -7,8 +7,7 @@ keeps every limit, the model alone is replaced. The rule is ours; the paper re-t
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,11 +121,6 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
         positions.append((None if model.by_equation else one.position_rms, len(log)))
         forces.append((one.force_predicted_rms, len(log)))
     return HeldOut(pooled(positions), pooled(forces))
-
-
-def contest_document(found: Contest) -> dict[str, Any]:
-    """The contest as the registry keeps it."""
-    return asdict(found)
 
 
 def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms, rotary: bool) -> str:

@@ -18,7 +18,7 @@ from workbench.documents.model import Model
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
 from workbench.report.drift import reason_sentence
-from workbench.steps.drift import Drifted, Stream, detectable_sizes, drift_of, model_key
+from workbench.steps.drift import Stream, detectable_sizes, drift_of, model_key
 
 TestedDrift = Literal["none", "drift", "structure", "not_judged"]
 
@@ -87,13 +87,14 @@ def drift_by_chart(
     seed = int(rng.integers(2**31))
     found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
     worst = [one.test for one in found.tests if one.test.verdict == found.verdict][-1]
+    state_now: Any = strict(found.stream.state)
     statistics = [one for one in (worst.single, worst.mean) if one is not None]
     return Drift(
         verdict=found.verdict,
         reason=reason_sentence(worst, found.settings.to_be_seen),
         moved=tuple(_moved(one) for one in worst.moved),
         p_value=min((one.p_value for one in statistics), default=None),
-        state=_plain(found),
+        state=state_now,
         unsure=worst.unsure,
         could_have_seen=detectable_sizes(worst),
         parameters=tuple(_reading(one) for one in worst.shifts.values()),
@@ -106,12 +107,6 @@ def _state(state: Mapping[str, Any]) -> DriftState:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise BadModel(f"stored drift state: {first['loc']}: {first['msg']}") from None
-
-
-def _plain(found: Drifted) -> Mapping[str, Any]:
-    plain = strict(found.stream.state)
-    assert isinstance(plain, dict)
-    return plain
 
 
 def _reading(shift: Shift) -> Reading:

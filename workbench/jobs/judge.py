@@ -14,15 +14,15 @@ from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model
 from workbench.documents.model_file import model_document, read_model
 from workbench.documents.reading import Stored
-from workbench.jobs.challenge import Contender, Terms, challenge, contest_document
+from workbench.jobs.challenge import Contender, Terms, challenge
 from workbench.jobs.drift_by_chart import Drift, DriftJudge, drift_by_chart
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Source, Sources, read_sources
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
+from workbench.steps.drift import moved_between, no_wear
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.moved_scale import moved_between, no_wear
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate, validation_document
 
@@ -108,7 +108,7 @@ class Chain:
         """A model of the machine as it is now, against the active one; said: why it was made."""
         rng = np.random.default_rng(self.seed)
         contest = challenge(champion, challenger, held_out, rng, self.terms)
-        evidence = {**evidence, "contest": contest_document(contest)}
+        evidence = {**evidence, "contest": asdict(contest)}
         reason = _then(said, contest.reason)
         moved = moved_between(champion.model.friction, challenger.model.friction)
         rotary = champion.model.rotary

@@ -16,7 +16,7 @@ from typing import Any
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import SHARE, Clock, Patience, renewed
 from workbench.jobs.options import is_gone
-from workbench.jobs.scan import MachineFolder, Scan, machine_folders, refuse_name, scan, unchanged
+from workbench.jobs.scan import BadRoot, MachineFolder, Scan, machine_folders, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
@@ -109,7 +109,6 @@ class Pass:
 
     @property
     def queue(self) -> Queue:
-        """The logs that wait."""
         return Queue(self.registry.database)
 
     def run(self, root: Path) -> PassReport:
@@ -136,7 +135,8 @@ class Pass:
 
     def _machine(self, folder: MachineFolder, done: PassReport) -> None:
         name, settings, retry = folder.name, self.settings, self.settings.patience
-        refuse_name(folder)
+        if folder.card.parent.name != name:
+            raise BadRoot("the folder's name is not UTF-8; rename the folder")
         known = retry(self.queue.known, name)
         found = scan(
             folder, known, settle=settings.settle, now=(self.files or self.clock)(),

@@ -26,11 +26,7 @@ Known = Mapping[tuple[str, int, int], str]
 
 
 class BadRoot(UserError):
-    """A folder of machines that is none."""
-
-
-class BadName(UserError):
-    """A machine whose folder has a name that no registry can hold."""
+    """A folder of machines that is none, or of a machine whose name no registry can hold."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +65,6 @@ def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
     return tuple(
         MachineFolder(shown_name(p), p / CARD_FILE, p / LOGS) for p in found if _plain(p.name)
     )
-
-
-def refuse_name(folder: MachineFolder) -> None:
-    """Raises BadName where the folder's name is not UTF-8."""
-    if folder.card.parent.name != folder.name:
-        raise BadName("the folder's name is not UTF-8; rename the folder")
 
 
 def scan(

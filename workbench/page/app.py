@@ -70,7 +70,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
     app.state.server, app.state.moment = Server(settings, registry, helpers), Moment()
     keeper = Doorkeeper(Access(registry.database), open_reading=settings.open_reading)
     app.state.doorkeeper = keeper
-    return Guard(health.Counted(app), settings)
+    return Guard(app, settings)
 
 
 async def _said(request: Request, error: Exception) -> Response:

@@ -14,7 +14,7 @@ from workbench.page.dropped import Drop
 from workbench.page.helpers import Helpers
 from workbench.page.pages import environment
 from workbench.page.settings import PageSettings
-from workbench.registry.access import audit
+from workbench.registry.access import note
 from workbench.registry.bench import Bench
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
@@ -64,12 +64,10 @@ class Asked:
 
     @property
     def registry(self) -> Registry:
-        """The registry that the page is of."""
         return self.server.registry
 
     @property
     def database(self) -> Database:
-        """The registry's database."""
         return self.server.registry.database
 
     @property
@@ -83,13 +81,12 @@ class Asked:
         return self.drop_of(self["upload"])
 
     def drop_of(self, upload: str) -> Drop:
-        """The files of an upload."""
-        return Drop(self.server.settings.root, upload)
+        return Drop(self.root, upload)
 
     @property
     def root(self) -> Path:
         """The folder of machines."""
-        return self.server.settings.root
+        return self.server.settings.machines
 
     def __getitem__(self, name: str) -> Any:
         """A part of the address."""
@@ -133,7 +130,8 @@ class Asked:
 
     def audit(self, kind: str, subject: str, detail: str) -> None:
         """Write what the visitor has changed into the audit."""
-        audit(self.database, kind, subject, detail, by=self.visitor.name, now=clock())
+        with self.database.writing() as session:
+            note(session, kind, subject, detail, by=self.visitor.name, now=clock())
 
 
 def download(content: str | bytes, name: str, media_type: str) -> Response:

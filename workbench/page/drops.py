@@ -128,7 +128,6 @@ def words(asked: Asked) -> Response:
 
 
 def card_file(asked: Asked) -> Response:
-    """The card itself."""
     if not asked.drop.card.exists():
         raise HTTPException(404, "No card yet.")
     return download(asked.drop.card.read_text("utf-8"), "card.toml", "text/plain")

@@ -9,6 +9,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from workbench.page.health import counted
 from workbench.page.settings import PageSettings
 
 POLICY = (
@@ -58,7 +59,7 @@ class Guard:
         """The answer to a body that may be longer than its sender has said."""
         seen = 0
 
-        async def counted() -> Message:
+        async def limited() -> Message:
             nonlocal seen
             message = await receive()
             seen += len(message.get("body", b""))
@@ -66,7 +67,7 @@ class Guard:
                 raise HTTPException(413, _too_large_text(most))
             return message
 
-        await self._app(scope, counted, send)
+        await self._app(scope, limited, counted(send, scope["method"]))
 
 
 def _too_large_text(most: int) -> str:

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Message, Send
 
 from workbench.jobs.metrics import PREFIX, MachineFigures, collected
 from workbench.page.asked import Asked, Server
@@ -28,28 +28,19 @@ SECONDS_TAKEN = Histogram(
 )  # fmt: skip
 
 
-class Counted:
-    """The application, its answers counted."""
+def counted(send: Send, method: str) -> Send:
+    """What sends an answer, which is counted."""
+    begun = time.perf_counter()
+    # What is none of the usual methods would make figures without end.
+    known = method if method in ("GET", "HEAD", "POST") else "other"
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    async def noted(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            ANSWERED.labels(known, str(message["status"])).inc()
+            SECONDS_TAKEN.observe(time.perf_counter() - begun)
+        await send(message)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer and count."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        begun = time.perf_counter()
-
-        async def noted(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                # What is none of the usual methods would make figures without end.
-                method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST") else "other"
-                ANSWERED.labels(method, str(message["status"])).inc()
-                SECONDS_TAKEN.observe(time.perf_counter() - begun)
-            await send(message)
-
-        await self._app(scope, receive, noted)
+    return noted
 
 
 async def health(request: Request) -> Response:

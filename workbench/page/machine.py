@@ -35,7 +35,6 @@ LAST_CHANGES = 200
 
 
 def machine(asked: Asked) -> Response:
-    """The page of a machine."""
     registry, name = asked.registry, asked["machine"]
     state = registry.machine(name)
     versions = registry.versions(name)
@@ -80,7 +79,6 @@ def compare(asked: Asked) -> Response:
 
 
 def report(asked: Asked) -> Response:
-    """The report of a version's design."""
     design = json.dumps(asked.registry.document(_version(asked), "design"))
     return report_response(asked.server.helpers(looks.design_page, design))
 
@@ -95,7 +93,6 @@ def stored_page(asked: Asked) -> Response:
 
 
 def document(asked: Asked) -> Response:
-    """A version's document as it is."""
     kind = asked["kind"]
     if kind not in get_args(Kind):
         raise HTTPException(404, "No such document.")
@@ -119,7 +116,6 @@ def export(asked: Asked) -> Response:
 
 
 def promote(asked: Asked) -> Response:
-    """Activate a version."""
     number = asked.text("number")
     if not number.isascii() or not number.isdigit():
         raise HTTPException(400, "Which version? Choose one.")

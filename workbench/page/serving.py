@@ -27,7 +27,7 @@ def serve(settings: PageSettings, report: "Report") -> int:
     """Serve until Ctrl-C or SIGTERM; the exit status. Raises BadRegistry and RegistryAway first."""
     with Registry(settings.where):
         pass  # its layout is brought up to date once, and what is wrong is reported before all else
-    settings.root.mkdir(parents=True, exist_ok=True)
+    settings.machines.mkdir(parents=True, exist_ok=True)
     hand_over(settings)
     shown = f"http://{settings.host}:{settings.port}{settings.prefix}/"
     report("serving", address=shown, reading="open" if settings.open_reading else "by token",
@@ -61,7 +61,7 @@ def _workers(settings: PageSettings, report: "Report") -> Iterator[None]:
 
 def _restarted(settings: PageSettings, report: "Report", over: threading.Event) -> None:
     """One worker after the other; the registry's address is not on its command line."""
-    command = [sys.executable, "-m", "workbench", "work", "--machines", settings.machines]
+    command = [sys.executable, "-m", "workbench", "work", "--machines", str(settings.machines)]
     environment = {**os.environ, REGISTRY_VARIABLE: settings.where}
     while not over.is_set():
         worker = subprocess.Popen(command, env=environment)

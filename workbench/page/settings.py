@@ -1,46 +1,76 @@
 """How the page is served, as the command line says it and every process of it reads it."""
 
-import json
 import os
-from dataclasses import asdict, dataclass
+import re
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Literal
+
+import click
 
 from identification.errors import UserError
+from workbench import options
+from workbench.output import dumps
+from workbench.signature import asked
 
 SETTINGS_VARIABLE = "WORKBENCH_PAGE"
 LOOPBACK = ("localhost", "127.0.0.1", "[::1]", "::1")
-UPLOAD_BYTES = 200_000_000
+MEGA = 1e6
+
+
+def _prefix(ctx: click.Context, param: click.Parameter, value: str) -> str:
+    text = value.rstrip("/")
+    if not (text.isascii() and re.fullmatch(r"(/[^/ ?#%\\\"'<>]+)*", text)):
+        raise click.UsageError(f"--prefix {value!r}: a path needed, as /servo.", ctx)
+    return text
 
 
 @dataclass(frozen=True)
 class PageSettings:
-    """where: the registry; machines: folder of machines, in which dropped logs lie too.
+    """The registry, the folder of machines, in which dropped logs lie too, and each option.
 
-    prefix: path below which a proxy serves the page, "" or as "/servo". names: hosts by which it
-    may be asked for. open_reading: whether reading needs no token. silent_days: after which a
-    machine counts as not heard from. most_bytes: of one dropped log. secure: cookies go by https
-    only. servers, workers: processes.
+    prefix: "" or as "/servo". servers, workers: processes.
     """
 
-    where: str
-    machines: str
-    host: str = "127.0.0.1"
-    port: int = 8000
-    prefix: str = ""
-    names: tuple[str, ...] = ()
-    open_reading: bool = True
-    silent_days: float = 7.0
-    most_bytes: int = UPLOAD_BYTES
-    secure: bool = False
-    servers: int = 1
-    workers: int = 1
+    where: str = options.REGISTRY_OPTION
+    machines: Path = options.MACHINES_OPTION
+    host: str = asked("127.0.0.1", "Address to bind to.")
+    port: int = asked(8000, "", type=click.IntRange(0, 65535))
+    names: tuple[str, ...] = asked(
+        (), "Name under which the page is asked for, beside localhost; may be repeated.",
+        "--name", metavar="HOST",
+    )  # fmt: skip
+    prefix: str = asked(
+        "", "Path below which a proxy serves the page.",
+        show_default=False, metavar="/PATH", callback=_prefix,
+    )  # fmt: skip
+    reading: Literal["open", "token"] | None = asked(
+        None, "Who may read.  [default: open on the loopback, else token]"
+    )
+    secure: bool = asked(False, "The proxy speaks https: send cookies by it alone.")
+    silent_days: float = asked(
+        7.0, "A machine without a log for so long counts as not heard from.",
+        type=options.POSITIVE, metavar="D",
+    )  # fmt: skip
+    most_megabytes: float = asked(
+        200.0, "Largest log that may be dropped.", type=options.POSITIVE, metavar="MB"
+    )
+    servers: int = asked(2, "Processes that answer.", type=click.IntRange(1, 64), metavar="N")
+    workers: int = asked(
+        1, "Processes that identify and trace; more by 'workbench work'.",
+        type=click.IntRange(0, 64), metavar="N",
+    )  # fmt: skip
 
     @property
-    def root(self) -> Path:
-        """The folder of machines."""
-        return Path(self.machines)
+    def open_reading(self) -> bool:
+        """Whether reading needs no token."""
+        return self.host in LOOPBACK if self.reading is None else self.reading == "open"
+
+    @property
+    def most_bytes(self) -> int:
+        """Of one dropped log."""
+        return round(self.most_megabytes * MEGA)
 
     @property
     def hosts(self) -> frozenset[str]:
@@ -50,13 +80,14 @@ class PageSettings:
 
 def hand_over(settings: PageSettings) -> None:
     """Leave the settings to the processes that this one starts; not on their command lines."""
-    os.environ[SETTINGS_VARIABLE] = json.dumps(asdict(settings))
+    os.environ[SETTINGS_VARIABLE] = dumps(settings)
 
 
 def handed_over() -> PageSettings:
     """The settings that the process which started this one has left."""
-    found: dict[str, Any] = json.loads(os.environ[SETTINGS_VARIABLE])
-    return PageSettings(**{**found, "names": tuple(found["names"])})
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(PageSettings).validate_json(os.environ[SETTINGS_VARIABLE])
 
 
 NEEDED_LIBRARIES = ("starlette", "uvicorn", "python_multipart")

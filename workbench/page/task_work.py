@@ -28,8 +28,7 @@ from workbench.report.model_tables import (
     plant_lines,
 )
 from workbench.report.reports import identified_view
-from workbench.report.trace import traced_view
-from workbench.report.trace_tables import errors_table, logs_of_trace
+from workbench.report.trace import errors_table, logs_of_trace, traced_view
 from workbench.report.view import View, report_notes
 from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources

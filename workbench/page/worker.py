@@ -94,7 +94,7 @@ def _made(
     bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report
 ) -> tuple[EndState, str]:
     """What came of the task: its last state, and a line."""
-    task, files = claim.task, Drop(settings.root, claim.task.upload)
+    task, files = claim.task, Drop(settings.machines, claim.task.upload)
     try:
         work = Work(task.kind, files.log, files.card, files.results(task.id))
         with _beating(bench, claim) as state:

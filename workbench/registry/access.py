@@ -33,17 +33,6 @@ class AccessToken:
 
 
 @dataclass(frozen=True)
-class Audited:
-    """A change: who made it, of which kind, to what."""
-
-    at: datetime
-    made_by: str
-    kind: str
-    subject: str
-    detail: str
-
-
-@dataclass(frozen=True)
 class Access:
     """The tokens of a registry."""
 
@@ -87,12 +76,12 @@ class Access:
         own = (AccessTokenRow.sha256 == hashed(secret), AccessTokenEndRow.at.is_(None))
         return next(iter(self._found(_TOKENS.where(*own))), None)
 
-    def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[Audited]:
+    def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[AuditRow]:
         """The last changes, of one subject or all; the newest first."""
         query = select(AuditRow).order_by(AuditRow.id.desc()).limit(last)
         if subject is not None:
             query = query.where(AuditRow.subject == subject)
-        return [of_row(Audited, row) for (row,) in self.database.rows(query)]
+        return [row for (row,) in self.database.rows(query)]
 
     def _found(self, query: Select[*tuple[Any, ...]]) -> tuple[AccessToken, ...]:
         rows = self.database.rows(query)
@@ -112,11 +101,3 @@ def hashed(secret: str) -> str:
 def note(session: Session, kind: str, subject: str, detail: str, *, by: str, now: datetime) -> None:
     """Write a change into the audit, within the transaction that makes it."""
     session.add(AuditRow(kind=kind, subject=subject, detail=detail, made_by=by, at=now))
-
-
-def audit(
-    database: Database, kind: str, subject: str, detail: str, *, by: str, now: datetime
-) -> None:
-    """Write a change of files, which no transaction holds, into the audit."""
-    with database.writing() as session:
-        note(session, kind, subject, detail, by=by, now=now)

@@ -183,7 +183,6 @@ class FleetPage:
 
 
 def fleet_page(database: Database, asked: FleetAsked) -> FleetPage:
-    """The page that was asked for."""
     now = MachineNowRow
     silent = and_(now.state.in_(MAY_FALL_SILENT), now.heard_at < asked.silent_since)
     state = case((silent, "silent"), else_=now.state)

@@ -142,7 +142,7 @@ class Queue:
             .group_by(LogRow.id)
             .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
         )
-        found = [(rows.seen(row), int(count)) for row, count in self.database.rows(query)]
+        found = [(of_row(SeenLog, row), int(count)) for row, count in self.database.rows(query)]
         return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
 
     def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
@@ -354,4 +354,5 @@ def _recorded(session: Session, done: OutcomeRow) -> LogOutcome:
 
 
 def _outcome(row: OutcomeRow, log: LogRow, number: int | None) -> LogOutcome:
-    return of_row(LogOutcome, row, machine=log.machine, log=rows.seen(log), number=number)
+    seen = of_row(SeenLog, log)
+    return of_row(LogOutcome, row, machine=log.machine, log=seen, number=number)

@@ -166,7 +166,6 @@ def numbered(session: Session, machine: str, number: int) -> VersionRow:
 
 
 def active_version(session: Session, machine: str) -> VersionRow | None:
-    """The row of the active version."""
     pointer = session.get(ActiveVersionRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
 
@@ -207,12 +206,7 @@ def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
             LogRow.machine == machine, or_(LogRow.id.in_(promoted), LogRow.sha256.in_(fitted))
         )
     )
-    return tuple(seen(row) for row in rows)
-
-
-def seen(row: LogRow) -> SeenLog:
-    """The log file as it was found."""
-    return of_row(SeenLog, row)
+    return tuple(of_row(SeenLog, row) for row in rows)
 
 
 def versions(session: Session, *where: ColumnElement[bool]) -> Sequence[Version]:
@@ -233,7 +227,6 @@ def versions(session: Session, *where: ColumnElement[bool]) -> Sequence[Version]
 
 
 def version_value(session: Session, row: VersionRow) -> Version:
-    """The version as a value."""
     return versions(session, VersionRow.id == row.id)[0]
 
 

@@ -123,7 +123,6 @@ class Registry:
             return None if row is None else rows.version_value(session, row)
 
     def version(self, machine: str, number: int) -> Version:
-        """The version of that number."""
         with self.database.reading() as session:
             return rows.version_value(session, rows.numbered(session, machine, number))
 

@@ -6,6 +6,7 @@ one query.
 """
 
 import json
+import re
 from datetime import UTC, datetime
 from typing import Any, get_args
 
@@ -22,7 +23,7 @@ from sqlalchemy import (
     TypeDecorator,
     UniqueConstraint,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
 
 from workbench.output import dumps
 from workbench.registry import values
@@ -47,7 +48,6 @@ class StorableText(TypeDecorator[str]):
     cache_ok = True
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """The text as the database keeps it."""
         if value is None:
             return None
         return value.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode("utf-8")
@@ -60,7 +60,6 @@ class UtcTime(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """The moment as the database keeps it."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -69,7 +68,6 @@ class UtcTime(TypeDecorator[datetime]):
         return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """The moment in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
@@ -82,7 +80,6 @@ class JsonText(TypeDecorator[Any]):
     cache_ok = True
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
-        """The document as the database keeps it."""
         return None if value is None else dumps(value)
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
@@ -108,6 +105,11 @@ class Base(DeclarativeBase):
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = COLUMN_TYPES
 
+    @declared_attr.directive
+    def __tablename__(cls) -> str:
+        """The class's name: that of AccessTokenRow is access_token."""
+        return re.sub(r"\B(?=[A-Z])", "_", cls.__name__.removesuffix("Row")).lower()
+
 
 def one_of(column: str, kind: Any) -> CheckConstraint:
     """That a column holds one of these words."""
@@ -117,7 +119,6 @@ def one_of(column: str, kind: Any) -> CheckConstraint:
 class MachineRow(Base):
     """A machine by its name."""
 
-    __tablename__ = "machine"
     name: Mapped[str] = mapped_column(primary_key=True)
     added_at: Mapped[datetime]
 
@@ -126,7 +127,6 @@ class LogRow(Base):
     """A log file by its fingerprint; size and mtime identify a known file without reading it
     again."""
 
-    __tablename__ = "log"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
     sha256: Mapped[str]
@@ -140,7 +140,6 @@ class LogRow(Base):
 class RecordRow(Base):
     """A document (model, design, validation) by its content."""
 
-    __tablename__ = "record"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
     kind: Mapped[values.Kind]
@@ -156,7 +155,6 @@ class RecordRow(Base):
 class VersionRow(Base):
     """A model and its design, numbered from 1 a machine: what can be activated."""
 
-    __tablename__ = "version"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
     number: Mapped[int]
@@ -170,7 +168,6 @@ class VersionRow(Base):
 class DecisionRow(Base):
     """What was decided of a version, by whom and why."""
 
-    __tablename__ = "decision"
     id: Mapped[int] = mapped_column(primary_key=True)
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"))
     kind: Mapped[values.DecisionKind]
@@ -206,7 +203,6 @@ class ActiveVersionRow(Base):
 class ClaimRow(Base):
     """The worker that has a machine's new logs in hand, until its lease ends."""
 
-    __tablename__ = "claim"
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
     token: Mapped[str]
     owner: Mapped[str]
@@ -217,7 +213,6 @@ class ClaimRow(Base):
 class ReopeningRow(Base):
     """A log is to be tested again; the number of these is the log's turn, from 0."""
 
-    __tablename__ = "reopening"
     id: Mapped[int] = mapped_column(primary_key=True)
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), index=True)
     reason: Mapped[str]
@@ -228,7 +223,6 @@ class ReopeningRow(Base):
 class AttemptRow(Base):
     """A worker began with a log."""
 
-    __tablename__ = "attempt"
     id: Mapped[int] = mapped_column(primary_key=True)
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), index=True)
     turn: Mapped[int]
@@ -240,7 +234,6 @@ class AttemptRow(Base):
 class OutcomeRow(Base):
     """What a log led to; one a log and turn, so that no log counts twice."""
 
-    __tablename__ = "outcome"
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     version_id: Mapped[int | None] = mapped_column(ForeignKey("version.id"))
@@ -255,7 +248,6 @@ class OutcomeRow(Base):
 class NoticeRow(Base):
     """The alarm of a log has been taken by the webhook."""
 
-    __tablename__ = "notice"
     log_id: Mapped[int] = mapped_column(primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
@@ -268,7 +260,6 @@ class OutboxRow(Base):
     next_at lies ahead too while a worker has it in hand; given_up_at: it is not tried any more.
     """
 
-    __tablename__ = "outbox"
     log_id: Mapped[int] = mapped_column(primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     refusals: Mapped[int]
@@ -281,7 +272,6 @@ class OutboxRow(Base):
 class AccessTokenRow(Base):
     """A token by its hash, what it allows, and who made it; the token itself is kept nowhere."""
 
-    __tablename__ = "access_token"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
     role: Mapped[values.Role]
@@ -298,7 +288,6 @@ class AccessTokenRow(Base):
 class AccessTokenEndRow(Base):
     """A token that is not taken any more."""
 
-    __tablename__ = "access_token_end"
     token_id: Mapped[int] = mapped_column(ForeignKey("access_token.id"), primary_key=True)
     made_by: Mapped[str]
     at: Mapped[datetime]
@@ -307,7 +296,6 @@ class AccessTokenEndRow(Base):
 class UploadRow(Base):
     """A log that was dropped on the page: its name there, and what identifies its content."""
 
-    __tablename__ = "upload"
     id: Mapped[str] = mapped_column(primary_key=True)
     file: Mapped[str]
     size: Mapped[int] = mapped_column(BigInteger)
@@ -323,7 +311,6 @@ class TaskRow(Base):
     token: of the worker's claim; share: done, 0 to 1; said: why it failed, or what came of it.
     """
 
-    __tablename__ = "task"
     id: Mapped[int] = mapped_column(primary_key=True)
     upload: Mapped[str] = mapped_column("upload_id", ForeignKey("upload.id"), index=True)
     kind: Mapped[values.TaskKind]
@@ -348,7 +335,6 @@ class TaskRow(Base):
 class AuditRow(Base):
     """A change that somebody made through the page or of its tokens: who, what, to what."""
 
-    __tablename__ = "audit"
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
     made_by: Mapped[str]
@@ -365,7 +351,6 @@ class MachineNowRow(Base):
     values over the last logs.
     """
 
-    __tablename__ = "machine_now"
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
     state: Mapped[values.MachineCondition]
     heard_at: Mapped[datetime | None]
@@ -383,6 +368,5 @@ class MachineNowRow(Base):
 class MachineTrendRow(Base):
     """A machine's parameters over its last logs: name, then a value a log."""
 
-    __tablename__ = "machine_trend"
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
     trend: Mapped[Document]

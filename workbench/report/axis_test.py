@@ -61,7 +61,6 @@ def axis_view(test: AxisTest) -> View:
             listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
             listed((f"note: {line}" for line in test.remarks), most=4),
         ],
-        lambda: axis_document(test),
         {"axis_test.json": lambda: axis_document(test)},
         lambda: _sections(test),
         lambda: axis_charts(test)[0],

@@ -6,11 +6,11 @@ from typing import Any
 
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import shown
-from workbench.cards.readable import as_shown, in_digits, number, shown_unit
+from workbench.cards.readable import number, shown_unit
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
-from workbench.report.model_tables import not_identified
-from workbench.report.trace_tables import errors_table, logs_of_trace
+from workbench.report.model_tables import estimate_cells, not_identified
+from workbench.report.trace import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation import (
     error_cells,
@@ -113,13 +113,10 @@ def _effects(found: Demonstration) -> list[Row]:
 
 def _beside(e: Estimate, true: str) -> Row:
     """Value, unit and interval of an estimate, and the truth."""
-    e = as_shown(e)
-    unit = "" if e.unit == "1" else e.unit
-    if e.value is None or e.low is None or e.high is None:
-        why = (e.reason or "no interval").partition(";")[0].partition(":")[0]
-        return ("-", unit, not_identified(why), true)
-    value, low, high = in_digits((e.value, e.low, e.high), e.value, e.sd)
-    return (value, unit, f"{low} to {high}", true)
+    value, unit, interval = estimate_cells(e, "")
+    if None in (e.value, e.low, e.high):
+        value, interval = "-", not_identified(interval.partition(";")[0].partition(":")[0])
+    return (value, "" if unit == "1" else unit, interval, true)
 
 
 def _true(value: float, unit: str) -> str:

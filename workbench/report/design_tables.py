@@ -8,7 +8,7 @@ from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import units_of
 from workbench.documents.drive import equation_lines, force_lines
 from workbench.output import Row
-from workbench.report.view import notes, texts_of
+from workbench.report.view import notes
 from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import COMPENSATED, takes_compensator
@@ -79,14 +79,8 @@ def _margins(one: Controller) -> Row:
 
 def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    return texts_of(design_parts(found, rotary))
-
-
-def other_lines(found: Design) -> list[str]:
-    """The figures of the other controllers, and of the present one, beside the recommended."""
-    why = found.recommendation.why if found.recommendation else ""
-    others = other_figures(why)
-    return [others] if found.recommended != "none" and others else []
+    every = [one if isinstance(one, Part) else listed([one]) for one in design_parts(found, rotary)]
+    return [str(line) for one in every if not one.full_head for line in one.whole]
 
 
 def loop_lines(found: Design, rotary: bool = False) -> list[str]:
@@ -200,15 +194,6 @@ def _unit_over(over: str, rotary: bool) -> str:
     return {"place": f" {units.position}", "load": f" {units.force}"}.get(over, "")
 
 
-def missed_lines(found: Design) -> list[str]:
-    """The goals that each controller misses."""
-    return [
-        f"{name.upper()} misses: {missed}"
-        for name, one in found.controllers.items()
-        for missed in one.missed
-    ]
-
-
 def design_sentence(found: Design) -> str:
     """Which controller, and what speaks for it, in one or two sentences."""
     lacks = of_the_model(found.lacks)
@@ -252,33 +237,26 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
     return out
 
 
-def polynomial_lines(found: Design) -> list[str]:
-    """The coefficients, in ascending powers of z^-1."""
-    return [
-        f"{name.upper()} {letter}: [{', '.join(f'{v:.7g}' for v in getattr(one, letter))}]"
-        for name, one in found.controllers.items()
-        for letter in "RST"
-    ]
-
-
 def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
     """The margins, what the design rests on, and remarks; behind --verbose also the plant and the
     other controllers' ramps."""
     chosen = None if found.recommended == "none" else found.recommended
+    others = other_figures(found.recommendation.why) if chosen and found.recommendation else ""
+    missed = [(name, one) for name, each in found.controllers.items() for one in each.missed]
     ramps = [f"{name.upper()}: {one.note}" for name, one in found.controllers.items() if one.note]
     return [
         margins_table(found),
         MARGINS_SAID,
         drive_table(found),
         FREQUENCIES_SAID,
-        listed(other_lines(found)),
+        listed([others] if others else []),
         more(FIGURES_SAID),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),
         listed(schedule_lines(found, rotary)),
         *map(more, schedule_rows(found, rotary)),
         listed(f"no {name.upper()}: {why}" for name, why in found.refused.items()),
-        listed(missed_lines(found)),
+        listed(f"{name.upper()} misses: {one}" for name, one in missed),
         instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),
         notes(found.remarks),
     ]

@@ -45,7 +45,6 @@ def drift_view(found: Drifted, model_name: str) -> View:
         f"Drift test of {found.model.card}",
         drift_sentence(found),
         drift_parts(found),
-        lambda: drift_document(found, model_name),
         {"drift.json": lambda: drift_document(found, model_name)},
         lambda: _sections(found),
         lambda: drift_chart(found, (_judged(found) or found.tests)[-1]),
@@ -191,17 +190,14 @@ def _all_that_moved(test: DriftTest) -> str:
     if not test.found_by:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = [_from_to(one) for one in _as_in_table(test)]
+    moved = []
+    for one in _as_in_table(test):
+        unit, factor = shown_unit(one.unit)
+        before, after = (number(factor * value, 4) for value in (one.before, one.after))
+        moved.append(f"{one.name} {before} -> {after} {unit}")
     if test.unsure:
         moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
-
-
-def _from_to(shift: Shift) -> str:
-    """A parameter before and after, in the unit in which tables show it."""
-    unit, factor = shown_unit(shift.unit)
-    before, after = (number(factor * value, 4) for value in (shift.before, shift.after))
-    return f"{shift.name} {before} -> {after} {unit}"
 
 
 def _percent(value: float) -> str:
@@ -258,8 +254,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = [_shift_row(shift) for shift in one.test.shifts.values()]
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
-    once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
-    return tabled(head, once, right=(1, 2), whole=rows)
+    return tabled(head, reasons_once(rows, logs, (4, 3, 5)), right=(1, 2), whole=rows)
 
 
 def _shift_row(shift: Shift) -> Row:
@@ -332,9 +327,3 @@ def drift_parts(found: Drifted) -> list[Part | str]:
         instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True),
         notes(found.remarks, logs),
     ]
-
-
-def _swapped(row: Row) -> Row:
-    """A row of `shift_table` with the unit after the change, as `reasons_once` has it; or back."""
-    first, second = row[3:5]
-    return (*row[:3], second, first, *row[5:])

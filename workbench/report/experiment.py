@@ -109,13 +109,13 @@ def experiment_view(found: Experiment) -> View:
             more(listed(search_lines(found))),
             notes(found.remarks),
         ],
-        lambda: experiment_document(found),
         {
             "reference.csv": lambda: reference_text(found),
             "experiment.json": lambda: experiment_document(found),
         },
         lambda: _sections(found),
         lambda: run_chart(found),
+        content=lambda: experiment_document(found),
     )
 
 

@@ -114,24 +114,27 @@ WHAT_TO_DO = re.compile(r"(: (the logs|not identifiable)[a-z ]*)?; .*")
 INSIGNIFICANT = "not significantly different from 0"
 
 
-def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
+def reasons_once(
+    rows: Iterable[Row], logs: Iterable[str], columns: tuple[int, int, int] = (1, 2, 3)
+) -> list[Row]:
     """Rows of parameters for one screen: those that are not identified for the same reason in one
     row, without the reason's advice.
 
-    value: column of the value, before those of the unit and of the interval or reason.
+    columns: of the value, of its unit, and of its interval or the reason.
     """
+    value, unit, reason = columns
     groups: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        key = (row[0],) if row[value] != "-" else ("", _short(row[value + 2], logs))
+        key = (row[0],) if row[value] != "-" else ("", _short(row[reason], logs))
         groups.setdefault(key, []).append(row)
     out = []
-    for (name, *reason), alike in groups.items():
-        row, units = alike[0], {one[value + 1] for one in alike}
+    for (name, *why), alike in groups.items():
+        cells, units = [*alike[0]], {one[unit] for one in alike}
         if not name:
-            unit = units.pop() if len(units) == 1 else ""
-            names, rest = ", ".join(one[0] for one in alike), [""] * (len(row) - value - 3)
-            row = (names, *row[1:value], "-", unit, *reason, *rest)
-        out.append(row)
+            cells[0] = ", ".join(one[0] for one in alike)
+            cells[unit] = units.pop() if len(units) == 1 else ""
+            cells[reason:] = [*why, *[""] * (len(cells) - reason - 1)]
+        out.append(tuple(cells))
     return out
 
 
@@ -175,8 +178,7 @@ def _found(model: Model, missing: float | None) -> str:
     if model.resonance is not None:
         hertz = number(used(model.resonance["frequency"]), 4)
         return f"{text} Two masses with a spring between them swing at {hertz} Hz."
-    by_equation = all(e.position_rms is None for e in model.log)
-    if by_equation and missing is not None and missing <= MATERIAL:
+    if model.by_equation and missing is not None and missing <= MATERIAL:
         times_noise = times(model.fit.chi_square**0.5)
         return f"{text} The equation of motion leaves {times_noise} the sensors' noise."
     if to_the_noise_by_equation(model):
@@ -213,7 +215,7 @@ def _off(model: Model) -> float | None:
 
 def to_the_noise_by_equation(model: Model) -> bool:
     """Whether the equation of motion answers for a model, and leaves hardly more than noise."""
-    return all(e.position_rms is None for e in model.log) and model.fit.chi_square <= ADEQUATE
+    return model.by_equation and model.fit.chi_square <= ADEQUATE
 
 
 def fit_lines(model: Model) -> list[str]:

@@ -63,15 +63,13 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
         "Prediction",
         first,
         [*more, notes(remarks, (Path(log).name,))],
-        lambda: found.summary,
-        {
-            "prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10),
-        },
+        {"prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10)},
         sections,
         lambda: prediction_chart(found, rotary),
         step=after_predict("LOG", "CARD"),
         has_page=False,
         lead=first.rstrip(".") + ".",
+        content=lambda: found.summary,
     )
 
 

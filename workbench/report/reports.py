@@ -26,7 +26,6 @@ from workbench.report.design_tables import (
     drive_lines,
     drive_table,
     margins_table,
-    polynomial_lines,
 )
 from workbench.report.fit import fit_chart, residual
 from workbench.report.friction import friction_curve
@@ -46,8 +45,7 @@ from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
 from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
-from workbench.steps.predict import fitted_run
-from workbench.steps.predicted_force import missing_force
+from workbench.steps.predict import fitted_run, missing_force
 
 
 def identified_view(found: Identified) -> View:
@@ -74,7 +72,6 @@ def identified_view(found: Identified) -> View:
         f"Identification of {model.card}",
         summary(model, missing),
         model_parts(model, found.remarks),
-        lambda: model_document(model),
         {"model.json": lambda: model_document(model)},
         sections,
         lambda: fit_chart(model, sources, runs()),
@@ -104,7 +101,6 @@ def design_view(found: Design, rotary: bool = False) -> View:
         f"Design for {found.card}",
         design_sentence(found),
         [*design_parts(found, rotary), *map(more, drive_lines(found, chosen))],
-        lambda: design_document(found),
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
@@ -134,9 +130,14 @@ def controllers(found: Design, rotary: bool = False) -> Section:
 
 
 def program_sections(found: Design) -> tuple[Section, Section]:
-    """The polynomials, for whoever programs the controller, and the same as difference equations,
-    in the unit that the drive takes."""
-    text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
+    """The polynomials in ascending powers of z^-1, for whoever programs the controller, and the
+    same as difference equations, in the unit that the drive takes."""
+    polynomials = [
+        f"{name.upper()} {letter}: [{', '.join(f'{v:.7g}' for v in getattr(one, letter))}]"
+        for name, one in found.controllers.items()
+        for letter in "RST"
+    ]
+    text = [*polynomials, "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
     return Section("Coefficients", text), Section("As the drive runs it", drive_lines(found))
 
 

@@ -156,7 +156,6 @@ def response_view(found: Responded) -> View:
         f"Frequency response of {found.card}",
         response_sentence(found),
         [peak_table(found), listed(lines), notes(found.remarks, logs)],
-        lambda: response_document(found),
         {
             "response.json": lambda: response_document(found),
             "response.csv": lambda: response_frame(found).to_csv(index=False, float_format="%.7g"),

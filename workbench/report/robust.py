@@ -140,7 +140,6 @@ def robust_view(found: Robust, rotary: bool) -> View:
             listed(choice_lines(found, rotary)),
             notes((*found.missed, *found.remarks)),
         ],
-        lambda: robust_document(found),
         {
             "design.json": lambda: design_document(found.design),
             "robust.json": lambda: robust_document(found),
@@ -148,6 +147,7 @@ def robust_view(found: Robust, rotary: bool) -> View:
         lambda: _sections(found, rotary),
         lambda: robust_chart(found, rotary),
         step=after_robust(found, Path("MODEL"), Path()),
+        content=lambda: robust_document(found),
     )
 
 

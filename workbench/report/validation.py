@@ -48,8 +48,11 @@ def validation_view(
     """Whether the design holds in simulation, and what the loop does."""
 
     def sections() -> Sequence[Section]:
-        places = dict.fromkeys(place for _, place in traces)
-        drawn = [one for place in places for one in _loop(found, traces, place, rotary)]
+        drawn = list[Section]()
+        for place in dict.fromkeys(place for _, place in traces):
+            on = "the identified plant" if place == "model" else "the other plant"
+            steps = Section(f"Steps on {on}", _step_chart(found, traces, place, rotary))
+            drawn += [steps, Section(f"Error on {on}", _error_chart(found, traces, place, rotary))]
         lines = validation_lines(found, rotary)
         verdict = Section("Verdict", validation_table(found, rotary), lines)
         return (*drawn[:1], verdict, *drawn[1:])
@@ -58,7 +61,6 @@ def validation_view(
         f"Validation for {found.card}",
         validation_sentence(found),
         validation_parts(found, rotary),
-        lambda: validation_document(found),
         {"validation.json": lambda: validation_document(found)},
         sections,
         lambda: _step_chart(found, traces, "model", rotary),
@@ -70,21 +72,16 @@ def validation_view(
 
 def validation_table(found: Validation, rotary: bool = False) -> Part:
     """A row a controller and plant."""
-    alone = len(found.figures[found.judged]) == 1
+    alone, units, one = len(found.figures[found.judged]) == 1, shown(rotary), _any(found)
+    command = () if one.command_peak is None else (f"command {one.command_unit}",)
+    figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
+    head = ("loop", *(() if alone else ("on",)), *figures, f"force {units.force}", *command)
     rows = [
-        (loop_name(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        (loop_name(name), *(() if alone else (place,)), *_row(one, units))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
-    return tabled(_head(found, rotary), rows, right=())
-
-
-def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
-    units, one = shown(rotary), _any(found)
-    where = ("on",) if len(found.figures[found.judged]) > 1 else ()
-    command = () if one.command_peak is None else (f"command {one.command_unit}",)
-    figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
-    return ("loop", *where, *figures, f"force {units.force}", *command, "limit cycle")
+    return tabled((*head, "limit cycle"), rows, right=())
 
 
 def _any(found: Validation) -> LoopFigures:
@@ -184,17 +181,6 @@ def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str
         *(more(listed(_missed(found, name))) for name in found.figures),
         columns_line(found, rotary),
         notes(found.remarks),
-    ]
-
-
-def _loop(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
-) -> list[Section]:
-    """The loop on one plant, all controllers over each other: after steps, then where they rest."""
-    on = "the identified plant" if place == "model" else "the other plant"
-    return [
-        Section(f"Steps on {on}", _step_chart(found, traces, place, rotary)),
-        Section(f"Error on {on}", _error_chart(found, traces, place, rotary)),
     ]
 
 

@@ -76,8 +76,10 @@ def _summary(model: VelocityModel) -> str:
 
 def _valve(model: VelocityModel) -> Part:
     """The numbers: value, unit, 95 % interval (or why there is none), at length what each is."""
-    every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
-    rows = [(key, *estimate_cells(one), VALVE_MEANING.get(key, "")) for key, one in every.items()]
+    rows = [
+        (key, *estimate_cells(one), VALVE_MEANING.get(key, ""))
+        for key, one in model.numbers.items()
+    ]
     short = tabled(MODEL_HEAD, [row[:4] for row in rows], whole=rows)
     return replace(short, whole_head=(*MODEL_HEAD, "meaning"))
 
@@ -119,8 +121,7 @@ def velocity_view(
                 sentence = f"Passed: the loop meets every limit on {many} plants."
             files = {"validation.json": partial(velocity_validation_document, found)}
             parts, sections = [loops], [Section("The loop", loops)]
-    content = next(iter(files.values()))
-    return View(f"{what} {model.card}", sentence, parts, content, files, lambda: sections)
+    return View(f"{what} {model.card}", sentence, parts, files, lambda: sections)
 
 
 def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
@@ -188,9 +189,9 @@ def velocity_prediction_view(
         "Prediction",
         f"position by the command alone{anew}: within {off} rms, {worst} at most",
         [],
-        lambda: summary,
         {"prediction.csv": lambda: velocity_csv(runs)},
         has_page=False,
+        content=lambda: summary,
     )
 
 

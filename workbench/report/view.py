@@ -15,7 +15,7 @@ from workbench.output import OutputFolder, dumps, emit, next_step, written
 from workbench.remarks import Merged, merged, printed_once
 from workbench.report.chart import Chart, chart_assets, chart_html
 from workbench.report.templating import render, safe, used_symbols
-from workbench.screen import Part, Screen, instead, listed, screen
+from workbench.screen import Part, Screen, instead, screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,12 +69,6 @@ def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str]
     )  # fmt: skip
 
 
-def texts_of(parts: Iterable[Part | str]) -> list[str]:
-    """All lines of the parts, as --verbose prints them, tables left out."""
-    every = [one if isinstance(one, Part) else listed([one]) for one in parts]
-    return [str(line) for one in every if not one.full_head for line in one.whole]
-
-
 MOST_NOTES = 6
 
 
@@ -103,8 +97,9 @@ class View:
     """A result: what was found in a sentence, what is advised next, and what stands below.
 
     parts: tables, lines and notes in their order. sections, chart: of the page, and the main
-    picture, drawn when they are asked for. content: the document by which other programs read it;
-    files: what the command writes, by name, a text or a document, and the page where it has_page.
+    picture, drawn when they are asked for. files: what the command writes, by name, a text or a
+    document, and the page where it has_page. content: the document by which other programs read it,
+    where it is not the first of the files.
     step: what to type next, which its command says with the names of the files at hand.
     lead: of the page, where that is another sentence.
     """
@@ -112,19 +107,20 @@ class View:
     title: str
     sentence: str
     parts: Sequence[Part | str]
-    content: Callable[[], Mapping[str, Any]]
-    files: Mapping[str, Callable[[], object]]
+    files: Mapping[str, Callable[[], Any]]
     sections: Callable[[], Sequence[Section]] = tuple
     chart: Callable[[], Chart] | None = None
     then: Sequence[str] = ()
     step: Step | None = None
     has_page: bool = True
     lead: str = ""
+    content: Callable[[], Mapping[str, Any]] | None = None
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
         """The result as plain values."""
-        return self.content()
+        made: Mapping[str, Any] = (self.content or next(iter(self.files.values())))()
+        return made
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -167,21 +163,19 @@ class View:
         return chart_figure(self.chart())
 
     def write(self, folder: OutputFolder, page_name: str = REPORT_FILE) -> None:
-        """Write the files of the result."""
         for name, content in self.files.items():
             made = content()
             folder.write_text(name, made if isinstance(made, str) else dumps(made) + "\n")
         if self.has_page:
             folder.write_text(page_name, self.page())
 
+    def show(self, folder: Path, then: Step | None = None, **more: object) -> None:
+        """Print the result that lies in the folder: as JSON, with `more` in it, or on one screen.
+
+        then: the command to type next.
+        """
+        emit({**self.document, **more, "out": folder}, lambda: self.screen(folder), then)
+
     @property
     def _then(self) -> list[str]:
         return [*self.then, *([f"`{self.step.command}` ({self.step.why})"] if self.step else ())]
-
-
-def show(view: View, folder: Path, then: Step | None = None, **more: object) -> None:
-    """Print a result that lies in the folder: as JSON, with `more` in it, or on one screen.
-
-    then: the command to type next.
-    """
-    emit({**view.document, **more, "out": folder}, lambda: view.screen(folder), then)

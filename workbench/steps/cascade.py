@@ -90,7 +90,6 @@ def cascade_controller(
     rst, gains = tuned.rst, tuned.gains
     ahead = feed_forward(model, force)
     rate, acceleration = reference_limits(model, force, ahead)
-    notes = [f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"]
     at = loop_frequencies(plant.A, plant.B, rst)
     return Controller(
         R=tuple(rst.R.tolist()),
@@ -104,7 +103,7 @@ def cascade_controller(
         lag=0.0,
         overshoot=0.0,
         missed=tuned.missed,
-        note="; ".join(notes),
+        note=f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)",
         W=drive_law(rst, gains.T_n).W,
         cascade=gains,
         series=tuned.series,

@@ -33,7 +33,6 @@ from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
 from workbench.steps.clear_win import CLEARLY_LESS
 from workbench.steps.identify import check_period
-from workbench.steps.lacking import lacking
 from workbench.steps.linear_loop import (
     command_of,
     corners,
@@ -270,7 +269,7 @@ def _design_of(
         versions=versions(),
         command=command_of(model, force),
         present=model.present,
-        lacks=lacking(model),
+        lacks=model.lacks,
     )
 
 

@@ -16,7 +16,7 @@ from identification.signals.differentiate import differentiate
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import dead_time
-from workbench.steps.predicted_force import refuse_missing
+from workbench.steps.predict import refuse_missing
 
 LINEAR_EFFECTS = frozenset({"compliance", "input_delay"})  # they stay in the response
 RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest

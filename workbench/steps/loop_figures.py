@@ -246,22 +246,15 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> Iterator[str
         samples = result.margins.delay_samples
         if samples is not None and not (samples >= limits.delay):
             yield f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed"
-    if not (result.standstill_relative <= limits.standstill):
-        yield (
-            f"error at standstill {length(result.standstill, machine.rotary)},"
-            f" {100 * result.standstill_relative:.1f} % of the step, at most"
-            f" {100 * limits.standstill:g} % allowed"
-        )
-    if not (result.smooth_relative <= limits.tracking):
-        yield (
-            f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
-            f" amplitude, at most {100 * limits.tracking:g} % allowed"
-        )
-    if not (result.overshoot <= limits.overshoot):
-        yield (
-            f"overshoot {100 * result.overshoot:.1f} % of the step, at most"
-            f" {100 * limits.overshoot:g} % allowed"
-        )
+    standstill = f"error at standstill {length(result.standstill, machine.rotary)},"
+    for what, share, of, allowed in (
+        (standstill, result.standstill_relative, "the step", limits.standstill),
+        ("error along the smooth reference", result.smooth_relative, "its amplitude",
+         limits.tracking),
+        ("overshoot", result.overshoot, "the step", limits.overshoot),
+    ):  # fmt: skip
+        if not (share <= allowed):
+            yield f"{what} {100 * share:.1f} % of {of}, at most {100 * allowed:g} % allowed"
     units, seen = shown(machine.rotary), result.force_seen
     if seen > 0 and not (result.force_peak <= limits.force * seen):
         yield (

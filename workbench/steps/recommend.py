@@ -119,11 +119,14 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
     taken = name + (COMPENSATED if compensator else "")
     every = (*DESIGNED_STRUCTURES, name + COMPENSATED, PRESENT)
     others = [other for other in every if other in figures and other != taken]
-    one = figures[taken]
+    one, most = figures[taken], ""
+    if one.force_limit is not None:
+        most = f" of {one.force_limit:.3g}"
     said = (
         f"{called(taken)}: static error {_rest(one, units)} of the step, settling"
         f" time {settling_words(one)}, tracking error {percent(one.smooth_relative)} on the smooth"
-        f" reference, peak force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
+        f" reference, peak force {one.force_peak:.3g}{most} {units.force}, modulus margin"
+        f" {_modulus(one):.2f}"
     )
     beside = [
         f"{called(other)}: {_rest(it, units)}, {settling_words(it)},"
@@ -255,8 +258,3 @@ def in_thousandths(length: float, units: Shown) -> tuple[float, str]:
 def percent(share: float) -> str:
     """A share with two digits; a hundredth of a percent is the least that is printed."""
     return f"{100 * share:.2g} %" if share >= 1e-4 else "< 0.01 %"
-
-
-def _force(one: LoopFigures, units: Shown) -> str:
-    most = "" if one.force_limit is None else f" of {one.force_limit:.3g}"
-    return f"{one.force_peak:.3g}{most} {units.force}"

@@ -37,7 +37,7 @@ from workbench.steps.linear_force import (
     stiffness_of,
 )
 from workbench.steps.linear_loop import dead_time, law_to_force
-from workbench.steps.predicted_force import with_applied_force
+from workbench.steps.predict import with_applied_force
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import actuator_units
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
-from identification.tracing.result import FoundEffect, FreeCurve, Trace
+from identification.tracing.result import FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
@@ -181,6 +181,11 @@ def trace_document(traced: Traced) -> dict[str, Any]:
          "p_value": e.p_value, "probability": e.probability}
         for e in found.effects
     ]  # fmt: skip
+    curves = [
+        {"key": one.effect, "equation": one.equation, "signal": one.signal,
+         **{name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}}
+        for one in found.curves
+    ]  # fmt: skip
     document: dict[str, Any] = plain(
         {
             "schema": TRACE_SCHEMA,
@@ -196,7 +201,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             "constant_force": force["F_0"] if force and shown else None,
             "lag": model.lag,
             "resonance": model.resonance,
-            "curves": [_curve(one) for one in found.curves],
+            "curves": curves,
             "rivals": list(found.rivals),
             "unknown": {
                 "depends_on": list(found.unknown.depends_on),
@@ -218,9 +223,3 @@ def trace_document(traced: Traced) -> dict[str, Any]:
         }
     )
     return document
-
-
-def _curve(one: FreeCurve) -> dict[str, Any]:
-    """A free curve and its law, an array each as a list."""
-    lists = {name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}
-    return {"key": one.effect, "equation": one.equation, "signal": one.signal, **lists}

@@ -15,7 +15,6 @@ from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.closed_loop import effects_left_out, scheduled_loop
 from workbench.steps.elastic import with_resonance
-from workbench.steps.lacking import lacking
 from workbench.steps.loop_figures import (
     ALMOST,
     COMPENSATED,
@@ -111,7 +110,7 @@ def validate(
         versions=versions(),
         why=reasons(alone, with_it, first, shown(model.rotary)),
         design=design_digest(found),
-        lacks=found.lacks or lacking(model),
+        lacks=found.lacks or model.lacks,
     ), traces
 
 

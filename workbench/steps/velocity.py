@@ -40,7 +40,6 @@ class VelocityTraced:
 
 
 def logs_of_runs(sources: Sources) -> list[Log]:
-    """The logs of the runs."""
     return [source.log for source in sources.runs]
 
 

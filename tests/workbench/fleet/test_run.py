@@ -26,7 +26,6 @@ from workbench.fleet.cluster import Cluster, Work, cluster_at, local_cluster
 from workbench.fleet.run import (
     LEASE,
     FleetRun,
-    FleetSettings,
     InRegistry,
     NoRegistry,
     Recorder,
@@ -65,8 +64,8 @@ def run(
     card: str = "card",
 ) -> Report:
     with ResultStore(folder) as store:
-        settings = FleetSettings("/nowhere", card)
-        return FleetRun(cluster, store, recorder or NoRegistry(), settings, clock, work=work)(logs)
+        keep = recorder or NoRegistry()
+        return FleetRun(cluster, store, keep, "/nowhere", clock, card, work=work)(logs)
 
 
 def verdicts(folder: Path) -> dict[str, str]:
@@ -134,8 +133,9 @@ def test_a_worker_killed_from_outside(cluster: Cluster, tmp_path: Path) -> None:
             os.kill(pids[0], signal.SIGKILL)
 
     with ResultStore(tmp_path) as store:
-        settings = FleetSettings("/nowhere", "card")
-        found = FleetRun(cluster, store, NoRegistry(), settings, clock, work=slow, advance=advance)
+        found = FleetRun(
+            cluster, store, NoRegistry(), "/nowhere", clock, "card", work=slow, advance=advance
+        )
         done = found([*LOGS, *(log_of(f"n{number}") for number in range(6))])
     assert killed
     assert done.verdicts == {"identified": 12}
@@ -213,9 +213,7 @@ def test_a_result_against_a_version_that_is_gone_is_left(registry: Registry) -> 
 
 def test_logs_without_any_card_are_refused(cluster: Cluster, tmp_path: Path) -> None:
     with ResultStore(tmp_path / "out") as store:
-        found = FleetRun(
-            cluster, store, NoRegistry(), FleetSettings(str(tmp_path)), clock, work=answer
-        )
+        found = FleetRun(cluster, store, NoRegistry(), str(tmp_path), clock, work=answer)
         with pytest.raises(BadLogs, match=r"no card.toml .* --card"):
             found(LOGS)
 

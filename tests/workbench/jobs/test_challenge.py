@@ -1,7 +1,7 @@
 """Who wins and who does not, on held-out logs and in the loop, each with its reason."""
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of, short_recipe
-from workbench.jobs.challenge import Contender, Contest, Terms, challenge, contest_document
+from workbench.jobs.challenge import Contender, Contest, Terms, challenge
 from workbench.steps.simulate import record
 
 ACTUATOR = Actuator(19530.0, 10405.0)
@@ -49,7 +49,7 @@ def test_the_model_of_the_machine_as_it_is_wins() -> None:
     assert new.position_rms < 0.1 * old.position_rms
     units = r"held out: free run [\d.]+ (mm|µm) rms against [\d.]+ mm, force [\d.]+ N rms against"
     assert re.match(units + r" [\d.]+ N; simulation: tracking error [\d.]+ mm rms", found.reason)
-    document = contest_document(found)
+    document = asdict(found)
     assert document["won"] is True
     assert document["held_out"]["challenger"]["position_rms"] == new.position_rms
 

@@ -40,7 +40,7 @@ class Page:
         self.where = str(folder / "r.db")
         self.registry = Registry(self.where)
         self.access = Access(self.registry.database)
-        self.settings = PageSettings(self.where, str(self.root), **settings)
+        self.settings = PageSettings(self.where, self.root, **settings)
         self.client = TestClient(
             application(self.settings, Here()), base_url="http://localhost", follow_redirects=False
         )

@@ -38,7 +38,7 @@ def work(where: str, root: str, *, once: bool = False) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     patched: Any = worker
     patched.done, patched.TASK_LEASE, patched.QUEUE_POLL = quick, LEASE, LOOKS_EVERY
-    settings = PageSettings(where, root)
+    settings = PageSettings(where, Path(root))
     worker.run_worker(settings, lambda event, **details: None, once=once)
 
 

@@ -66,7 +66,7 @@ def test_work_ends_where_nothing_waits(tmp_path: Path) -> None:
 
 def test_settings_reach_the_servers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("WORKBENCH_PAGE", "")
-    given = PageSettings("r.db", "m", names=("a", "b"), prefix="/x", silent_days=2.5)
+    given = PageSettings("r.db", Path("m"), names=("a", "b"), prefix="/x", silent_days=2.5)
     hand_over(given)
     assert handed_over() == given
     assert {"localhost", "a", "b"} <= given.hosts

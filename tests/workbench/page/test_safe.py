@@ -43,7 +43,7 @@ def test_a_token_is_kept_as_its_hash_and_told_once(where: str) -> None:
 
 
 def test_reading_is_open_or_by_token_and_changing_by_its_role(tmp_path: Path) -> None:
-    closed = Page(tmp_path, open_reading=False)
+    closed = Page(tmp_path, reading="token")
     with closed.client as client:
         reader, changer = closed.token("r", "read"), closed.token("c", "change")
         assert client.get("/").status_code == 401
@@ -160,7 +160,7 @@ def test_hosts_and_sizes(page: Page, tmp_path: Path) -> None:
     assert answer.status_code == 413
     folder = tmp_path / "small"
     folder.mkdir()
-    small = Page(folder, most_bytes=1000)
+    small = Page(folder, most_megabytes=0.001)
     with small.client as client:
         token = small.token("anna", "change")
         answer = client.post("/drop", headers=token, files={"log": ("a.csv", CSV * 200)})

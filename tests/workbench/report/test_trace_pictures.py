@@ -7,7 +7,7 @@ import pytest
 
 from identification.tracing.result import Residual
 from tests.workbench.trace_values import trace_of
-from workbench.report.missing_force import missing_chart, missing_over_time
+from workbench.report.fit import missing_chart, missing_over_time
 from workbench.report.trace_pictures import folded_at, pictures
 
 

@@ -20,7 +20,6 @@ def view() -> View:
         "A title",
         "It is so.",
         [TABLE, instead(["in short"], ["at length"]), more("beside"), notes(["one", "two"])],
-        lambda: {"schema": "x/1", "size": 1.0},
         {"x.json": lambda: {"schema": "x/1", "size": 1.0}, "x.csv": lambda: "t\n0\n"},
         lambda: [Section("Sizes", TABLE, ["a line"]), Section("More", "<p>more</p>")],
         lambda: Chart("x", "a line", [Panel("t [s]", "y [m]", [Line("y", X, X)])]),

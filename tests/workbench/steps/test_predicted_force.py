@@ -12,7 +12,7 @@ from identification.model.karnopp import Karnopp
 from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.documents.model import Model
-from workbench.steps.predicted_force import force_by_model, seen_moving
+from workbench.steps.predict import force_by_model, seen_moving
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
 

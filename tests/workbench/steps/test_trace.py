@@ -31,7 +31,14 @@ from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
 from workbench.report.friction import sliding_friction
-from workbench.report.trace import traced_view
+from workbench.report.trace import (
+    changes_table,
+    differences_table,
+    effects_table,
+    errors_table,
+    rivals_table,
+    traced_view,
+)
 from workbench.report.trace_pictures import (
     axis_of,
     effect_at_rows,
@@ -39,13 +46,6 @@ from workbench.report.trace_pictures import (
     pictures,
     running_median,
     share_inside,
-)
-from workbench.report.trace_tables import (
-    changes_table,
-    differences_table,
-    effects_table,
-    errors_table,
-    rivals_table,
 )
 from workbench.report.trace_words import percent, trace_sentence
 from workbench.steps import trace as tracing

@@ -21,7 +21,6 @@ from workbench.output import dumps
 from workbench.report.chart import Chart
 from workbench.report.design_tables import design_sentence
 from workbench.report.validation import validation_sentence, validation_view
-from workbench.steps.lacking import lacking
 from workbench.steps.loop_figures import PRESENT, LoopFigures, references
 from workbench.steps.loop_motion import LimitCycle, limit_cycle, worst_rest
 from workbench.steps.recommend import compared
@@ -165,7 +164,7 @@ def test_what_a_model_lacks_comes_first(changes: dict[str, Any], words: str) -> 
     poor = replace(model, fit=replace(model.fit, **changes))
     found = designed(poor, period=5e-3)
     result, _ = validate(poor, found, np.random.default_rng(0))
-    said = (lacking(poor), design_sentence(found), validation_sentence(result))
+    said = (poor.lacks, design_sentence(found), validation_sentence(result))
     first = words[:1].upper() + words[1:]
     assert said[0].startswith(words) and bool(said[0]) is bool(words)
     assert all(one.startswith(first) for one in said[1:])
@@ -177,6 +176,6 @@ def test_a_model_that_no_free_run_follows_is_told_as_such() -> None:
     model, _ = seen()
     log = replace(model.log[0], position_rms=None)
     alone = replace(model, fit=replace(model.fit, adequate=False, chi_square=1.0), log=(log,))
-    assert lacking(alone) == (
+    assert alone.lacks == (
         "no free run of the model follows its logs, its equation of motion alone does"
     )

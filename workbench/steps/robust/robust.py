@@ -16,7 +16,6 @@ from workbench.documents.reading import versions
 from workbench.steps.asked import RobustAsked as RobustAsked
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
-from workbench.steps.lacking import lacking
 from workbench.steps.loop_figures import PRESENT, references
 from workbench.steps.robust.outcomes import (
     MEASURES,
@@ -209,8 +208,8 @@ def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
             f"widened by the drift between the machine's models: {len(wanted.drift)} parameters, at"
             f" most {100 * wanted.drift[widest]:.2g} % a step ({widest})"
         )
-    if lacks := lacking(model):
-        out.append(f"{lacks}: the machine is not among those drawn")
+    if model.lacks:
+        out.append(f"{model.lacks}: the machine is not among those drawn")
     return out
 
 
