@@ -42,13 +42,14 @@ class Log:
     `y` position [m], `F` applied force F_e [N], `u` command [V, or the
     rig's command_unit], `r` reference [m]; any further
     name is a signal that effects may use. lost (n,): rows that the logger has lost, whose values
-    lie between those of their neighbours. Arrays are read-only copies. Raises BadLog where the
-    lengths differ or `t` is missing.
+    lie between those of their neighbours. held: F is a zero-order hold, constant from each row to
+    the next. Arrays are read-only copies. Raises BadLog where the lengths differ or `t` is missing.
     """
 
     name: str
     signals: Mapping[str, Array]
     lost: BoolArray | None = None
+    held: bool = False
 
     def __post_init__(self) -> None:
         signals = {key: frozen(values) for key, values in self.signals.items()}

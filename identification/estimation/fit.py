@@ -180,7 +180,7 @@ def finished(
     # A motor's stops are searched already.
     hopeless = loose(found.plant, recorded.drive) and rough(found.outcomes)
     followed = found.misfit <= COMPLETE and not found.imposed
-    if not (quick or followed or recorded.held or hopeless):
+    if not (quick or followed or recorded.by_motor or hopeless):
         found = searched(found, recorded, search, report, SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)

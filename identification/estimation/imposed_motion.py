@@ -98,7 +98,7 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
         estimates=found,
         free=names,
         covariance=fit.covariance,
-        drive="command" if recorded.held else "force",
+        drive="command" if recorded.by_motor else "force",
         noise_y=noise_y,
         noise_F=noise_F,
         chi_square=float(np.mean(np.concatenate(squares))),

@@ -61,19 +61,24 @@ class RecordedLogs:
     remarks: tuple[str, ...] = ()
 
     @property
-    def held(self) -> bool:
+    def by_motor(self) -> bool:
         """Whether a motor drives them, whose force is that of its command."""
         return self.rig.kind == "motor"
 
     @property
+    def held(self) -> bool:
+        """Whether the force is a zero-order hold: a motor's, or one that the logs show to be so."""
+        return self.by_motor or any(one.held for one in self.logs)
+
+    @property
     def by_noisy_command(self) -> bool:
         """Whether a motor drives them whose command, and so its force, has noise of its own."""
-        return self.held and any(one.walks(self.drive) for one in self.logs)
+        return self.by_motor and any(one.walks(self.drive) for one in self.logs)
 
     @property
     def by_command(self) -> bool:
         """Whether an actuator's equation is fitted beside the mechanical one."""
-        return self.drive == "command" and not self.held
+        return self.drive == "command" and not self.by_motor
 
     @property
     def steps(self) -> bool:
@@ -82,13 +87,15 @@ class RecordedLogs:
 
     @property
     def command_period(self) -> float | None:
-        """Time [s] after which the loop gives its next command, None where it is the samples'."""
-        return period_of(self.share, self.logs[0].log.h)
+        """Time [s] after which the loop gives its next command, or for which a measured force is
+        held; None where it is the samples', and of a force that is not held."""
+        h = self.logs[0].log.h
+        return period_of(self.share, h) or (h if self.held and not self.by_motor else None)
 
     @property
     def instant_sd(self) -> float:
-        """Deviation [s] of the instants at which the force of these logs acts: of a motor's by the
-        share above, of a measured one as likely anywhere within half a sample of its row."""
+        """Deviation [s] of the instants at which the force of these logs acts: of a held one by the
+        share above, of another as likely anywhere within half a sample of its row."""
         h = self.logs[0].log.h
         return self.share_sd * h if self.held else unseen_lag(h)
 
@@ -117,8 +124,9 @@ class RecordedLogs:
     def record(self, log: Log) -> MotionLog:
         """Another log of the machine with its motion."""
         one = motion_log(
-            log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
-            imposed=self.imposed, between=unseen(log, self.share) if self.held else 0.0,
+            log, held=self.by_motor, by_command=self.by_command,
+            rotary=self.rig.motion == "rotary", imposed=self.imposed,
+            between=unseen(log, self.share) if self.by_motor or log.held else 0.0,
         )  # fmt: skip
         return replace(one, halt=self.halt)
 
@@ -133,9 +141,10 @@ class RecordedLogs:
 
 
 def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
-    """The logs at the rates that their motion needs; those with a command as they are: what it does
-    between its samples is in no mean, and makes other stops (`benchmarks/drives.py`, 4 kHz)."""
-    if rig.kind == "motor" or commanded(logs):
+    """The logs at the rates that their motion needs; those with a command or a held force as they
+    are: what it does between its samples is in no mean, and makes other stops
+    (`benchmarks/drives.py`, 4 kHz)."""
+    if rig.kind == "motor" or commanded(logs) or any(log.held for log in logs):
         return list(logs)
     return [at_needed_rate(log) for log in logs]
 
@@ -280,6 +289,6 @@ def left_share(found: Fitted, sd: Array, rate: Array) -> float:
 
 def led_by_rig(recorded: RecordedLogs) -> bool:
     """Whether the motion is prescribed by a rig, so that no run of its own is to be followed."""
-    if recorded.held or commanded(recorded.plain):
+    if recorded.by_motor or commanded(recorded.plain):
         return False
     return inertia_has_no_part(recorded.logs)

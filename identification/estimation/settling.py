@@ -20,15 +20,17 @@ from identification.estimation.estimates import (
     reported_estimate,
 )
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.breakaway import risen_to
+from identification.estimation.regression.breakaway import risen_to, usual_limits
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.parameters import even, names_of, values_of
 from identification.estimation.windowed_run.refinement import (
     Effort,
     Refit,
+    counts,
     refit,
 )
 from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED
+from identification.estimation.windowed_run.stick_search import stick_ranges
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     left_in_windows,
@@ -40,6 +42,7 @@ from identification.log import Log
 from identification.model.estimates import NORMAL_95, Drive, Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
+from identification.model.size import Size
 from identification.progress import Progress
 from identification.remarks import MinorRemark
 from identification.signals.initial_state import measured_start
@@ -56,6 +59,9 @@ OF_STEPS = 0.1
 # What stops that come and go, in steps of the likelihood, add to deviations over whole runs; for
 # the coverage on seeds 5000 to 5004 of benchmarks/nine_parameters.py.
 WALLS = 1.2
+# Deviation of a stick limit between two steps of a held force, of the step; and by a measured
+# one's noise, of it, in the shortest stretch that is smoothed.
+OF_A_STEP, OF_NOISE = 12.0**-0.5, 0.5
 
 NO_REST_WHY = (
     "{}: no rest that ends is seen in it, and the force changes between its samples; log starts"
@@ -166,9 +172,29 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
         _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
     )
     covariance = covariance + np.diag(between_samples_sd(near.names, values, recorded) ** 2)
+    if recorded.held and is_adequate(near.misfit):
+        covariance = _with_stick_ranges(covariance, near, recorded)
     if not np.all(np.isfinite(covariance)):
         covariance = np.diag(np.abs(values) ** 2)
     return np.asarray(covariance)
+
+
+def _with_stick_ranges(covariance: Array, near: Refit, recorded: RecordedLogs) -> Array:
+    """The covariance with the deviations of stick limits that a held force allows (d, d)."""
+    independent = len(set(counts(recorded.logs, recorded.drive).tolist()))
+    ranges = stick_ranges(near.plant, recorded.logs, recorded.drive, RUN_WINDOW, independent)
+    rise = usual_limits(recorded.logs, near.plant)[1]
+    unsure = (
+        [OF_A_STEP * rise]
+        if recorded.by_motor
+        else [OF_A_STEP * rise, OF_NOISE * recorded.noise[1]]
+    )
+    factor = np.ones(len(near.names))
+    for name, (low, high) in ranges.items():
+        i = near.names.index(name)
+        sd = float(np.linalg.norm([0.5 * (high - low) / NORMAL_95, *unsure]))
+        factor[i] = sd / np.sqrt(covariance[i, i])
+    return covariance * np.outer(factor, factor)
 
 
 def between_samples_sd(
@@ -178,7 +204,8 @@ def between_samples_sd(
     that part, by default as a run is driven."""
     gain = max(one.noise.corrected for one in recorded.logs)
     least = OF_STEPS if recorded.held else gain**2
-    part = of if of is not None else 1.0 if recorded.drive == "force" else least
+    drives = recorded.drive == "force" and not recorded.held
+    part = of if of is not None else 1.0 if drives else least
     return np.asarray(part * np.array([BETWEEN.get(name, 0.0) for name in names]) * np.abs(values))
 
 
@@ -226,17 +253,22 @@ def _of_both(
 ) -> dict[str, Estimate]:
     """The stick limits of a motor, each midway between the run's and the force at its breakaways:
     where the force changes between samples the one errs to below and the other to above, and the
-    interval holds both. followed: the logs are to the noise, so that where the run shows no limit
-    the Coulomb level stands in for it. Ours."""
-    if not recorded.by_noisy_command:
+    interval holds both; those of a measured force that is held likewise, where most breakaways by
+    themselves say another. followed: the logs are to the noise, so that where the run shows no
+    limit the Coulomb level stands in for it. Ours."""
+    measured = recorded.held and not recorded.by_motor
+    if not (measured or recorded.by_noisy_command):
         return {}
     risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
+    if measured:
+        usual = usual_limits(recorded.logs, plant)[0]
+        risen = {name: size for name, size in usual.items() if _differ(found[name], size)}
     for name, level, way in (("F_sp", "F_cp", 1.0), ("F_sn", "F_cn", -1.0)):
         one, coulomb = found.get(name), found.get(level)
         if one is None:
             continue
         if name not in risen:
-            if one.value is not None:
+            if one.value is not None and not measured:
                 out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
             continue
         run = one if one.low is not None or not followed else coulomb
@@ -252,6 +284,13 @@ def _of_both(
         ends = (low, high) if way > 0.0 else (-high, -low)
         out[name] = reported_estimate(way * middle, one.unit, sd, interval=ends)
     return out
+
+
+def _differ(one: Estimate, other: Size) -> bool:
+    """Whether an estimate is known to be another than a size."""
+    if one.value is None or one.sd is None:
+        return False
+    return abs(one.value - other.value) > NORMAL_95 * float(np.hypot(one.sd, other.sd))
 
 
 def force_of(logs: Sequence[Log]) -> float:

@@ -29,12 +29,16 @@ from identification.estimation.windowed_run.refinement import (
     refit,
 )
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.estimation.windowed_run.stick_search import stick_search, widest_band
+from identification.estimation.windowed_run.stick_search import (
+    nearest_limits,
+    stick_search,
+    widest_band,
+)
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halted, Progress, quiet
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, WORSE
 
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 
@@ -91,6 +95,12 @@ def fitted_structure(
         if free and not (missing or on_bristle(plant)):
             stopped = stick_search(plant, logs, drive, rng)
             done = refit(stopped, logs, drive, prior=prior, effort="near")
+            gains = True
+            while gains and done.misfit > followed:
+                nearer = nearest_limits(done.plant, logs, drive)
+                again = refit(nearer, logs, drive, prior=prior, effort="near")
+                gains = WORSE * again.misfit < done.misfit
+                done = again if gains else done
             if done.misfit <= followed:
                 return model.refined(done)
         done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)

@@ -139,6 +139,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         return NO_SURROUNDINGS
     found, used = looked
     lag, sampled = _lag(found, used, held), False
+    hold = _hold(moved, found.lags, lag) if rig.kind == "force" else None
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
@@ -164,8 +165,8 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
             # As far as friction is equal in both directions, which it is about.
             unequal = OF_ACCOUNT * 0.5 * abs(up + down) / NORMAL_95
             force = replace(always, sd=float(np.hypot(always.sd, unequal)))
-    lag = Size(lag.value * h, lag.sd * h)
-    return Surroundings(lag, force, sine, cosine, (), gives, sampled)
+    lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold.value * h, hold.sd * h)
+    return Surroundings(lag, force, sine, cosine, (), gives, sampled, held=hold is not None)
 
 
 def _looked_far(
@@ -322,6 +323,30 @@ def _lag(found: _Squares, used: Sequence[int], held: bool) -> Size:
     about = not held and abs(lag) <= HALF
     if not (about or (apart(lag) and explains(without, float(left[best])))):
         return NOT_SHOWN
+    return _significant(found, used)
+
+
+def _hold(moved: Sequence[MotionLog], lags: Array, lag: Size) -> Size | None:
+    """By how many whole samples the motion follows a column of force that is constant from each row
+    to the next, nothing or -1 (until the row); None where it is no such column.
+
+    A line through the samples of a zero-order hold is half a sample ahead of it (Åström,
+    Wittenmark, Computer-Controlled Systems (1997), 8.2). By the changes from a window to the next,
+    of which what acts beside friction, unknown yet, makes little; where they show none, by the lag
+    that the rows themselves show.
+    """
+    changes = _squares(moved, lags, False, False, changes=True)
+    by_changes = NOT_SHOWN if changes is None else _significant(changes, PLAIN)
+    behind = by_changes if by_changes.value else lag
+    nearest = LAG_STEP * round(behind.value / LAG_STEP)
+    return {0.5: NOT_SHOWN, -0.5: Size(-1.0, behind.sd)}.get(nearest)
+
+
+def _significant(found: _Squares, used: Sequence[int]) -> Size:
+    """The lag in samples that leaves least, nothing where it is not significantly different from
+    0."""
+    left = found.left(found.every, used)[0]
+    best, lag = int(np.argmin(left)), _lowest(found.lags, left)
     each = left_out(
         found.blocks, lambda kept: np.asarray(_lowest(found.lags, found.left(kept, used)[0]))
     )
@@ -363,11 +388,12 @@ def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
 
 def _squares(
     moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
-    known: Surroundings = NO_SURROUNDINGS,
+    known: Surroundings = NO_SURROUNDINGS, *, changes: bool = False,
 ) -> _Squares | None:  # fmt: skip
     """The equation's rows at every lag, by blocks of time; None where there are too few.
 
-    lags: in samples, ascending; held: the force's column is a zero-order hold.
+    lags: in samples, ascending; held: the force's column is a zero-order hold; changes: of the
+    rows from each window to the next of the same way.
     """
     if not any(len(one.speed) for one in moved):
         return None
@@ -387,7 +413,13 @@ def _squares(
         )
         inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
         inside &= plain.speed >= slow
-        block = _blocks_of_each_way(one.up, inside)
+        up = one.up
+        if changes:
+            apart_by = np.diff(w.start)
+            inside = inside[1:] & inside[:-1] & (apart_by == np.min(apart_by, initial=len(F)))
+            inside &= up[1:] == up[:-1]
+            X, B, up = np.diff(X, axis=0), np.diff(B, axis=0), up[1:]
+        block = _blocks_of_each_way(up, inside)
         for k in range(BLOCKS):
             in_block = inside & (block == k)
             if np.any(in_block):

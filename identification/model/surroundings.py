@@ -47,7 +47,8 @@ class Surroundings:
     +y; sine, cosine [N m]: gravity's of the angle; orders: of a turn, in which cogging repeats,
     the largest first; resonance: of a second mass, which is not taken out. gives [N per unit of
     u]: a motor's, whose force is its command's; None elsewhere. sampled: its column is a current
-    measured at instants, no command that is held until the next.
+    measured at instants, no command that is held until the next; held: the column of a measured
+    force is such a command.
     """
 
     lag: Size = NOT_SHOWN
@@ -58,6 +59,7 @@ class Surroundings:
     gives: float | None = None
     sampled: bool = False
     resonance: Resonance | None = None
+    held: bool = False
 
     @property
     def none(self) -> bool:
@@ -66,12 +68,13 @@ class Surroundings:
         return not (self.orders or any(one.value for one in sizes))
 
     def taken_out(self, log: Log) -> Log:
-        """The log with the whole force that drives its body in place of the applied one.
+        """The log with the whole force that drives its body in place of the applied one, held where
+        that is.
 
         Samples at its ends whose force is not known are left out.
         """
         if self.none:
-            return log
+            return replace(log, held=True) if self.held and not log.held else log
         whole, behind = self._with_whole_force(log)
         unknown, n = int(np.ceil(abs(behind))), len(log)
         first, last = (unknown, n) if behind > 0.0 else (0, n - unknown)
@@ -79,16 +82,16 @@ class Surroundings:
 
     def of_one_instant(self, log: Log) -> Log:
         """The log with its force or command moved to the instants of its position, all samples."""
-        return Surroundings(lag=self.lag, gives=self.gives, sampled=self.sampled)._with_whole_force(
-            log
-        )[0]
+        late = Surroundings(self.lag, gives=self.gives, sampled=self.sampled, held=self.held)
+        return late._with_whole_force(log)[0]
 
     def of_angle(self, y: Array) -> Array:
         """Gravity and the orders of a turn at angles y [rad], (n,) [N m]: at each sample, or over
-        the period that follows it where the force is a command that is held for so long."""
+        the period that follows it where the force is held for so long."""
         force = sum((one.force(y) for one in self.orders), np.zeros(len(y)))
         force = force - self.sine.value * np.sin(y) - self.cosine.value * np.cos(y)
-        return 0.5 * (force + np.append(force[1:], force[-1:])) if self.gives else force
+        stands = self.gives or self.held
+        return 0.5 * (force + np.append(force[1:], force[-1:])) if stands else force
 
     @property
     def of_place(self) -> "Surroundings":
@@ -106,7 +109,8 @@ class Surroundings:
             signals["u"] = force / self.gives
         elif "u" in log:  # of an actuator: its force and command are of one instant
             signals["u"] = np.interp(at - behind, at, log["u"])
-        return log.with_signals(**signals), behind
+        whole = log.with_signals(**signals)
+        return replace(whole, held=log.held or self.held), behind
 
     @property
     def effects(self) -> tuple[Acting, ...]:

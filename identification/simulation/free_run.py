@@ -156,7 +156,7 @@ def free_run(
     out, modes = np.zeros((4, len(log))), np.zeros(len(log), dtype=np.int64)
     u = read_only(log["u"] if "u" in log else np.zeros(len(log)))
     force = read_only(force)
-    slope = np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False)
+    slope = force_slope(force, log.h, hold=motor or log.held or not held)
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
     if not plant.effects:
         run_kernel(p, log.h, held, gain, u, force, slope, log["y"], *begun, out, modes)

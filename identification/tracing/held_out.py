@@ -256,7 +256,9 @@ class HeldOut:
         """Share of the missing force that is left, None where neither model lacks one of account,
         the logs only bound it, or all effects are an actuator's, whose force is measured."""
         effects = [step.candidate.effect for step in self.choice.steps]
-        of_actuator = not self.plain.recorded.held and all(one.place.in_actuator for one in effects)
+        of_actuator = not self.plain.recorded.by_motor and all(
+            one.place.in_actuator for one in effects
+        )
         if missing is None or (effects and of_actuator):
             return None
         lacked = [

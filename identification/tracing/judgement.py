@@ -108,7 +108,7 @@ def _remarks(held: HeldOut, left: Dependence) -> Iterator[str]:
     if not model.imposed and driven_only(held.logs):
         motor = (
             " nor a dead zone of the command be distinguishable from friction"
-            if held.plain.recorded.held
+            if held.plain.recorded.by_motor
             else ""
         )
         yield (

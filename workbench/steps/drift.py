@@ -29,6 +29,7 @@ from workbench.documents.plausible import refuse_other_machine, refuse_other_uni
 from workbench.documents.reading import as_number, plain, read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
+from workbench.steps.predict import of_one_instant
 
 DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 QUANTITIES = ("length", "force", "time")
@@ -199,7 +200,8 @@ def drift_of(
     for source in sources.runs:
         # A log's own stream, so that its verdict does not hang on the others of the command.
         rng = np.random.default_rng([seed, int(source.sha256[:8], 16)])
-        found = drift_test(active, source.log, rng, state=state, settings=settings)
+        log = of_one_instant(source.log, model)
+        found = drift_test(active, log, rng, state=state, settings=settings)
         again = source.sha256 in before
         if again:
             remarks.append(f"{source.file}: taken in before; the state does not count it again")

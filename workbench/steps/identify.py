@@ -45,6 +45,7 @@ from workbench.logs.sources import Source
 from workbench.steps.asked import Options as Options
 from workbench.steps.asked import Orders
 from workbench.steps.drift import active_model
+from workbench.steps.predict import of_one_instant
 
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
@@ -110,7 +111,8 @@ def identify(
         resonance=resonance_of(fit.surroundings, rig),
         falling=fit.falling,
     )
-    known = with_own_logs(active_model(model, ""), logs, alone)
+    of_model = [of_one_instant(log, model) for log in logs]
+    known = with_own_logs(active_model(model, ""), of_model, alone)
     return replace(model, own_logs=known.own_logs), fit
 
 

@@ -20,7 +20,7 @@ from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.karnopp import VISCOUS_NAMES, Karnopp
 from identification.model.plant import Motor, Plant
-from identification.model.size import Size
+from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
 from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
@@ -322,12 +322,14 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
 
 def of_one_instant(log: Log, model: Model) -> Log:
     """The log with its force at the instants of its position, where its columns are apart and no
-    effect of the model says so."""
-    if model.lag is None or "input_delay" in model.effects:
+    effect of the model says so, and held between them as the model's logs showed it."""
+    held = model.rig.kind == "force" and model.fit.command_period is not None
+    if "input_delay" in model.effects or (model.lag is None and not held):
         return log
     drive = model.simulated.actuator
     gives = drive.k_a if isinstance(drive, Motor) else None
-    return Surroundings(lag=Size(used(model.lag)), gives=gives).of_one_instant(log)
+    lag = NOT_SHOWN if model.lag is None else Size(used(model.lag))
+    return Surroundings(lag=lag, gives=gives, held=held).of_one_instant(log)
 
 
 def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:

@@ -28,6 +28,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.model.size import Size
 from identification.signals.sampling import samples
+from identification.signals.steps import MEDIAN_OF_NOISE
 from identification.simulation.free_run import released
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
 from identification.thresholds import EVENTS_NEEDED
@@ -40,6 +41,9 @@ MOVED = 20.0  # times the position's noise that a body goes on to move, or it wa
 LOST = 1e4  # square in noise units, beyond which one sample is as far off as another
 SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose force is a line
 FEWEST_ON_LINE = 4
+NO_BAND = 1e-9  # m/s or rad/s
+# Of a stick limit over the Coulomb level; a body that let go later had been caught again.
+LIMITS = (0.9, 3.0)
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
@@ -71,7 +75,7 @@ def _event(
     level = float(np.mean(y[first : first + mean]))
     if way * (y[last - 1] - level) < MOVED * one.noise.y:
         return None
-    driven = one.log if one.held else one.driving
+    driven = one.log if one.by_motor else one.driving
     part = Log(one.log.name, {key: driven[key][first:last] for key in ("t", "y", "F")})
     pushed = way * driven["F"][first : high + mean // 2]
     lowest, highest = float(np.min(pushed)), float(np.max(pushed))
@@ -104,6 +108,40 @@ def _costs(
     y = released(nine, part["F"], one.log.h, hold=one.held, level=level)
     r = (y - part["y"]) / max(one.noise.y, EXACT_POSITION)
     return np.asarray(np.mean(np.minimum(np.nan_to_num(r**2, nan=LOST), LOST), axis=1))
+
+
+def usual_limits(logs: Sequence[MotionLog], plant: Plant) -> tuple[dict[str, Size], float]:
+    """F_sp and F_sn [N] of most breakaways, each by itself and without a band, of the directions
+    that have any; and by how much the force rises in a sample there.
+
+    A median, since a body that is caught again at once seems to let go much later; its deviation by
+    the median of theirs, infinite where they are few. Sources: as `breakaway_limits`; median and
+    its spread, Huber, Robust Statistics (1981), 5.1.
+    """
+    p = replace(plant.friction, dv_p=NO_BAND, dv_n=-NO_BAND)
+    found = [breakaway_limits(_alone(one, plant), p) for one in logs]
+    force = np.concatenate([one.force for one in found])
+    rises = [np.abs(one.rate) * log.log.h for one, log in zip(found, logs, strict=True)]
+    out: dict[str, Size] = {}
+    for name, coulomb, way in (("F_sp", p.F_cp, 1.0), ("F_sn", p.F_cn, -1.0)):
+        own = way * force[np.sign(force) == way]
+        own = own[(LIMITS[0] * coulomb < own) & (own < LIMITS[1] * coulomb)]
+        if len(own):
+            middle = float(np.median(own))
+            spread = float(np.median(np.abs(own - middle))) / MEDIAN_OF_NOISE
+            enough = len(own) >= EVENTS_NEEDED
+            out[name] = Size(way * middle, spread / np.sqrt(len(own)) if enough else np.inf)
+    return out, float(np.median(np.concatenate(rises))) if len(force) else 0.0
+
+
+def _alone(one: MotionLog, plant: Plant) -> MotionLog:
+    """The log with the force that is left to move the body and its friction."""
+    if not plant.effects:
+        return one
+    log = of_body(with_motor_force(one.log, plant), plant)
+    y, none = np.asarray(log["y"]), np.zeros(len(log))
+    force = np.asarray(log["F"]) - opposing_force(log, plant, y, none, none)
+    return replace(one, log=log.with_signals(F=force))
 
 
 def risen_to(logs: Sequence[MotionLog], plant: Plant) -> dict[str, Size]:

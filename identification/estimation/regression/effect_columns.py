@@ -13,9 +13,9 @@ SLIDING = "f > c"  # as an equation says it
 BOUND_SLACK = 0.05  # of an effect's largest size, by which another may lie out of bounds
 
 
-def equations_of(effect: Effect, by_command: bool, held: bool) -> tuple[str, ...]:
-    """The equations in which an effect shows; held: the force is a motor's, by its command."""
-    if held and effect.place.on_command:
+def equations_of(effect: Effect, by_command: bool, by_motor: bool) -> tuple[str, ...]:
+    """The equations in which an effect shows; by_motor: the force is that of its command."""
+    if by_motor and effect.place.on_command:
         return (MECHANICAL,)
     if effect.place.rubs or effect.place.drives:
         return (MECHANICAL,)

@@ -115,9 +115,9 @@ class EffectRows:
         return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
 
     @property
-    def held(self) -> bool:
+    def by_motor(self) -> bool:
         """Whether the force is a motor's, that of its command."""
-        return self.logs[0].held
+        return self.logs[0].by_motor
 
     @property
     def imposed(self) -> bool:
@@ -140,7 +140,7 @@ class _Parts(dict[str, list[Rows]]):
         stage = self.stage
         own = [plain_rows(stage, equation, i) for i in range(len(stage.logs))]
         for effect, values in stage.chosen:
-            if equation in equations_of(effect, stage.by_command, stage.held):
+            if equation in equations_of(effect, stage.by_command, stage.by_motor):
                 own = [
                     with_effect(stage, equation, effect, values, i, rows)
                     for i, rows in enumerate(own)

@@ -20,6 +20,7 @@ from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.progress import Halt
 from identification.signals.force_random_walk import corrected_share
+from identification.signals.smooth_stretches import smooth_stretches
 from identification.signals.weak_form import (
     WeakWindows,
     noise_gain,
@@ -89,6 +90,11 @@ class MotionLog:
         """Whether a run drifts off with the noise of the force that drives or corrects it."""
         return (self.is_forced(drive) or self.noise.walk > 0.0) and self.noise.F > 0.0
 
+    @property
+    def by_motor(self) -> bool:
+        """Whether its force is that of a motor's command, not one that is measured."""
+        return self.held and not self.log.held
+
     @cached_property
     def position_sd(self) -> Array:
         """Noise of every sample of the position [m], (n,): more in motion if the clock jitters."""
@@ -103,8 +109,11 @@ class MotionLog:
 
     @cached_property
     def driving(self) -> Log:
-        """The log with the force that drives a run, between its samples too."""
-        return self.log.with_signals(F=self.log["F"] + self.kinks)
+        """The log with the force that drives a run, between its samples too, and without the noise
+        of a measured one where that is smooth: at a stop noise alone would begin a motion."""
+        F = np.asarray(self.log["F"])
+        smooth = F if self.by_motor else smooth_stretches(F, self.noise.F)
+        return self.log.with_signals(F=smooth + self.kinks)
 
 
 def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:

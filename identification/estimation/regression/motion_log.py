@@ -57,11 +57,11 @@ def motion_log(
 ) -> MotionLog:  # fmt: skip
     """A log with its motion and windows.
 
-    held: the force is a zero-order hold of a command; imposed: by a rig; the motion is then
-    smoothed until most of it has a significant direction. between [N]: noise of the force beside
-    what the log shows of it. Source of the windows: weak form, Messenger, Bortz (2021).
+    held: the force is a zero-order hold, as the log itself may say; imposed: by a rig; the motion
+    is then smoothed until most of it has a significant direction. between [N]: noise of the force
+    beside what the log shows of it. Source of the windows: weak form, Messenger, Bortz (2021).
     """
-    h = log.h
+    h, held = log.h, held or log.held
     motion = differentiate(log["y"], h)
     d = _direction(motion)
     for cutoff in IMPOSED_CUTOFFS if imposed else ():
@@ -89,9 +89,9 @@ def motion_log(
     up, slowest = d[sliding.middle] > 0, np.min(view[sliding.start], axis=1)
     whole = all_windows(len(log), length, h) if by_command else None
     noise = _of_sensors(log, motion, held, between)
+    beyond = np.zeros(len(log)) if held else kinks(np.asarray(log["F"]), noise.F)
     one = MotionLog(
-        log, signals, sliding, up, slowest, whole, noise, held,
-        kinks(np.asarray(log["F"]), noise.F), rotary, imposed,
+        log, signals, sliding, up, slowest, whole, noise, held, beyond, rotary, imposed
     )  # fmt: skip
     return replace(one, noise=_beside_the_equations(one, motion))
 

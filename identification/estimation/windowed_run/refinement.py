@@ -246,7 +246,7 @@ def refit(
         if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
         cluster = _windows(logs, drive) if drifts else None
-        alike = None if drifts else _counts(logs, drive)
+        alike = None if drifts else counts(logs, drive)
         return factor * inside.covariance(cluster, noise, alike) * np.outer(size, size)
 
     names = tuple(unknowns.names[i] for i in unknowns.at)
@@ -345,7 +345,7 @@ def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | Non
     return np.concatenate(parts, axis=1)
 
 
-def _counts(logs: Sequence[MotionLog], drive: Drive) -> IntArray:
+def counts(logs: Sequence[MotionLog], drive: Drive) -> IntArray:
     """Numbers of the errors over all logs, (n,), the same of those that are one: of a position
     while it stands on one count of its encoder."""
     parts, count = [], 0

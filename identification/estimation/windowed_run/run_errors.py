@@ -27,16 +27,21 @@ ROBUST_FROM = 3.0  # residual in noise units from which it counts less
 Judge = Callable[[Plant], Array]
 
 
-def judge(plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float) -> Judge:
+def judge(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, *, every: bool = False
+) -> Judge:
     """Errors of a plant like this one, in units of the sensors' noise: position (and, driven by the
     command, force) over all logs, less what the windows' uncertain states account for.
 
-    Windows that this plant loses by chance (`misfit`) are left out: 0. Sources: windows, Bock
-    (1983); states, Robinson (1991): `README.md`, (1), (2).
+    Windows that this plant loses by chance (`misfit`) are left out: 0; every: none is. Sources:
+    windows, Bock (1983); states, Robinson (1991): `README.md`, (1), (2).
     """
     free = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
     sizes = [len(one.log) * (1 if one.is_forced(drive) else 2) for one in logs]
-    lost = [_lost(plant, one, drive, own) for one, own in zip(logs, free, strict=True)]
+    lost = [
+        _lost(plant, one, drive, None if every else own)
+        for one, own in zip(logs, free, strict=True)
+    ]
 
     def errors_of(tried: Plant) -> Array:
         parts = []

@@ -9,12 +9,15 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.global_search import evolve
+from identification.estimation.regression.breakaway import NO_BAND, usual_limits
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.run_errors import Judge, judge, loss
-from identification.model.estimates import Drive
+from identification.estimation.windowed_run.windows import RUN_WINDOW
+from identification.model.estimates import NORMAL_95, Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.model.size import Size
 
 SHORT_WINDOW = 1.0  # s, of the windows in which the search begins
 FIRST_BANDS = (0.15, 0.5, 1.0)
@@ -27,6 +30,8 @@ PIECE = 20.0
 WIDEST_BAND, SLOWEST_BAND, BANDS_SPAN = 0.4, 0.5, 200.0
 LIMITS_PER_COULOMB = (0.96, 2.8)
 NEAR_BAND, NEAR_LIMIT = 1.6, 1.06
+REACHES, LIMITS_TRIED = (1.25, 1.05, 1.01), 24  # factors, between which so many limits are tried
+FARTHEST_LIMIT, LIMIT_HALVINGS = 0.5, 10  # of a stick limit, between what its range is looked for
 SIDE_CROWD, SIDE_GENERATIONS = 24, 10
 
 
@@ -67,6 +72,8 @@ def stick_search(
     slow = max(SLOWEST_BAND * min(one.noise.v for one in part), top / BANDS_SPAN)
     if not slow < top < np.inf:
         return plant
+    errors_of = judge(plant, part, drive, SHORT_WINDOW)
+    plant = _best_of(plant, _without_bands(plant, logs), errors_of)
     for close in (False, True):
         errors_of = judge(plant, part, drive, SHORT_WINDOW)
         for up in (False, True):
@@ -74,12 +81,72 @@ def stick_search(
             band, stick = (p.dv_p, p.F_sp) if up else (-p.dv_n, -p.F_sn)
             coulomb = p.F_cp if up else p.F_cn
             least, most = LIMITS_PER_COULOMB
-            low, high = (slow, least * coulomb), (top, most * coulomb)
+            low, high = (min(slow, band), least * coulomb), (top, most * coulomb)
             if close:
                 low = (band / NEAR_BAND, stick / NEAR_LIMIT)
                 high = (band * NEAR_BAND, stick * NEAR_LIMIT)
             plant = _searched_side(plant, up, np.log([low, high]), errors_of, rng)
     return plant
+
+
+def nearest_limits(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Plant:
+    """The plant with the stick limits close by, with its band or without, with which most of its
+    stops are those of the logs, one direction after the other: no slope leads to them. Ours."""
+    errors_of = judge(plant, logs, drive, RUN_WINDOW, every=True)
+    for reach in REACHES:
+        for name, band, none in (("F_sp", "dv_p", NO_BAND), ("F_sn", "dv_n", -NO_BAND)):
+            p = plant.friction
+            limits = getattr(p, name) * np.geomspace(1.0 / reach, reach, LIMITS_TRIED)
+            both = product(limits.tolist(), {getattr(p, band), none})
+            tried = [replace(p, **{name: limit, band: width}) for limit, width in both]
+            plant = _best_of(plant, [p, *tried], errors_of)
+    return plant
+
+
+def stick_ranges(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, independent: int
+) -> dict[str, tuple[float, float]]:
+    """95 % ranges [N] of F_sp and F_sn under a held force, by the cost of runs in windows of so
+    many seconds, at the best of a few bands; independent: how many errors are.
+
+    Between two steps of such a force a limit changes nothing, so that no derivative of the run
+    says how well it is known. Source: profile likelihood, Venzon, Moolgavkar, Appl. Stat. 37 (1988)
+    87.
+    """
+    errors_of, p = judge(plant, logs, drive, seconds), plant.friction
+    least = loss(errors_of(plant))
+    most = least * (1.0 + NORMAL_95**2 / independent)
+
+    def beyond(name: str, band: str, limit: float) -> bool:
+        """Whether a limit is significantly less likely, whatever the band."""
+        bands = {getattr(p, band), float(np.copysign(NO_BAND, limit))}
+        tried = [replace(p, **{name: limit, band: one}) for one in bands]
+        return all(loss(errors_of(replace(plant, friction=one))) > most for one in tried)
+
+    def end(name: str, band: str, way: float) -> float:
+        value, inside, outside = getattr(p, name), 0.0, FARTHEST_LIMIT
+        for step in FARTHEST_LIMIT * 0.5 ** np.arange(LIMIT_HALVINGS)[::-1]:
+            if beyond(name, band, value * (1.0 + way * step)):
+                outside = float(step)
+                break
+            inside = float(step)
+        return float(value * (1.0 + way * 0.5 * (inside + outside)))
+
+    sides = [(*names, way) for names in (("F_sp", "dv_p"), ("F_sn", "dv_n")) for way in (-1.0, 1.0)]
+    with ThreadPoolExecutor(2) as pool:
+        ends = list(pool.map(lambda one: end(*one), sides))
+    return {"F_sp": (ends[0], ends[1]), "F_sn": (ends[2], ends[3])}
+
+
+def _without_bands(plant: Plant, logs: Sequence[MotionLog]) -> list[Karnopp]:
+    """The plant's friction as it is, and without a band in either direction and in both, with the
+    stick limit of most breakaways there."""
+    p, (limits, _) = plant.friction, usual_limits(logs, plant)
+    none = Size(0.0, np.inf)
+    F_sp = max(limits.get("F_sp", none).value, p.F_cp)
+    F_sn = min(limits.get("F_sn", none).value, -p.F_cn)
+    both = [p, replace(p, dv_p=NO_BAND, F_sp=F_sp)]
+    return [*both, *(replace(one, dv_n=-NO_BAND, F_sn=F_sn) for one in both)]
 
 
 def _searched_side(

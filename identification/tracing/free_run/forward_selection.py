@@ -135,7 +135,7 @@ def _taken(
     def candidate(one: RunContender) -> EffectCandidate:
         """A contender as the equations see it; what a run leaves counts as one sample a second."""
         values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
-        told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
+        told = [e for e in equations_of(one.effect, stage.by_command, stage.by_motor) if e in base]
         gain = seconds * (before - one.misfit)
         return EffectCandidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
 

@@ -106,7 +106,7 @@ def first_shape(stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]) -
 
     Source: variable projection, Golub, Pereyra (1973).
     """
-    shown_in = tuple(e for e in equations_of(effect, stage.by_command, stage.held) if e in base)
+    shown_in = tuple(e for e in equations_of(effect, stage.by_command, stage.by_motor) if e in base)
     if not shown_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
         return None
     if effect.signals and not any(
