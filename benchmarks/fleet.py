@@ -28,7 +28,7 @@ from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.fleet.cluster import local_cluster
 from workbench.fleet.finding import find_logs
-from workbench.fleet.run import FleetRun, FleetSettings, InRegistry, NoRegistry, Report
+from workbench.fleet.run import FleetRun, InRegistry, NoRegistry, Report
 from workbench.fleet.store import ResultStore
 from workbench.logs.sources import card_path
 from workbench.registry.store import Registry
@@ -70,23 +70,23 @@ def made(folder: Path, machines: range, seconds: float, card: Card) -> dict[str,
 def run(folder: Path, workers: int, card: Card, out: Path, registry: Path | None = None) -> Report:
     """One run over the logs in the folder, by workers that have compiled before."""
     text = card.path.read_text(encoding="utf-8")
-    settings = FleetSettings(str(folder), text)
-    logs = find_logs(str(folder))
+    url = str(folder)
+    logs = find_logs(url)
     with local_cluster(workers, 3) as cluster:
-        warm(cluster, logs[:1], settings, workers)
+        warm(cluster, logs[:1], url, text)
         with ResultStore(out) as store:
             if registry is None:
-                return FleetRun(cluster, store, NoRegistry(), settings, clock)(logs)
+                return FleetRun(cluster, store, NoRegistry(), url, clock, text)(logs)
             with Registry(str(registry)) as there:
                 recorder = InRegistry(there, "benchmark", clock)
-                return FleetRun(cluster, store, recorder, settings, clock)(logs)
+                return FleetRun(cluster, store, recorder, url, clock, text)(logs)
 
 
-def warm(cluster, logs, settings: FleetSettings, workers: int) -> None:  # type: ignore[no-untyped-def]
+def warm(cluster, logs, url: str, card: str) -> None:  # type: ignore[no-untyped-def]
     """Every worker has loaded its libraries and kernels, which a long run does once."""
     from workbench.fleet.work import work
 
-    item = NoRegistry().item(settings.url, logs[0], str(settings.card), 0)
+    item = NoRegistry().item(url, logs[0], card, 0)
     cluster.client.run(work, item)
 
 

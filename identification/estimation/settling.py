@@ -287,10 +287,10 @@ def _of_both(
 
 
 def _differ(one: Estimate, other: Size) -> bool:
-    """Whether an estimate is known to be another than a size."""
-    if one.value is None or one.sd is None:
-        return False
-    return abs(one.value - other.value) > NORMAL_95 * float(np.hypot(one.sd, other.sd))
+    """Whether the 95 % intervals of an estimate and of a size are apart."""
+    spread = NORMAL_95 * other.sd
+    low, high = other.value - spread, other.value + spread
+    return one.low is not None and one.high is not None and (one.high < low or high < one.low)
 
 
 def force_of(logs: Sequence[Log]) -> float:

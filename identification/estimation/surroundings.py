@@ -11,19 +11,19 @@ dynamic model, Gautier, Khalil, CDC 1988.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray, IntArray
+from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import NOTHING_KNOWN, MotionLog, mechanical
-from identification.estimation.regression.motion_log import SLOWEST_PART, again, motion_log
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
+from identification.estimation.regression.motion_log import again, motion_log
 from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
 from identification.estimation.regression.weighted_rows import (
-    BLOCKS,
     OVERLAP,
     left_out,
     solve_rows,
@@ -56,51 +56,12 @@ FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
 OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
 # From which, of a measured force and of a motor, whose current may be as late as a position.
 EARLIEST_LAG = {False: -6.0, True: -LAG}
-FEWEST_WINDOWS = 40  # windows of sliding
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
 OF_TAKEN_OUT = 1e-3  # of a value, by which it errs where a force was taken out first
 WHOLE_NUMBER = "exact: a whole number of times in a turn"
-
-
-@dataclass(frozen=True, eq=False)
-class _Squares:
-    """Products of the equation's columns X with themselves (k, c, c) and with the force at every
-    lag (k, c, l), and its squares (k, l), of each block; lags in samples (l,);
-    rows: of all."""
-
-    columns: Array
-    with_force: Array
-    force: Array
-    lags: Array
-    rows: int
-
-    def left(self, kept: BoolArray, used: Sequence[int]) -> tuple[Array, Array]:
-        """Square left at every lag (l,) and coefficients (c, l), of these blocks and columns."""
-        at = np.asarray(used)
-        G = np.sum(self.columns[kept], axis=0)[np.ix_(at, at)]
-        size = np.sqrt(np.diag(G))
-        size = np.where(size > 0.0, size, 1.0)  # of nothing, whose coefficient is then 0
-        c = np.sum(self.with_force[kept], axis=0)[at] / size[:, np.newaxis]
-        theta = np.linalg.pinv(G / np.outer(size, size), rcond=1e-10, hermitian=True) @ c
-        square = np.sum(self.force[kept], axis=0) - np.sum(c * theta, axis=0)
-        return np.maximum(square, 1e-300), theta / size[:, np.newaxis]
-
-    def least(self, used: Sequence[int]) -> float:
-        """Square left at the best lag, of all blocks and these columns."""
-        return float(np.min(self.left(self.every, used)[0]))
-
-    @property
-    def blocks(self) -> IntArray:
-        """Numbers of the blocks (k,)."""
-        return np.arange(len(self.force))
-
-    @property
-    def every(self) -> BoolArray:
-        """All of them (k,)."""
-        return np.ones(len(self.force), dtype=np.bool_)
 
 
 def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
@@ -143,7 +104,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
-        current = _squares(moved, found.lags, turns, False, known) or found
+        current = lagged_rows(moved, found.lags, turns, False, known) or found
         other = _lag(current, used, held)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
@@ -171,7 +132,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
 
 def _looked_far(
     moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings
-) -> tuple[_Squares, Sequence[int]] | None:
+) -> tuple[LaggedRows, Sequence[int]] | None:
     """The equation's rows at lags that reach as far as the best of them, and the columns used; the
     nearest ones where none of these is the best within its reach; None where there are too few."""
     first = None
@@ -179,7 +140,7 @@ def _looked_far(
     most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
     for latest in (one * LAG for one in FARTHER if one == 1.0 or one * LAG < most):
         lags = np.arange(EARLIEST_LAG[moved[0].held], latest + LAG_STEP / 2, LAG_STEP)
-        found = _squares(moved, lags, turns, held, known)
+        found = lagged_rows(moved, lags, turns, held, known)
         if found is None:
             break
         used = GRAVITY if turns and _has_gravity(found) else PLAIN
@@ -253,7 +214,7 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     moved = [motion_log(log, held=held, by_command=False) for log in logs]
     lags = np.unique([0.0, around.lag.value / logs[0].h])
     turns = bool(around.sine.value or around.cosine.value)
-    found = _squares(moved, lags, turns, held)
+    found = lagged_rows(moved, lags, turns, held)
     if found is None:
         raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
     left = np.sqrt(found.left(found.every, GRAVITY if turns else PLAIN)[0] / found.rows)
@@ -271,7 +232,7 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     return solve_rows(rows).theta, spread_of_left_out(without_each_block(rows))
 
 
-def _has_gravity(found: _Squares) -> bool:
+def _has_gravity(found: LaggedRows) -> bool:
     """Whether the force depends on the sine of the angle, significantly, for much of what is left
     without, and a spring, on the angle itself, would not leave clearly less: in a narrow motion
     both do."""
@@ -308,7 +269,7 @@ def apart(lag: float) -> bool:
     return abs(lag) >= FAR_LESS
 
 
-def _lag(found: _Squares, used: Sequence[int], held: bool) -> Size:
+def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
     """The lag in samples, nothing where none shows beyond doubt; held: of a motor's command."""
     left, theta = found.left(found.every, used)
     best = int(np.argmin(left))
@@ -335,14 +296,14 @@ def _hold(moved: Sequence[MotionLog], lags: Array, lag: Size) -> Size | None:
     of which what acts beside friction, unknown yet, makes little; where they show none, by the lag
     that the rows themselves show.
     """
-    changes = _squares(moved, lags, False, False, changes=True)
+    changes = lagged_rows(moved, lags, False, False, changes=True)
     by_changes = NOT_SHOWN if changes is None else _significant(changes, PLAIN)
     behind = by_changes if by_changes.value else lag
     nearest = LAG_STEP * round(behind.value / LAG_STEP)
     return {0.5: NOT_SHOWN, -0.5: Size(-1.0, behind.sd)}.get(nearest)
 
 
-def _significant(found: _Squares, used: Sequence[int]) -> Size:
+def _significant(found: LaggedRows, used: Sequence[int]) -> Size:
     """The lag in samples that leaves least, nothing where it is not significantly different from
     0."""
     left = found.left(found.every, used)[0]
@@ -366,7 +327,7 @@ def _lowest(lags: Array, left: Array) -> float:
     return float(lags[i]) + (0.5 * LAG_STEP * (low - high) / bend if bend > 0.0 else 0.0)
 
 
-def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Array, Array]:
+def _with_spread(found: LaggedRows, used: Sequence[int], lag: float) -> tuple[Array, Array]:
     """Coefficients (c,) at a lag in samples, and their deviations by leaving out blocks."""
 
     def of(kept: BoolArray) -> Array:
@@ -374,60 +335,3 @@ def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Arra
         return np.array([np.interp(lag, found.lags, one) for one in theta])
 
     return of(found.every), spread_of_left_out(left_out(found.blocks, of))
-
-
-def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
-    """Blocks of time (r,) with as many of the rows inside that go up, and that go down, in each:
-    without any one of them there is motion both ways."""
-    block = np.zeros(len(up), dtype=np.int64)
-    for way in (up & inside, ~up & inside):
-        count = int(np.count_nonzero(way))
-        block[way] = np.arange(count) * BLOCKS // max(count, 1)
-    return block
-
-
-def _squares(
-    moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
-    known: Surroundings = NO_SURROUNDINGS, *, changes: bool = False,
-) -> _Squares | None:  # fmt: skip
-    """The equation's rows at every lag, by blocks of time; None where there are too few.
-
-    lags: in samples, ascending; held: the force's column is a zero-order hold; changes: of the
-    rows from each window to the next of the same way.
-    """
-    if not any(len(one.speed) for one in moved):
-        return None
-    own, cross, square, rows = [], [], [], 0
-    slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
-    for one in moved:
-        w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
-        mean = w.held if held else w.mean
-        at, F, y = np.arange(len(one.log)), np.asarray(one.log["F"]), np.asarray(one.log["y"])
-        X = plain.X
-        if turns:
-            X = np.column_stack([X, w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y)])
-        own_lags = lags * (moved[0].log.h / one.log.h)  # lags are in samples of the first log
-        place = known.of_angle(y)  # which is of the angle at that instant, whatever the lag
-        B = np.column_stack(
-            [mean @ (np.interp(at - lag, at, F - place) + place) for lag in own_lags]
-        )
-        inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
-        inside &= plain.speed >= slow
-        up = one.up
-        if changes:
-            apart_by = np.diff(w.start)
-            inside = inside[1:] & inside[:-1] & (apart_by == np.min(apart_by, initial=len(F)))
-            inside &= up[1:] == up[:-1]
-            X, B, up = np.diff(X, axis=0), np.diff(B, axis=0), up[1:]
-        block = _blocks_of_each_way(up, inside)
-        for k in range(BLOCKS):
-            in_block = inside & (block == k)
-            if np.any(in_block):
-                x, b = X[in_block], B[in_block]
-                own.append(x.T @ x)
-                cross.append(x.T @ b)
-                square.append(np.sum(b**2, axis=0))
-                rows += len(b)
-    if rows < FEWEST_WINDOWS:
-        return None
-    return _Squares(np.array(own), np.array(cross), np.array(square), lags, rows)

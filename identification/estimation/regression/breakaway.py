@@ -41,7 +41,6 @@ MOVED = 20.0  # times the position's noise that a body goes on to move, or it wa
 LOST = 1e4  # square in noise units, beyond which one sample is as far off as another
 SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose force is a line
 FEWEST_ON_LINE = 4
-NO_BAND = 1e-9  # m/s or rad/s
 # Of a stick limit over the Coulomb level; a body that let go later had been caught again.
 LIMITS = (0.9, 3.0)
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
@@ -111,14 +110,14 @@ def _costs(
 
 
 def usual_limits(logs: Sequence[MotionLog], plant: Plant) -> tuple[dict[str, Size], float]:
-    """F_sp and F_sn [N] of most breakaways, each by itself and without a band, of the directions
+    """F_sp and F_sn [N] of most breakaways, each by itself with the plant's band, of the directions
     that have any; and by how much the force rises in a sample there.
 
     A median, since a body that is caught again at once seems to let go much later; its deviation by
     the median of theirs, infinite where they are few. Sources: as `breakaway_limits`; median and
     its spread, Huber, Robust Statistics (1981), 5.1.
     """
-    p = replace(plant.friction, dv_p=NO_BAND, dv_n=-NO_BAND)
+    p = plant.friction
     found = [breakaway_limits(_alone(one, plant), p) for one in logs]
     force = np.concatenate([one.force for one in found])
     rises = [np.abs(one.rate) * log.log.h for one, log in zip(found, logs, strict=True)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.global_search import evolve
-from identification.estimation.regression.breakaway import NO_BAND, usual_limits
+from identification.estimation.regression.breakaway import usual_limits
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.run_errors import Judge, judge, loss
@@ -30,6 +30,7 @@ PIECE = 20.0
 WIDEST_BAND, SLOWEST_BAND, BANDS_SPAN = 0.4, 0.5, 200.0
 LIMITS_PER_COULOMB = (0.96, 2.8)
 NEAR_BAND, NEAR_LIMIT = 1.6, 1.06
+NO_BAND = 1e-9  # m/s or rad/s
 REACHES, LIMITS_TRIED = (1.25, 1.05, 1.01), 24  # factors, between which so many limits are tried
 FARTHEST_LIMIT, LIMIT_HALVINGS = 0.5, 10  # of a stick limit, between what its range is looked for
 SIDE_CROWD, SIDE_GENERATIONS = 24, 10
@@ -141,8 +142,9 @@ def stick_ranges(
 def _without_bands(plant: Plant, logs: Sequence[MotionLog]) -> list[Karnopp]:
     """The plant's friction as it is, and without a band in either direction and in both, with the
     stick limit of most breakaways there."""
-    p, (limits, _) = plant.friction, usual_limits(logs, plant)
-    none = Size(0.0, np.inf)
+    p, none = plant.friction, Size(0.0, np.inf)
+    bare = replace(p, dv_p=NO_BAND, dv_n=-NO_BAND)
+    limits, _ = usual_limits(logs, replace(plant, friction=bare))
     F_sp = max(limits.get("F_sp", none).value, p.F_cp)
     F_sn = min(limits.get("F_sn", none).value, -p.F_cn)
     both = [p, replace(p, dv_p=NO_BAND, F_sp=F_sp)]

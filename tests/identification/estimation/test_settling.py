@@ -16,7 +16,7 @@ from identification.model.size import Size
 from tests.identification.motor_logs import K_A, made
 
 PLANT = Plant(Karnopp(1.0, 8.0, 8.0, 1.0, 1.0, 1e-3, -1e-3, 10.0, -10.0))
-NOISY: Any = SimpleNamespace(by_noisy_command=True, logs=(), name="log")
+NOISY: Any = SimpleNamespace(by_noisy_command=True, held=True, by_motor=True, logs=(), name="log")
 COULOMB = {"F_cp": Estimate(8.0, "N", 0.1, 7.8, 8.2), "F_cn": Estimate(8.0, "N", 0.1, 7.8, 8.2)}
 
 
@@ -56,6 +56,23 @@ def test_a_breakaway_that_is_not_above_sliding_friction_shows_none(
 ) -> None:
     none = {"F_sp": Estimate(None, "N", reason="2 breakaways", assumed=9.0)}
     assert limits(monkeypatch, none, {"F_sp": Size(7.5, 0.1)}) == {}
+
+
+@pytest.mark.parametrize(("usual", "held"), [(10.1, False), (12.0, True)])
+def test_a_limit_of_a_held_measured_force_holds_what_most_breakaways_say(
+    usual: float, held: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only where that is another one: the run knows more."""
+    measured: Any = SimpleNamespace(
+        by_noisy_command=False, held=True, by_motor=False, logs=(), name="log"
+    )
+    run = {"F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2)}
+    monkeypatch.setattr(settling, "risen_to", lambda logs, plant: {})
+    monkeypatch.setattr(settling, "usual_limits", lambda *_: ({"F_sp": Size(usual, 0.2)}, 0.0))
+    found = settling._of_both({**COULOMB, **run}, PLANT, measured, followed=True)
+    assert bool(found) == held
+    if held:
+        assert (found["F_sp"].low, found["F_sp"].high) == pytest.approx((9.8, 12.39), abs=0.01)
 
 
 def test_without_a_rest_that_ends_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.random_plants import KINDS, drawn, logged
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
+from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.surroundings import lag_estimate, surroundings, widened_friction
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -100,16 +101,46 @@ def test_columns_of_two_instants_are_found(samples: float) -> None:
     assert told.low < told.high
 
 
-@pytest.mark.parametrize("samples", [-0.5, -0.25, 0.25, 0.5])
+@pytest.mark.parametrize("samples", [-0.25, 0.25])
 def test_a_measured_force_may_act_anywhere_within_its_sample(samples: float) -> None:
-    """As a torque that is held over its period does: left in, it was damping, another one in every
-    motion, and a machine that stays as it is had drifted."""
+    """As that of a filtered current does: left in, it was damping, another one in every motion, and
+    a machine that stays as it is had drifted."""
+    found = surroundings([moved_by(samples)], TURNING)
+    assert found.lag.value == pytest.approx(samples * 2e-3, abs=4.0 * found.lag.sd)
+    assert 0.0 < found.lag.sd < 0.2e-3 and not found.held
+
+
+@pytest.mark.parametrize(("samples", "whole"), [(0.5, 0.0), (-0.5, -1.0)])
+def test_half_a_sample_is_the_lag_of_a_force_that_is_held(samples: float, whole: float) -> None:
+    """From its row to the next, or until its row."""
+    found = surroundings([moved_by(samples)], TURNING)
+    assert found.held and found.lag.value == pytest.approx(whole * 2e-3)
+
+
+@pytest.mark.parametrize("key", ["spring", "backlash"])
+def test_a_hold_is_seen_beside_what_is_not_known_yet(key: str) -> None:
+    """Of a pull five times as large as what half a sample makes."""
+    log = moved_by(0.5)
+    y = np.asarray(log["y"])
+    if key == "spring":
+        log = log.with_signals(F=log["F"] + 0.5 * y)
+    else:
+        log = log.with_signals(y=y + 2e-4 * np.sign(np.gradient(y)))
+    assert surroundings([log], TURNING).held
+
+
+def test_a_held_force_is_held_in_the_log_that_is_fitted() -> None:
+    log = moved_by(0.5)
+    out = surroundings([log], TURNING).taken_out(log)
+    assert out.held and not log.held
+    assert motion_log(out, held=False, by_command=False).held
+
+
+def moved_by(samples: float) -> Log:
+    """A log whose force acts so much later than its row."""
     log = pendulum(3, 0.0, pulls=QUICK)
     at = np.arange(len(log))
-    late = log.with_signals(F=np.interp(at + samples, at, log["F"]))
-    found = surroundings([late], TURNING)
-    assert found.lag.value == pytest.approx(samples * log.h, abs=4.0 * found.lag.sd)
-    assert 0.0 < found.lag.sd < 0.1 * log.h
+    return log.with_signals(F=np.interp(at + samples, at, log["F"]))
 
 
 def test_no_lag_is_sought_that_is_much_of_a_stroke() -> None:

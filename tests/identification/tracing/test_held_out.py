@@ -189,7 +189,7 @@ def test_no_effect_of_an_actuator_is_proved_by_the_force_that_a_body_lacks(
 ) -> None:
     """The plain model's body is bent by its run, which numbers of the equation put right whatever
     is named: a dead zone stood for leakage. Of a motor the force is that of its command."""
-    monkeypatch.setattr(RecordedLogs, "held", not measured)
+    monkeypatch.setattr(RecordedLogs, "by_motor", not measured)
     own, n = replace(judged()), np.ones(8)
     (step,) = own.choice.steps
     effect = built_in()["valve_dead_zone"]

@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.errors import BadLog
 from identification.log import Log
 from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
+from workbench.cards.card import load_card
 from workbench.documents.model import Model
-from workbench.steps.predict import force_by_model, seen_moving
+from workbench.logs.sources import Source, Sources, card_path
+from workbench.steps import drift
+from workbench.steps.predict import force_by_model, of_one_instant, seen_moving
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
 
@@ -59,3 +63,34 @@ def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
     steep = replace(falls, falling={"F_vp": Estimate(-1e3, "N s/m", 1.0, -1002.0, -998.0)})
     inertia = log["y"][up] * -9.0
     assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives
+
+
+def late_model(**of_fit: float) -> Model:
+    known = model_of(WIDE)
+    rig, fit = replace(known.rig, kind="force"), replace(known.fit, **of_fit)
+    return replace(known, rig=rig, fit=fit, lag=Estimate(3e-3, "s", 1e-4, 2.8e-3, 3.2e-3))
+
+
+def test_a_log_is_taken_at_the_lag_of_the_model_and_held_as_its_logs_were() -> None:
+    log = swing().with_signals(F=np.arange(4000.0))
+    late = of_one_instant(log, late_model())
+    assert late["F"][100] == pytest.approx(97.0) and not late.held
+    assert of_one_instant(log, late_model(command_period=1e-3)).held
+    assert of_one_instant(log, replace(late_model(), lag=None)) is log
+
+
+def test_a_log_is_tested_for_drift_at_the_lag_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Left in, the lag of an unchanged machine was a structure that had changed."""
+    seen: list[Log] = []
+
+    def test(active: object, log: Log, rng: object, **more: object) -> None:
+        seen.append(log)
+        raise BadLog("enough")
+
+    monkeypatch.setattr(drift, "drift_test", test)
+    model, log = late_model(), swing().with_signals(F=np.arange(4000.0))
+    card = load_card(card_path("paper_table1"))
+    sources = Sources(card, model.rig, (Source(log, "a.csv", "0" * 64, len(log)),), ())
+    with pytest.raises(BadLog, match="enough"):
+        drift.drift_of(model, "key", sources)
+    assert seen[0]["F"][100] == pytest.approx(97.0)

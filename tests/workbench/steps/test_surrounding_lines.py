@@ -39,3 +39,9 @@ def test_a_force_of_a_command_without_a_scale_is_in_units_of_it() -> None:
     )
     assert known.startswith("constant force: -0.36 N (")
     assert unknown.startswith("constant force: -0.36 units of u (")
+
+
+@pytest.mark.parametrize(("lag", "until"), [(Size(0.0, 0.0), "from"), (Size(-1e-3, 1e-5), "until")])
+def test_a_held_force_is_said_to_be_one_and_no_late_position(lag: Size, until: str) -> None:
+    (line,) = surrounding_lines(Surroundings(lag=lag, held=True), Rig("force"))
+    assert line == f"the force acts as it stands {until} its row, constant between rows"

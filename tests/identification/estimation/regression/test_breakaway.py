@@ -1,8 +1,9 @@
 """Stick limits by simulation: the limit of every breakaway, and what it grows with."""
 
 import numpy as np
+import pytest
 
-from identification.estimation.regression.breakaway import breakaway_limits, risen_to
+from identification.estimation.regression.breakaway import breakaway_limits, risen_to, usual_limits
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 
@@ -53,3 +54,23 @@ def test_a_body_that_never_rests_has_no_force_at_breakaway() -> None:
     log = made(1)
     still = seen(log.with_signals(y=1e-5 * np.random.default_rng(0).standard_normal(len(log))))
     assert risen_to([still], plant()) == {}
+
+
+def test_most_breakaways_by_themselves_give_the_limits() -> None:
+    found, rise = usual_limits([seen(made(1))], plant())
+    assert found["F_sp"].value == pytest.approx(NINE.F_sp, rel=0.02)
+    assert found["F_sn"].value == pytest.approx(NINE.F_sn, rel=0.02)
+    assert 0.0 < found["F_sp"].sd < 0.5 and 0.0 < rise < 2.0
+
+
+def test_what_effects_push_is_no_part_of_the_limits() -> None:
+    pushed = {"constant_force": {"F_0": 3.0}}
+    found, _ = usual_limits([seen(made(3, pushed))], plant(pushed))
+    assert found["F_sp"].value == pytest.approx(NINE.F_sp, rel=0.03)
+    assert found["F_sn"].value == pytest.approx(NINE.F_sn, rel=0.03)
+
+
+def test_a_body_that_never_rests_has_no_usual_limits() -> None:
+    log = made(1)
+    still = seen(log.with_signals(y=1e-5 * np.random.default_rng(0).standard_normal(len(log))))
+    assert usual_limits([still], plant()) == ({}, 0.0)
