@@ -31,7 +31,7 @@ WIDEST_BAND, SLOWEST_BAND, BANDS_SPAN = 0.4, 0.5, 200.0
 LIMITS_PER_COULOMB = (0.96, 2.8)
 NEAR_BAND, NEAR_LIMIT = 1.6, 1.06
 NO_BAND = 1e-9  # m/s or rad/s
-REACHES, LIMITS_TRIED = (1.25, 1.05, 1.01), 24  # factors, between which so many limits are tried
+NEARER_BY, LIMITS_TRIED = (1.25, 1.05, 1.01), 24  # factors, between which so many limits are tried
 FARTHEST_LIMIT, LIMIT_HALVINGS = 0.5, 10  # of a stick limit, between what its range is looked for
 SIDE_CROWD, SIDE_GENERATIONS = 24, 10
 
@@ -94,7 +94,7 @@ def nearest_limits(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Pla
     """The plant with the stick limits close by, with its band or without, with which most of its
     stops are those of the logs, one direction after the other: no slope leads to them. Ours."""
     errors_of = judge(plant, logs, drive, RUN_WINDOW, every=True)
-    for reach in REACHES:
+    for reach in NEARER_BY:
         for name, band, none in (("F_sp", "dv_p", NO_BAND), ("F_sn", "dv_n", -NO_BAND)):
             p = plant.friction
             limits = getattr(p, name) * np.geomspace(1.0 / reach, reach, LIMITS_TRIED)

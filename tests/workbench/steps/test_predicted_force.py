@@ -65,9 +65,9 @@ def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
     assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives
 
 
-def late_model(**of_fit: float) -> Model:
+def late_model(command_period: float | None = None) -> Model:
     known = model_of(WIDE)
-    rig, fit = replace(known.rig, kind="force"), replace(known.fit, **of_fit)
+    rig, fit = replace(known.rig, kind="force"), replace(known.fit, command_period=command_period)
     return replace(known, rig=rig, fit=fit, lag=Estimate(3e-3, "s", 1e-4, 2.8e-3, 3.2e-3))
 
 

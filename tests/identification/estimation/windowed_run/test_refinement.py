@@ -205,7 +205,7 @@ def swung(seed: int) -> Log:
 
 
 def test_beside_a_viscous_term_at_its_bound_the_coulomb_force_is_no_better_known() -> None:
-    one = motion_log(swung(26), held=False, by_command=False)
+    one = motion_log(swung(40), held=False, by_command=False)
     found = refit(Plant(SLIPPERY), [one], "force", prior={}, effort="near")
     assert found.plant.friction.F_vp < 2e-9 < 1e-3 < found.plant.friction.F_vn
     assert found.sd["F_cp"] > 0.7 * found.sd["F_cn"]
