@@ -110,10 +110,13 @@ class MotionLog:
     @cached_property
     def driving(self) -> Log:
         """The log with the force that drives a run, between its samples too, and without the noise
-        of a measured one where that is smooth: at a stop noise alone would begin a motion."""
+        of a measured one as far as that is smooth, since noise alone would begin a motion: of one
+        that is no hold, which changes between its samples, at rest alone."""
         F = np.asarray(self.log["F"])
-        smooth = F if self.by_motor else smooth_stretches(F, self.noise.F)
-        return self.log.with_signals(F=smooth + self.kinks)
+        if not self.by_motor:
+            smooth = self.held or self.signals["d"] == 0.0
+            F = np.where(smooth, smooth_stretches(F, self.noise.F), F)
+        return self.log.with_signals(F=F + self.kinks)
 
 
 def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
