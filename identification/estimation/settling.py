@@ -185,16 +185,13 @@ def _with_stick_ranges(covariance: Array, near: Refit, recorded: RecordedLogs) -
     independent = len(set(counts(recorded.logs, recorded.drive).tolist()))
     ranges = stick_ranges(near.plant, recorded.logs, recorded.drive, RUN_WINDOW, independent)
     rise = usual_limits(recorded.logs, near.plant)[1]
-    unsure = (
-        [OF_A_STEP * rise]
-        if recorded.by_motor
-        else [OF_A_STEP * rise, OF_NOISE * recorded.noise[1]]
-    )
+    by_force = float(np.hypot(OF_A_STEP * rise, OF_NOISE * recorded.noise[1]))
     factor = np.ones(len(near.names))
-    for name, (low, high) in ranges.items():
-        i = near.names.index(name)
-        sd = float(np.linalg.norm([0.5 * (high - low) / NORMAL_95, *unsure]))
-        factor[i] = sd / np.sqrt(covariance[i, i])
+    for i, name in enumerate(near.names):
+        if name in ranges:
+            low, high = ranges[name]
+            sd = float(np.hypot(0.5 * (high - low) / NORMAL_95, by_force))
+            factor[i] = sd / np.sqrt(covariance[i, i])
     return covariance * np.outer(factor, factor)
 
 

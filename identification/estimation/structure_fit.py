@@ -38,7 +38,7 @@ from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halted, Progress, quiet
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, WORSE
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HOPELESS, WORSE
 
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 
@@ -95,7 +95,7 @@ def fitted_structure(
         if free and not (missing or on_bristle(plant)):
             stopped = stick_search(plant, logs, drive, rng)
             done = refit(stopped, logs, drive, prior=prior, effort="near")
-            gains = True
+            gains = done.misfit <= HOPELESS
             while gains and done.misfit > followed:
                 nearer = nearest_limits(done.plant, logs, drive)
                 again = refit(nearer, logs, drive, prior=prior, effort="near")

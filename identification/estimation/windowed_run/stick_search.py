@@ -74,7 +74,7 @@ def stick_search(
     if not slow < top < np.inf:
         return plant
     errors_of = judge(plant, part, drive, SHORT_WINDOW)
-    plant = _best_of(plant, _without_bands(plant, logs), errors_of)
+    plant = _best_of(plant, without_bands(plant, logs), errors_of)
     for close in (False, True):
         errors_of = judge(plant, part, drive, SHORT_WINDOW)
         for up in (False, True):
@@ -139,7 +139,7 @@ def stick_ranges(
     return {"F_sp": (ends[0], ends[1]), "F_sn": (ends[2], ends[3])}
 
 
-def _without_bands(plant: Plant, logs: Sequence[MotionLog]) -> list[Karnopp]:
+def without_bands(plant: Plant, logs: Sequence[MotionLog]) -> list[Karnopp]:
     """The plant's friction as it is, and without a band in either direction and in both, with the
     stick limit of most breakaways there."""
     p, none = plant.friction, Size(0.0, np.inf)

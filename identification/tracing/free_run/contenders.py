@@ -11,7 +11,7 @@ from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LO
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit, descended, refit
 from identification.estimation.windowed_run.run_errors import judge, loss
-from identification.estimation.windowed_run.stick_search import start_band
+from identification.estimation.windowed_run.stick_search import start_band, stick_search
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
@@ -22,6 +22,8 @@ from identification.tracing.regression.stepwise import Step
 
 LARGER = 3  # starts of a play, from the best up
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
+LIMIT_BEGUN = 1.2  # times the Coulomb level, at which a search for a bristle's limits begins
+SEED = 0  # of that search, whose outcome a refinement follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
     """The effect from the best of its starts, refined a little on the short logs; None where no
     plant can have it there."""
     plants = []
+    if trial.effect.place.elastic and loose(trial.base, setting.drive):
+        trial = replace(trial, base=_that_sticks(trial.base))
     for values in trial.values:
         try:
             acting = trial.effect.acting(values)
@@ -89,17 +93,38 @@ def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
-        return plant if on_bristle(plant) else descended(plant, setting.short, setting.drive).plant
+        if on_bristle(plant):
+            return _stops_searched(plant, setting)
+        return descended(plant, setting.short, setting.drive).plant
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
     return plant
 
 
+def _that_sticks(plant: Plant) -> Plant:
+    """The plant with stick limits above sliding friction, which a bristle takes no less of: those
+    of a rigid body that crept, or whose limit a run had lost, lie below."""
+    p = plant.friction
+    F_sp, F_sn = max(p.F_sp, LIMIT_BEGUN * p.F_cp), min(p.F_sn, -LIMIT_BEGUN * p.F_cn)
+    return replace(plant, friction=replace(p, F_sp=F_sp, F_sn=F_sn))
+
+
+def _stops_searched(plant: Plant, setting: Setting) -> Plant:
+    """A plant on a bristle with its bands and limits searched on the short logs."""
+    rng = np.random.default_rng(SEED)
+    return stick_search(_that_sticks(plant), setting.short, setting.drive, rng)
+
+
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     logs, drive = setting.logs, setting.drive
     found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
+    if found.misfit > COMPLETE and on_bristle(found.plant) and loose(found.plant, drive):
+        # Of the right stiffness it follows most, and may have lost a limit on its way there.
+        searched = _stops_searched(found.plant, setting)
+        again = refit(searched, logs, drive, prior=even(searched), effort="near")
+        found = again if again.misfit < found.misfit else found
     if found.misfit > COMPLETE and even(found.plant):
         again = refit(found.plant, logs, drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found

@@ -101,9 +101,9 @@ def test_stops_that_come_and_go_leave_no_number_of_a_motor_exact() -> None:
     assert not np.any(settling.between_samples_sd(names, values, actuator))
 
 
-@pytest.mark.parametrize(("by_motor", "sd"), [(True, 0.1), (False, 0.1 * 37.0**0.5)])
+@pytest.mark.parametrize(("noise", "sd"), [(0.0, 0.1), (0.3, 0.1 * 37.0**0.5)])
 def test_a_held_force_says_of_a_limit_no_more_than_its_steps_and_noise_allow(
-    by_motor: bool, sd: float, monkeypatch: pytest.MonkeyPatch
+    noise: float, sd: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A step of 0.35 N is uniform, 0.1 N; a measured one's noise of 0.3 N counts twice."""
     both: Any = lambda *_: {"F_sp": (10.0, 10.0), "F_sn": (-9.0, -9.0)}  # noqa: E731
@@ -111,7 +111,7 @@ def test_a_held_force_says_of_a_limit_no_more_than_its_steps_and_noise_allow(
     monkeypatch.setattr(settling, "usual_limits", lambda *_: ({}, 0.12**0.5))
     monkeypatch.setattr(settling, "counts", lambda *_: np.arange(5))
     near: Any = SimpleNamespace(names=("m", "F_sp", "F_sn"), plant=PLANT)
-    recorded: Any = SimpleNamespace(logs=(), drive="force", by_motor=by_motor, noise=(1.0, 0.3))
+    recorded: Any = SimpleNamespace(logs=(), drive="force", noise=(1.0, noise))
     covariance = np.array([[1.0, 0.5, 0.0], [0.5, 4.0, 0.0], [0.0, 0.0, 9.0]])
     found = settling._with_stick_ranges(covariance, near, recorded)
     assert np.sqrt(np.diag(found)) == pytest.approx([1.0, sd, sd])
