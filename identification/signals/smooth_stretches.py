@@ -7,7 +7,7 @@ from scipy.signal import savgol_filter
 from identification.arrays import Array
 
 HALF_STRETCHES = (4, 8, 16, 32)  # samples to either side, over which a parabola is laid
-BY_CHANCE = 2.0  # deviations, by which the square that one leaves may be more than the noise's
+BY_NOISE = 2.0  # deviations, by which the square that one leaves may be more than the noise's
 
 
 def smooth_stretches(x: Array, noise: float) -> Array:
@@ -26,6 +26,6 @@ def smooth_stretches(x: Array, noise: float) -> Array:
         fitted = savgol_filter(x, length, 2)
         free = length - 3
         left = uniform_filter1d((x - fitted) ** 2, length) * length / free
-        smooth = left <= noise**2 * (1.0 + BY_CHANCE * np.sqrt(2.0 / free))
+        smooth = left <= noise**2 * (1.0 + BY_NOISE * np.sqrt(2.0 / free))
         out[smooth] = fitted[smooth]
     return out

@@ -23,7 +23,7 @@ from identification.tracing.regression.stepwise import Step
 LARGER = 3  # starts of a play, from the best up
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 LIMIT_BEGUN = 1.2  # times the Coulomb level, at which a search for a bristle's limits begins
-SEED = 0  # of that search, whose outcome a refinement follows
+SEED_OF_STOPS = 0  # of that search, whose outcome a refinement follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def _that_sticks(plant: Plant) -> Plant:
 
 def _stops_searched(plant: Plant, setting: Setting) -> Plant:
     """A plant on a bristle with its bands and limits searched on the short logs."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SEED_OF_STOPS)
     return stick_search(_that_sticks(plant), setting.short, setting.drive, rng)
 
 
