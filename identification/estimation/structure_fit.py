@@ -33,6 +33,7 @@ from identification.estimation.windowed_run.stick_search import (
     nearest_limits,
     stick_search,
     widest_band,
+    without_band,
 )
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
@@ -93,8 +94,11 @@ def fitted_structure(
     try:
         free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
         if free and not (missing or on_bristle(plant)):
-            stopped = stick_search(plant, logs, drive, rng)
-            done = refit(stopped, logs, drive, prior=prior, effort="near")
+            first, other = (
+                refit(stick_search(one, logs, drive, rng), logs, drive, prior=prior, effort="near")
+                for one in (plant, without_band(plant, logs))
+            )
+            done = _better(first, other, recorded)
             gains = done.misfit <= HOPELESS
             while gains and done.misfit > followed:
                 nearer = nearest_limits(done.plant, logs, drive)
@@ -111,6 +115,14 @@ def fitted_structure(
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
         return replace(model, plant=best, misfit=least)
+
+
+def _better(one: Refit, other: Refit, recorded: RecordedLogs) -> Refit:
+    """The refinement that leaves less at the weights of the first, or the one that drifts more with
+    the noise of its force would be the better."""
+    logs, drive = recorded.logs, recorded.drive
+    left = misfit(other.plant, logs, drive, weighed_by=one.plant)
+    return other if left < one.misfit else one
 
 
 def _from_far_off(done: Refit, others: Sequence[Plant], recorded: RecordedLogs) -> Refit:

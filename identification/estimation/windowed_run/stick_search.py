@@ -73,8 +73,6 @@ def stick_search(
     slow = max(SLOWEST_BAND * min(one.noise.v for one in part), top / BANDS_SPAN)
     if not slow < top < np.inf:
         return plant
-    errors_of = judge(plant, part, drive, SHORT_WINDOW)
-    plant = _best_of(plant, without_bands(plant, logs), errors_of)
     for close in (False, True):
         errors_of = judge(plant, part, drive, SHORT_WINDOW)
         for up in (False, True):
@@ -139,16 +137,15 @@ def stick_ranges(
     return {"F_sp": (ends[0], ends[1]), "F_sn": (ends[2], ends[3])}
 
 
-def without_bands(plant: Plant, logs: Sequence[MotionLog]) -> list[Karnopp]:
-    """The plant's friction as it is, and without a band in either direction and in both, with the
-    stick limit of most breakaways there."""
+def without_band(plant: Plant, logs: Sequence[MotionLog]) -> Plant:
+    """The plant without a band in either direction, its stick limits those of most breakaways by
+    themselves, or the Coulomb levels where there are none. Source: as `usual_limits`."""
     p, none = plant.friction, Size(0.0, np.inf)
-    bare = replace(p, dv_p=NO_BAND, dv_n=-NO_BAND)
-    limits, _ = usual_limits(logs, replace(plant, friction=bare))
+    bare = replace(plant, friction=replace(p, dv_p=NO_BAND, dv_n=-NO_BAND))
+    limits, _ = usual_limits(logs, bare)
     F_sp = max(limits.get("F_sp", none).value, p.F_cp)
     F_sn = min(limits.get("F_sn", none).value, -p.F_cn)
-    both = [p, replace(p, dv_p=NO_BAND, F_sp=F_sp)]
-    return [*both, *(replace(one, dv_n=-NO_BAND, F_sn=F_sn) for one in both)]
+    return replace(bare, friction=replace(bare.friction, F_sp=F_sp, F_sn=F_sn))
 
 
 def _searched_side(
