@@ -94,11 +94,13 @@ def fitted_structure(
     try:
         free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
         if free and not (missing or on_bristle(plant)):
-            first, other = (
-                refit(stick_search(one, logs, drive, rng), logs, drive, prior=prior, effort="near")
-                for one in (plant, without_band(plant, logs))
-            )
-            done = _better(first, other, recorded)
+            stopped = stick_search(plant, logs, drive, rng)
+            done = refit(stopped, logs, drive, prior=prior, effort="near")
+            # A noisy force's run that seems to follow may have a band in place of its limits.
+            if done.misfit > followed or any(one.walks(drive) for one in logs):
+                stopped = stick_search(without_band(plant, logs), logs, drive, rng)
+                other = refit(stopped, logs, drive, prior=prior, effort="near")
+                done = _better(done, other, recorded)
             gains = done.misfit <= HOPELESS
             while gains and done.misfit > followed:
                 nearer = nearest_limits(done.plant, logs, drive)

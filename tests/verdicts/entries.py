@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 TABLE = Path(__file__).parents[1] / "reference" / "verdicts.toml"
-LOOKS = 16_000  # at which a trace is halted, unless its entry says otherwise
+LOOKS = 24_000  # at which a trace is halted, unless its entry says otherwise
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _WITHIN = re.compile(
     rf"(?:(?P<value>{_NUMBER}) \+- )?(?P<share>{_NUMBER}) %"
