@@ -31,6 +31,7 @@ from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.cards.own_effects import library
 from workbench.cards.units import conversion, parse_gain, si_unit
+from workbench.logs.clocks import named_in_turn
 from workbench.logs.sources import Recorded, Sources, card_path, sources_of
 from workbench.logs.table import RawColumn, Table
 from workbench.logs.tables import read_table
@@ -115,7 +116,8 @@ def _recorded(log: Any, number: int) -> Recorded:
         raw = repr(values.tolist()).encode() if values.dtype.kind == "O" else values.tobytes()
         digest.update(name.encode() + raw)
     table = Table(names, columns.__getitem__, first_row=0)
-    return Recorded(str(frame.attrs.get("name") or usual), table, digest.hexdigest())
+    called = str(frame.attrs.get("name") or usual)
+    return Recorded(called, named_in_turn(table) or table, digest.hexdigest())
 
 
 def _values(series: "pd.Series[Any]") -> RawColumn:

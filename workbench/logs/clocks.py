@@ -116,7 +116,9 @@ def named_in_turn(table: Table) -> Table | None:
     if table.groups or any(len(one) != len(columns[0]) for one in columns):
         return None
     first = zip(*(one[:FIRST_ROWS].tolist() for one in columns), strict=True)
-    return long_groups(table, [list(map(str, row)) for row in first])
+    # A whole number is one, whatever the table's columns are kept as.
+    rows = [[f"{one:g}" if isinstance(one, float) else str(one) for one in row] for row in first]
+    return long_groups(table, rows)
 
 
 def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> Table | None:

@@ -323,7 +323,7 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
 def of_one_instant(log: Log, model: Model) -> Log:
     """The log with its force at the instants of its position, where its columns are apart and no
     effect of the model says so, and held between them as the model's logs showed it."""
-    held = model.rig.kind == "force" and model.fit.command_period is not None
+    held = model.fit.drive == "force" and model.fit.command_period is not None
     if "input_delay" in model.effects or (model.lag is None and not held):
         return log
     drive = model.simulated.actuator

@@ -41,8 +41,8 @@ MOVED = 20.0  # times the position's noise that a body goes on to move, or it wa
 LOST = 1e4  # square in noise units, beyond which one sample is as far off as another
 SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose force is a line
 FEWEST_ON_LINE = 4
-# Of a stick limit over the Coulomb level; a body that let go later had been caught again.
-LIMITS = (0.9, 3.0)
+# Of a stick limit; a body that let go later had been caught again.
+LIMITS_PER_COULOMB = (0.96, 2.8)
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
@@ -124,7 +124,8 @@ def usual_limits(logs: Sequence[MotionLog], plant: Plant) -> tuple[dict[str, Siz
     out: dict[str, Size] = {}
     for name, coulomb, way in (("F_sp", p.F_cp, 1.0), ("F_sn", p.F_cn, -1.0)):
         own = way * force[np.sign(force) == way]
-        own = own[(LIMITS[0] * coulomb < own) & (own < LIMITS[1] * coulomb)]
+        least, most = (factor * coulomb for factor in LIMITS_PER_COULOMB)
+        own = own[(least < own) & (own < most)]
         if len(own):
             middle = float(np.median(own))
             spread = float(np.median(np.abs(own - middle))) / MEDIAN_OF_NOISE

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.global_search import evolve
-from identification.estimation.regression.breakaway import usual_limits
+from identification.estimation.regression.breakaway import LIMITS_PER_COULOMB, usual_limits
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.windowed_run.run_errors import Judge, judge, loss
@@ -24,11 +24,9 @@ FIRST_BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 # Of `stick_search`: s of each log; the widest band over the usual speed, the slowest one over the
-# velocity's noise, and how far apart they are at most; stick limits over the Coulomb level; factors
-# close by; members and generations
+# velocity's noise, and how far apart they are at most; factors close by; members and generations
 PIECE = 20.0
 WIDEST_BAND, SLOWEST_BAND, BANDS_SPAN = 0.4, 0.5, 200.0
-LIMITS_PER_COULOMB = (0.96, 2.8)
 NEAR_BAND, NEAR_LIMIT = 1.6, 1.06
 NO_BAND = 1e-9  # m/s or rad/s
 NEARER_BY, LIMITS_TRIED = (1.25, 1.05, 1.01), 24  # factors, between which so many limits are tried

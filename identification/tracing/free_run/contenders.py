@@ -120,8 +120,8 @@ def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     logs, drive = setting.logs, setting.drive
     found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
-    if found.misfit > COMPLETE and loose(found.plant, drive) and one.plant.effects:
-        # With the right effect it follows most, and may have lost a limit on its way there.
+    if found.misfit > COMPLETE and on_bristle(found.plant) and loose(found.plant, drive):
+        # Of the right stiffness it follows most, and may have lost a limit on its way there.
         searched = _stops_searched(found.plant, setting)
         again = refit(searched, logs, drive, prior=even(searched), effort="near")
         found = again if again.misfit < found.misfit else found

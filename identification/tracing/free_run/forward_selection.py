@@ -75,7 +75,7 @@ def contest(
         return None
     winner = min(found, key=lambda one: one.misfit)
     rivals = [one for one in found if one.effect.key != winner.effect.key]
-    done = _from_equations(winner, on_whole_logs(winner, setting), rivals, setting)
+    done = _from_equations(winner, on_whole_logs(winner, setting), setting)
     if done.misfit > decisive(model.misfit, rivals):
         return None
     bare = on_whole_logs(without_effect(winner), setting)
@@ -124,14 +124,12 @@ def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> Mot
     return shortened(one, seconds, int(begins[np.argmax(sums[begins + size] - sums[begins])]))
 
 
-def _from_equations(
-    winner: RunContender, done: Refit, rivals: Sequence[RunContender], setting: Setting
-) -> Refit | FittedStructure:
+def _from_equations(winner: RunContender, done: Refit, setting: Setting) -> Refit | FittedStructure:
     """The winner as refined, or from what the equations make of the body beside its effect, if that
     is followed better: the plain plant's numbers are bent to do without it."""
     if done.misfit <= COMPLETE or not loose(winner.plant, setting.drive):
         return done
-    choice, _ = _taken(winner, done, rivals, setting, setting.plain.model.misfit)
+    choice, _ = _taken(winner, done, (), setting, setting.plain.model.misfit)
     again = fitted(choice, setting)
     return again if not again.imposed and again.misfit < done.misfit else done
 

@@ -326,6 +326,16 @@ UNFIT: list[tuple[Callable[[Any], object], str]] = [
 ]
 
 
+@pytest.mark.parametrize("axes", [("J1", "J2"), (1, 2)])
+def test_rows_of_several_axes_in_turn_have_a_column_each(axes: tuple[Any, Any]) -> None:
+    """As those of a file: it was said that the time repeats."""
+    t, n = np.repeat(1e-3 * np.arange(2000), 2), 4000
+    own = {"y": np.sin(np.arange(n)), "F": np.cos(np.arange(n))}
+    frame = pd.DataFrame({"t": t, "axis": np.tile(axes, 2000), **own})
+    with pytest.raises(wb.UserError, match=rf"there is: t, {axes[0]} y, {axes[1]} y, {axes[0]} F"):
+        fit(frame, rig="force")
+
+
 @pytest.mark.parametrize(("given", "words"), WRONG)
 def test_a_machine_that_is_not_well_said(given: dict[str, Any], words: str, bench: Bench) -> None:
     with pytest.raises(wb.UserError, match=words) as caught:

@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import BadLog
 from identification.log import Log
-from identification.model.estimates import Estimate
+from identification.model.estimates import Drive, Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.simulation.inverse_dynamics import force_needed
@@ -65,9 +65,10 @@ def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
     assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives
 
 
-def late_model(command_period: float | None = None) -> Model:
+def late_model(command_period: float | None = None, drive: Drive = "force") -> Model:
     known = model_of(WIDE)
-    rig, fit = replace(known.rig, kind="force"), replace(known.fit, command_period=command_period)
+    fit = replace(known.fit, command_period=command_period, drive=drive)
+    rig = replace(known.rig, kind="force")
     return replace(known, rig=rig, fit=fit, lag=Estimate(3e-3, "s", 1e-4, 2.8e-3, 3.2e-3))
 
 
@@ -77,6 +78,8 @@ def test_a_log_is_taken_at_the_lag_of_the_model_and_held_as_its_logs_were() -> N
     assert late["F"][100] == pytest.approx(97.0) and not late.held
     assert of_one_instant(log, late_model(command_period=1e-3)).held
     assert of_one_instant(log, replace(late_model(), lag=None)) is log
+    # Of an actuator it is the period of its command, whose integral is the force.
+    assert not of_one_instant(log, late_model(command_period=1e-3, drive="command")).held
 
 
 def test_a_log_is_tested_for_drift_at_the_lag_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:

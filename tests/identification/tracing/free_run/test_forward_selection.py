@@ -205,7 +205,7 @@ def test_a_winner_begins_from_the_equations_too(
     done, anew = SimpleNamespace(misfit=left), SimpleNamespace(misfit=again, imposed=False)
     monkeypatch.setattr(forward_selection, "_taken", lambda *_: (None, None))
     monkeypatch.setattr(forward_selection, "fitted", lambda *_: anew)
-    found: Any = forward_selection._from_equations(winner, done, (), setting)  # type: ignore[arg-type]
+    found: Any = forward_selection._from_equations(winner, done, setting)  # type: ignore[arg-type]
     assert (found is anew) == better
 
 
@@ -214,7 +214,7 @@ def test_what_follows_to_the_noise_begins_nowhere_else(monkeypatch: pytest.Monke
     done: Any = SimpleNamespace(misfit=0.9)
     winner: Any = SimpleNamespace(plant=plant())
     setting: Any = SimpleNamespace(drive="command")
-    assert forward_selection._from_equations(winner, done, (), setting) is done
+    assert forward_selection._from_equations(winner, done, setting) is done
 
 
 def test_a_bristle_begins_with_limits_above_sliding_friction() -> None:
