@@ -69,7 +69,7 @@ def test_a_cancelled_task_is_no_longer_its_workers(where: str) -> None:
         bench.give_back(claim)
         assert bench.cancel(task.id, by="bob", now=NOW).said == "cancelled by bob"
         assert bench.claim("x", lease=LEASE, now=NOW + 9 * LEASE) is None
-        kinds = [one.kind for one in Access(registry.database).audited(UPLOAD)]
+        kinds = [one.kind for one in Access(registry.database).audited(9)]
         assert kinds == ["identify_cancelled", "identify_asked", "log_dropped"]
 
 
