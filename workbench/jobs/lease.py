@@ -16,7 +16,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 Clock = Callable[[], datetime]
 SHARE = 3.0  # renewals in one lease
-LONGEST_WAIT = 5.0  # s between two tries
+LONGEST_PAUSE = 5.0  # s between two tries
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Patience:
         again = Retrying(
             retry=retry_if_exception_type(RegistryAway),
             stop=stop_after_delay(self.seconds),
-            wait=wait_random_exponential(multiplier=0.1, max=LONGEST_WAIT),
+            wait=wait_random_exponential(multiplier=0.1, max=LONGEST_PAUSE),
             reraise=True,
         )
         return again(call, *args, **kwargs)

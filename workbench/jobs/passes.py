@@ -22,7 +22,7 @@ from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
 
-MOST_BEGUN = 20  # times that a log is begun without a result, after which it is excluded
+MOST_ATTEMPTS = 20  # times that a log is begun without a result, after which it is excluded
 OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
@@ -88,7 +88,7 @@ class Pass:
     report: Report
     stop: Callable[[], bool] = lambda: False
     files: Clock | None = None
-    attempts: int = MOST_BEGUN
+    attempts: int = MOST_ATTEMPTS
 
     @property
     def queue(self) -> Queue:
@@ -160,7 +160,11 @@ class Pass:
 
         try:
             with renewed(renew, given.lease / SHARE):
-                self._logs(folder, found, claim, done)
+                for log, begun in retry(self.queue.waiting, name):  # again, now that it is ours
+                    if self.stop():
+                        break
+                    if self._ready(log, found):
+                        done.outcomes += self._log(folder, found, claim, log, begun)
         except LostClaim as error:
             self.report("claim_lost", machine=name, reason=str(error))
             done.busy += (name,)
@@ -176,14 +180,6 @@ class Pass:
     def _ready(self, log: SeenLog, found: Scan) -> bool:
         """Whether a waiting log can be tested now: it is there, or something else in its place."""
         return log.sha256 in found.complete or _replaced(log, found)
-
-    def _logs(self, folder: MachineFolder, found: Scan, claim: Claim, done: PassReport) -> None:
-        """Test the machine's logs; what is waiting is asked again, now that it is ours."""
-        for log, begun in self.patience(self.queue.waiting, folder.name):
-            if self.stop():
-                break
-            if self._ready(log, found):
-                done.outcomes += self._log(folder, found, claim, log, begun)
 
     def _log(
         self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
