@@ -67,7 +67,7 @@ def test_temperature_has_an_offset() -> None:
         ("deg", "y", "is not a length"),
         ("furlung", "y", "unit 'furlung' is unknown"),
         ("m m)", "y", "is unknown"),
-        ("3 mm", "y", "is unknown"),
+        ("3 furlung", "y", "is unknown"),
         ("dBm", "power", "not linear"),
     ],
 )

@@ -41,8 +41,11 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     end = key[key.index("*") + 1 :]
     others = _beginnings(words, heads, end, best)
     out = {}
+    of_axes = [own for own in words if set(own) & set(best)]
+    in_all = {word for word in best if all(word in own for own in of_axes)}  # of the machine's name
     for (_, number), own in zip(columns, words, strict=True):
-        named = [word for word in dict.fromkeys(own) if word in best]
+        told = [word for k, word in enumerate(own) if word not in in_all or word in own[:k]]
+        named = [word for word in dict.fromkeys(told) if word in best]
         named += ["_".join(one) for one in others if tuple(own[: len(one)]) == one]
         out[number] = named[0] if len(named) == 1 else ""
     return out

@@ -30,6 +30,7 @@ from workbench.steps.first_card.motion_guess import (
     metre,
     near,
     unit_by_turn,
+    written_gain,
 )
 from workbench.steps.first_card.roles import Roles
 
@@ -96,16 +97,33 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
             out[name] = _alone(name, column, motion)
-    return {name: _of_a_sensor(name, column, out[name]) for name, column in found.items()}
+    if chambers := {"p_p", "p_n"} & found.keys() - given.keys():  # of one supply: in one unit
+        whole = {"p_p", "p_n"} & given.keys() or chambers
+        larger = max(whole, key=lambda name: float(np.max(np.abs(found[name].x))))
+        out |= dict.fromkeys(chambers, replace(out[larger], sure=False))
+    return {name: _of_a_sensor(name, column, out, roles, motion) for name, column in found.items()}
 
 
-def _of_a_sensor(name: str, column: Column, guess: UnitGuess) -> UnitGuess:
-    """The unit of a force or pressure; of one in volts that, and a gain to be looked up."""
-    own = column.header.unit
-    if name not in ("F", "p_p", "p_n") or own is None or own.quantity not in SENSOR_OUTPUTS:
+def _of_a_sensor(
+    name: str, column: Column, units: Units, roles: Roles, motion: MotionGuess
+) -> UnitGuess:
+    """The unit of a signal; of a force or pressure in volts that, and a gain to be looked up; so of
+    what stands before a gear or screw, that turns where the position slides."""
+    own, guess = column.header.unit, units[name]
+    if name in ("F", "p_p", "p_n") and own and own.quantity in SENSOR_OUTPUTS:
+        gain, other = (written_gain(1.0, own.card, unit) for unit in (guess.unit, guess.rival))
+        return UnitGuess(own.card, gain, False, DATA_SHEET, other)
+    linked = own is not None and own.quantity == ("position" if name == "r" else "force")
+    if name not in ("r", "F", "u") or own is None or not linked or guess.gain or units["y"].gain:
         return guess
-    gain, other = (f"1 {own.card}/{unit}" for unit in (guess.unit, guess.rival))
-    return UnitGuess(own.card, gain, False, DATA_SHEET, other)
+    if own.rotary == (motion.motion == "rotary"):
+        return guess
+    per, size = force_unit(motion.motion), 1.0
+    why = "before a gear or screw: see its ratio or lead, which no log tells"
+    if name == "r":
+        per, why = units["y"].unit, "by its size beside the position, behind a gear or screw"
+        size = _sensible(abs(_slow_ratio(column.x, roles.columns["y"].x)))
+    return UnitGuess(own.card, written_gain(size, own.card, per), False, why)
 
 
 def _of_header(name: str, column: Column) -> UnitGuess | None:
@@ -328,8 +346,8 @@ def by_reference(
         return UnitGuess(unit, f"{turn} count/turn", True, "it leaps back after a turn")
 
     def guess(number: float, why: str, rival: float | None = None) -> UnitGuess:
-        other = "" if rival is None else f"{rival:.9g} {unit}/{per}"
-        return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, other)
+        other = "" if rival is None else written_gain(rival, unit, per)
+        return UnitGuess(unit, written_gain(number, unit, per), False, why, other)
 
     if (rate := _by_velocity(columns, roles, given, motion)) is not None:
         return guess(_sensible(rate, per == "turn"), "by the velocity beside it")

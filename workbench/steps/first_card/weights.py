@@ -119,7 +119,12 @@ def _by_unit(one: Column, role: str) -> float:
 
 
 def together(one: Column, other: Column) -> float:
-    """Log-odds of two columns in one card, by the axes that their headers name."""
+    """Log-odds of two columns in one card, by the axes that their headers name, and by their units:
+    what turns and what slides have another body between them."""
+    units = [x.header.unit for x in (one, other) if not x.header.doubtful]
+    moved = [unit.rotary for unit in units if unit and unit.quantity in ("position", "force")]
+    if moved in ([True, False], [False, True]):
+        return OTHER_AXIS
     if not (one.axis and other.axis):
         return 0.0
     return SAME_AXIS if one.axis == other.axis else OTHER_AXIS
