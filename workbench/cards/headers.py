@@ -27,6 +27,11 @@ class WrittenUnit:
     quantity: Quantity
     rotary: bool = False
 
+    @property
+    def plain(self) -> str:
+        """The unit without a number before it: rpm of "0.1 rpm"."""
+        return self.card.lstrip("0123456789. ") or self.card
+
 
 @dataclass(frozen=True)
 class Header:
@@ -242,7 +247,7 @@ def _read(text: str, unit_below: str) -> Header:
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
         purpose = "demand"  # a voltage or current that is asked for is the command
-    elif purpose == "reference" and not means and not doubtful and unit and unit.card in _VOLTS:
+    elif purpose == "reference" and not means and not doubtful and unit and unit.plain in _VOLTS:
         means, purpose = {"command": 2.0}, "demand"
     elif purpose == "reference" and not means:
         means = {"position": 1.5}

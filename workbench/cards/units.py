@@ -35,7 +35,7 @@ _POUND = re.compile(r"\b(lbs?|klb)\b")
 # As data sheets write them, without a sign between: Nm, Nms, kgm2, gcm^2.
 _RUN_TOGETHER = re.compile(r"(?<![^\W\d_])([Mkmµμu]?N|k?g)([cm]?m)?(s)?(?=[\d²³^*/·.\s()]|$)")
 _POWER = re.compile(r"(?<=[a-z])([234])(?![\w.])")  # of m2
-_TIMES = re.compile(r"(\d*\.?\d+)\s+(?=[^\W\d]|%)")
+_TIMES = re.compile(r"(\d*\.?\d+)\s+(?=[^\W\d]|[%(])")
 LONGEST_UNIT = 100  # characters of a unit
 MOST_POWERS = 6  # in a unit, as in kg^2 m^4 s^-6 A^-2
 _DIGIT = r"[+-]?\d(?:\.\d{1,3})?"
@@ -203,15 +203,12 @@ def command_unit(unit: str, gain: float | str | None, motion: Motion) -> str:
 def over_time(unit: str, signal: str) -> str:
     """The unit of the sum of a column in `unit` over time: of a speed its length or angle; of the
     clock's own steps theirs."""
-    return unit if signal == "t" else f"({unit}) s"
+    number = found[0] if (found := _TIMES.match(unit)) else ""
+    return unit if signal == "t" else f"{number}({unit.removeprefix(number)}) s"
 
 
 def column_scale(
-    unit: str,
-    gain: float | str | None,
-    signal: str,
-    motion: Motion,
-    command: str | None = None,
+    unit: str, gain: float | str | None, signal: str, motion: Motion, command: str | None = None
 ) -> Scale:
     """Signal in SI = factor * (column - offset) + shift; a command in the unit `command`.
 

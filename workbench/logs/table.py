@@ -244,9 +244,8 @@ def _entries(
 
 def _unit(name: str, one: Mapping[str, Any]) -> Iterator[tuple[str, RawColumn]]:
     """The unit that a table gives of its only vector, as a single value behind that's name."""
-    given = next((v for key, v in one.items() if key.lower() in UNIT_KEYS and v), "")
-    if isinstance(given, str) and given:
-        yield f"{name}.unit", np.array([given])
+    if unit := _label(one, UNIT_KEYS):
+        yield f"{name}.unit", np.array([unit])
 
 
 def records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
@@ -269,9 +268,9 @@ def _numbers(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def _label(one: Mapping[str, Any]) -> str:
-    """What a table calls itself, else nothing."""
-    found = (v for key, v in one.items() if key.lower() in LABELS and isinstance(v, str) and v)
+def _label(one: Mapping[str, Any], keys: Sequence[str] = LABELS) -> str:
+    """What a table calls itself, or the text of another of these keys, else nothing."""
+    found = (v for key, v in one.items() if key.lower() in keys and isinstance(v, str) and v)
     return next(found, "")
 
 

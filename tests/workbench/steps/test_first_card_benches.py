@@ -183,6 +183,16 @@ def test_units_with_a_factor_are_read(joint: dict[str, Array], tmp_path: Path) -
     assert y is not None and y.sure and y.unit == "0.0001 rad"
 
 
+def test_a_speed_in_a_unit_with_a_factor_is_summed(joint: dict[str, Array], tmp_path: Path) -> None:
+    v = np.gradient(joint["y"], H) * 30.0 / np.pi
+    own = (1e3 * T, 10.0 * v, joint["F"])
+    head = "Time[ms],Feedback Speed[0.1 rpm],Torque[Nm]\n"
+    found = card_of(tmp_path / "run.csv", head + text_of(own, "{},{:.0f},{}\n"))
+    y = found.signal("y")
+    assert y is not None and (y.unit, y.summed) == ("0.1 rpm", True)
+    assert is_read(found, {"y": joint["y"], "F": joint["F"]})
+
+
 @pytest.mark.parametrize(
     ("header", "unit"),
     [("Load (kg)", "kgf"), ("Torque (kgf.cm)", "kgf cm"), ("Torque [oz-in]", "ozf inch"),

@@ -112,8 +112,9 @@ def as_position(head: Header) -> Header:
     """The header of a speed, as one of what the speed sums up to."""
     unit = head.unit
     if unit is not None and unit.quantity == "velocity":
-        card = OF_TURNS.get(unit.card, unit.card.partition("/")[0])
-        unit = WrittenUnit(card, "position", unit.rotary)
+        whole = OF_TURNS.get(unit.plain, unit.plain.partition("/")[0])
+        number = unit.card.removesuffix(unit.plain)
+        unit = WrittenUnit(number + whole, "position", unit.rotary)
     return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
 
 

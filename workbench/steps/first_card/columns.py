@@ -15,12 +15,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
-from workbench.logs.times import (
-    even_stamps,
-    sound_rows,
-    stretches,
-    told_of_starts,
-)
+from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
