@@ -118,7 +118,7 @@ def _of_a_sensor(
     if own.rotary == (motion.motion == "rotary"):
         return guess
     per, size = force_unit(motion.motion), 1.0
-    why = "before a gear or screw: see its ratio or lead, which no log tells"
+    why = "before a gear or screw: its ratio or lead is in no log"
     if name == "r":
         per, why = units["y"].unit, "by its size beside the position, behind a gear or screw"
         size = sensible(abs(slow_ratio(column.x, roles.columns["y"].x)))
