@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 Quantity = Literal[
@@ -25,6 +26,11 @@ class WrittenUnit:
     card: str
     quantity: Quantity
     rotary: bool = False
+
+    @property
+    def plain(self) -> str:
+        """The unit without a number before it: rpm of "0.1 rpm"."""
+        return self.card.lstrip("0123456789. ") or self.card
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ class Header:
 
 _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
     "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis 毫秒"
-    " milliseconds millisekunden ミリ秒; us: us µs usec microseconds mikrosekunden 微秒;"
+    " milliseconds millisekunden ミリ秒; us: us µs usec micros microseconds mikrosekunden 微秒;"
     " ns: ns nsec nanoseconds; min: min minutes minuten 分 分钟",
     "position": "m: m meter metre meters 米; mm: mm millimeter millimetre ミリ 毫米; cm: cm 厘米;"
     " um: um µm micron microns mikrometer micrometer 微米; nm: nm 纳米;"
@@ -65,11 +71,12 @@ _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
     " um/s: um/s µm/s; cm/s: cm/s; inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
     "acceleration": "m/s^2: m/s^2 m/s² m/s2 m/s**2; mm/s^2: mm/s^2 mm/s² mm/s2",
     "force": "N: n newton newtons 牛 牛顿; kN: kn 千牛; mN: mn; lbf: lbf lb lbs;"
-    " kip: kip; kgf: kgf kp",
+    " kip: kip; kgf: kgf kp kg",
     "pressure": "bar: bar barg bara bar(g) 巴; mbar: mbar 毫巴; Pa: pa pascal 帕;"
     " kPa: kpa 千帕; hPa: hpa; MPa: mpa 兆帕; psi: psi psig psia; atm: atm;"
     " kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
-    "command": "V: v volt volts 伏 伏特; mV: mv 毫伏; A: a amp amps ampere arms apk 安 安培;"
+    "command": "V: v volt volts vdc vrms 伏 伏特; mV: mv 毫伏;"
+    " A: a amp amps ampere arms apk adc 安 安培;"
     " mA: ma 毫安; %: % pct percent prozent"
     " %pwm %duty; 1: 1 - dimensionless",
     "count": "count: count counts counts16bit counts32bit cnt cnts inc"
@@ -85,7 +92,8 @@ _SPELT_ROTARY: Mapping[Quantity, str] = {
     " 转/分 r/min rev/min upm; turn/s: rev/s turn/s rps rotations/sec rot/sec",
     "acceleration": "rad/s^2: rad/s^2 rad/s² rad/s2; deg/s^2: deg/s^2 deg/s² deg/s2 °/s² °/s^2",
     "force": "N m: nm n·m n.m n*m n-m newtonmeter 牛米 牛·米; mN m: mnm mn·m; N cm: ncm;"
-    " lbf inch: lb-in lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft",
+    " lbf inch: lb-in lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft; ozf inch: oz-in ozin;"
+    " kgf cm: kgf-cm kgf·cm kgfcm kg-cm kg·cm kgcm; N mm: nmm n·mm n-mm",
 }
 
 
@@ -104,6 +112,8 @@ _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
 _HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])")
+_SCALED = re.compile(r"(\d*[.,]?\d+)\s*([^\W\d].*|%.*|°.*)")
+_VOLTS = ("V", "mV", "A", "mA")
 _OF_TWO_LETTERS = ("Ms", "Us", "Mm", "Nm")  # units at the end of a name in humps
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
@@ -175,7 +185,7 @@ _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "
 _REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
 _MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定", "实际",
              "反馈", "测量", "messwert", "encoder")  # fmt: skip
-_MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
+_MEASURED_SHORT = ("ist", "act", "meas", "msr", "mes", "fb", "fbk", "m")
 _MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
           "推定", "vorhersage")  # fmt: skip
 _MODEL_SHORT = ("pred", "hat", "sim", "mdl", "nn", "mlp", "lstm", "net", "modell")
@@ -192,6 +202,8 @@ _ERRORS = (
 _FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
 _FILTERED_SHORT = ("filt", "lpf")
 _SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
+_GREEK = str.maketrans({"θ": "theta", "φ": "phi", "ω": "omega", "τ": "tau", "α": "alpha",
+                        "β": "beta", "ψ": "psi"})  # fmt: skip
 _PARTS = re.compile(r"/|(?<=\w)[\"']?\.(?=[^\W\d])")  # of a path, and of a variable in a structure
 _PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
@@ -227,11 +239,16 @@ def _read(text: str, unit_below: str) -> Header:
     whole = " ".join(words)
     purpose = _purpose(words, whole, means)
     lengths = unit is not None and unit.quantity in ("position", "count")
-    asked = any(one == "cmd" or one.startswith("command") for one in words)
+    others = [one for one in words if one != "cmd" and not one.startswith("command")]
+    asked = len(others) < len(words)
+    if purpose == "reference" and asked and not any(map(_commands, others)):
+        means = {what: weight for what, weight in means.items() if what != "command"} or means
     if lengths and asked and (not purpose or "position" not in means):
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
         purpose = "demand"  # a voltage or current that is asked for is the command
+    elif purpose == "reference" and not means and not doubtful and unit and unit.plain in _VOLTS:
+        means, purpose = {"command": 2.0}, "demand"
     elif purpose == "reference" and not means:
         means = {"position": 1.5}
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
@@ -257,13 +274,18 @@ def written_unit(text: str) -> WrittenUnit | None:
         return _UNITS["mn"]
     if found.startswith("% "):  # of what: "% of rated torque"
         return _UNITS["%"]
+    if scaled := _SCALED.fullmatch(found):  # "0.1 rpm"
+        own = written_unit(scaled[2])
+        return replace(own, card=f"{scaled[1].replace(',', '.')} {own.card}") if own else None
     found = found.replace("μ", "µ").casefold().replace("μ", "µ")
-    return _UNITS.get(found) or _UNITS.get(found.replace(" ", ""))
+    plain = found.replace(" ", "")
+    return _UNITS.get(found) or _UNITS.get(plain) or _UNITS.get(plain.replace(".", "-"))
 
 
 def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     """Name, unit, and whether the unit is doubtful."""
-    if (found := written_unit(text)) and found.quantity == "velocity":  # "rpm"
+    found = written_unit(text) if len(text) > 1 and text != "min" else None
+    if found and found.quantity in ("velocity", "time"):  # "rpm", "millis"
         return text, found, False
     if _INDEX.search(text):  # "position[1]" of an array
         return text, None, False
@@ -284,6 +306,9 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
         parted = any(sign in text for sign in ",;:")
         if suffix[2] == "1" and not parted:  # "current_1", the first of several
             return text, None, False
+        instrument = suffix[2].casefold() in ("meter", "metre")  # as a tachometer is
+        if instrument and "position" not in _meanings(words_of(suffix[1]), ""):
+            return text, None, False
         letter = len(suffix[2]) < _SURE_SUFFIX and suffix[2].isalpha()
         return suffix[1], found, not parted and letter
     humps = _HUMPS.split(text)  # "positionRad", "VelocityMetersPerSec"
@@ -303,9 +328,12 @@ def _around(text: str, bracket: re.Match[str], inside: str) -> str:
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters: at case, digits and signs it is parted; addresses, as
     0x6064, are none."""
-    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", _ADDRESS.sub(" ", name))
+    parted = re.sub(
+        r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", _ADDRESS.sub(" ", name)
+    )
     parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
-    small = parted.casefold()
+    parted = unicodedata.normalize("NFD", parted).replace("\u0307", "dot")  # above a letter
+    small = unicodedata.normalize("NFC", parted).casefold().translate(_GREEK)
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
         small = small.replace(umlaut, two)
     return [one for one in re.split(r"[\W_]+", small) if one]
@@ -342,7 +370,7 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
         return {"other": _TWO_WEIGHTS}
     if found.get("temperature", 0.0) >= _TWO_WEIGHTS:
         return {"temperature": _TWO_WEIGHTS}
-    if "load" in words:
+    if "load" in words and "position" not in found:
         found["force"] = max(found.get("force", 0.0), 1.0)
     if "input" in words and not found:
         found["command"] = 2.0
@@ -367,8 +395,12 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
         return "error"
     if any(one in whole for one in _MODEL) or any(one in _MODEL_SHORT for one in words):
         return "model"
-    said = any(one in whole for one in _MEASURED)  # beside which a letter is that of a parameter
-    short = [one for one in words if one in _REFERENCE_SHORT and not (said and len(one) == 1)]
+    said = any(one in whole for one in _MEASURED)
+    letters = said or any(one in _MEASURED_SHORT and len(one) > 1 for one in words)
+    # A letter is then that of a parameter, as it is before a number: the R of "R820".
+    named = {one for one, after in pairwise(words) if after.isdigit() and len(after) > 1}
+    short = [one for one in words if one in _REFERENCE_SHORT
+             and not (len(one) == 1 and (letters or one in named))]  # fmt: skip
     if any(one in whole for one in _REFERENCE) or short:
         return "reference"
     if any(one.startswith("command") for one in words) and "position" in means:

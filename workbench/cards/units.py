@@ -35,6 +35,7 @@ _POUND = re.compile(r"\b(lbs?|klb)\b")
 # As data sheets write them, without a sign between: Nm, Nms, kgm2, gcm^2.
 _RUN_TOGETHER = re.compile(r"(?<![^\W\d_])([Mkmµμu]?N|k?g)([cm]?m)?(s)?(?=[\d²³^*/·.\s()]|$)")
 _POWER = re.compile(r"(?<=[a-z])([234])(?![\w.])")  # of m2
+_TIMES = re.compile(r"(\d*\.?\d+)\s+(?=[^\W\d]|[%(])")
 LONGEST_UNIT = 100  # characters of a unit
 MOST_POWERS = 6  # in a unit, as in kg^2 m^4 s^-6 A^-2
 _DIGIT = r"[+-]?\d(?:\.\d{1,3})?"
@@ -102,9 +103,11 @@ def conversion(unit: str, target: str | None, per: str | None = None) -> Scale |
     import pint  # its registry takes longer than all the rest of a short command
 
     wanted = None if target is None else _parsed(target)
-    parsed = _parsed(unit) if per is None else _parsed(unit) / _parsed(per)
+    times = _TIMES.match(unit)  # "0.001 mm", as a drive counts
+    size, one = (float(times[1]), unit[times.end() :]) if times else (1.0, unit)
+    parsed = _parsed(one) if per is None else _parsed(one) / _parsed(per)
     try:
-        values = [_registry().Quantity(value, parsed) for value in (0.0, 1.0, 2.0)]
+        values = [_registry().Quantity(value * size, parsed) for value in (0.0, 1.0, 2.0)]
         in_si = [one.to_base_units() if wanted is None else one.to(wanted) for one in values]
         points = [float(one.magnitude) for one in in_si]
     except pint.DimensionalityError:
@@ -200,15 +203,12 @@ def command_unit(unit: str, gain: float | str | None, motion: Motion) -> str:
 def over_time(unit: str, signal: str) -> str:
     """The unit of the sum of a column in `unit` over time: of a speed its length or angle; of the
     clock's own steps theirs."""
-    return unit if signal == "t" else f"({unit}) s"
+    number = found[0] if (found := _TIMES.match(unit)) else ""
+    return unit if signal == "t" else f"{number}({unit.removeprefix(number)}) s"
 
 
 def column_scale(
-    unit: str,
-    gain: float | str | None,
-    signal: str,
-    motion: Motion,
-    command: str | None = None,
+    unit: str, gain: float | str | None, signal: str, motion: Motion, command: str | None = None
 ) -> Scale:
     """Signal in SI = factor * (column - offset) + shift; a command in the unit `command`.
 

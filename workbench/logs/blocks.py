@@ -17,10 +17,9 @@ import numpy as np
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.logs.layout import is_number
-from workbench.logs.table import RawColumn, Table
+from workbench.logs.table import UNIT_KEYS, RawColumn, Table
 
 FEWEST_BLOCKS = 2
-UNIT_KEYS = ("unit", "units", "einheit", "unité", "単位")  # of a line that gives a block's unit
 PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line

@@ -132,6 +132,8 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
     clocks, values = list[tuple[int, Array]](), list[tuple[int, Array]]()
     for k in (k for k in range(len(table.names)) if k != at):
         x = _numbers_or_times(np.asarray(table.fetch(k)))
+        if len(x) != len(of):  # a single value beside the rows
+            continue
         steps = [np.diff(x[own][np.isfinite(x[own])]) for own in rows]
         if any(np.any(one != 0.0) for one in steps):
             rises = np.all(np.isfinite(x)) and all(np.all(one >= 0.0) for one in steps)

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from identification.thresholds import HALF
 from workbench.cards.headers import words_of, written_unit
 from workbench.logs.times import is_time
 
@@ -26,6 +27,8 @@ _WORDS_OF_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "
                      "interval", "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
 _TWO_OF_PERIODS = {("delta", "x"), ("delta", "t"), ("sample", "time"), ("sampling", "time")}
 _RATES = {"rate", "samplerate", "abtastrate", "fs"}
+_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
+_COMMENT = re.compile(r"\s*(?:%+|//|!|;)\s*")  # of programs whose comments begin otherwise
 _NO_COLUMN = ("", "comment", "comments", "remark", "remarks", "kommentar")  # behind the names
 _SCOPE_NAME = "name"
 _SCOPE_ROWS = 3  # of a block of keys, at least
@@ -68,6 +71,7 @@ def find_layout(
         ends = any(line[-1] for line in lines[first:] if len(line) == width)
         block = list[Sequence[str]]()
         for line in reversed(above):
+            line = _uncommented(line, width)
             fitted = [*line, ""] if len(line) == width - 1 and not ends else line
             if all(one.casefold() in _NO_COLUMN for one in fitted[width:]):
                 fitted = fitted[:width]
@@ -84,6 +88,8 @@ def find_layout(
     elif noted := [one for k, one in (comments or {}).items() if k < first and len(one) == width]:
         names, units = _names_and_units(noted)
         names = () if all(map(is_number, names)) else names
+    if any(map(_DECIMAL.fullmatch, names)):  # a row of data, beside a key
+        return Layout((), first)
     return Layout(names, first, units=units)
 
 
@@ -93,6 +99,9 @@ def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple
     while len(whole) > 1 and (is_mark(whole[-1], whole[-2]) or _is_units(whole[-1])):
         below = whole.pop()
         units = tuple(_bare(one) for one in below) if _is_units(below) else units
+        whole[-1] = [
+            own or (one if units else "") for own, one in zip(whole[-1], below, strict=True)
+        ]
     names, over = whole[-1], whole[-2] if len(whole) > 1 else ()
     if over and all(names) and len(set(names)) < len(names) and over[0] and not all(over):
         plotted = [one.lower() for one in names] == ["x", "y"] * (len(names) // 2)
@@ -102,6 +111,14 @@ def _names_and_units(whole: list[Sequence[str]]) -> tuple[tuple[str, ...], tuple
             joined.append(f"{group} {own}" if not plotted else group if k % 2 else own)
         names = joined
     return tuple(names), units
+
+
+def _uncommented(line: Sequence[str], width: int) -> Sequence[str]:
+    """As many names as the data have fields behind a sign of comments; any other line as it is."""
+    signed = _COMMENT.match(line[0])
+    bare = [line[0][signed.end() :], *line[1:]] if signed else line
+    several = bare[0].split() if len(bare) == 1 else [one for one in bare[:1] if one] + [*bare[1:]]
+    return several if signed and len(several) == width else line
 
 
 def _keyed_units(line: Sequence[str]) -> tuple[str, ...]:
@@ -140,20 +157,23 @@ def is_number(field: str) -> bool:
 
 def _first_data(lines: Sequence[Sequence[str]], width: int) -> int | None:
     filled = [k for k, line in enumerate(lines) if line]
+    begins = Counter(lines[k][0] for k in filled[len(filled) // 2 :])
+    word = next((one for one, many in begins.items() if many > HALF * begins.total()), "")
     for at in range(len(filled)):
-        if all(_is_data(lines[j], width) for j in filled[at : at + _IN_A_ROW]):
+        if all(_is_data(lines[j], width, word) for j in filled[at : at + _IN_A_ROW]):
             while at and len(lines[filled[at - 1]]) == width and not any(lines[filled[at - 1]]):
                 at -= 1  # a row of empty fields is one of missing samples
             return filled[at]
     return None
 
 
-def _is_data(line: Sequence[str], width: int) -> bool:
+def _is_data(line: Sequence[str], width: int, word: str = "") -> bool:
+    """Whether a line holds numbers and times behind a number, a time, or a word that most have."""
     if len(line) != width:
         return False
     filled = [field for field in line if field]
     known = sum(is_number(field) or is_time(field) for field in filled)
-    first = is_number(line[0]) or is_time(line[0])  # where other lines have a key
+    first = is_number(line[0]) or is_time(line[0]) or line[0] == word  # others have a key
     return first and known > _DATA_SHARE * len(filled)
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+from identification.signals.check import SHORTEST_LOG
 from workbench.cards.headers import written_unit
 from workbench.logs.layout import is_number
 from workbench.logs.times import is_time
@@ -17,6 +18,10 @@ from workbench.logs.times import is_time
 _FIRST_LETTERS = 64 * 1024  # by which a text is known
 _LINES_SEEN, _FEWEST_LINES = 40, 5
 _ABOVE = 3  # lines above the numbers at most, of which the last may be a header
+_MOST_TURNED = 50_000_000  # letters of a text whose lines may be signals
+_ARRAY = re.compile(r"array\('\w', (\[[^\]]*\])\)")  # as Python prints one
+_BROKEN_NAME = re.compile(r'(?:^|(?<=[;,\t\n]))"[^";,\t\n]*\n[^";,\t]*"(?=[;,\t\r\n])')  # in lines
+_NAME_ABOVE = re.compile(r"^# name: (\w+)[ \t]*\r?$", re.MULTILINE)
 _SEPARATORS = (",", ";", "\t", "|")
 _SAYS_THE_DELIMITER = re.compile(r"\Asep=.(?=\r?\n)", re.I)
 _GOT_AT = re.compile(r"^((?:\d{4}-\d\d-\d\d )?\d\d:\d\d:\d\d[.,]\d{1,6}) -> ", re.MULTILINE)
@@ -40,10 +45,13 @@ _GROUPED = re.compile(_CELLS.format(_IN_THOUSANDS))
 
 def as_table(text: str) -> str:
     """The text as a plain table where its lines hold more than numbers; else as it is."""
+    text = _BROKEN_NAME.sub(lambda one: " ".join(one[0].split()), text)
     text = _in_decimals(_without_thousands(_SAYS_THE_DELIMITER.sub("", text)))
-    text = _without_monitor(text)
+    text = _without_monitor(_in_columns(_ARRAY.sub(r"\1", text)))
     if len(_NEXT_DOCUMENT.findall(text[:_FIRST_LETTERS])) > _FEWEST_LINES:
         return _of_documents(text)
+    if len(_NAME_ABOVE.findall(text)) > 1:
+        return _of_variables(text)
     return _labelled(_parted(_flat(text)))
 
 
@@ -51,6 +59,20 @@ def _seen(text: str) -> list[str]:
     """The lines by which it is known what a text is: the last whole ones of its beginning."""
     lines = text[:_FIRST_LETTERS].splitlines()[: -1 if len(text) > _FIRST_LETTERS else None]
     return [line for line in lines if line.strip()][-_LINES_SEEN:]
+
+
+def _in_columns(text: str) -> str:
+    """The text with a column for each signal where a few long lines have one each, its name first
+    or none."""
+    lines = [line for line in text.splitlines() if line.strip()] if len(text) < _MOST_TURNED else []
+    if not 1 < len(lines) < SHORTEST_LOG or len(lines[0]) < 2 * SHORTEST_LOG:
+        return text
+    sign = max((*_SEPARATORS, " "), key=lambda one: min(line.count(one) for line in lines))
+    rows = [line.split() if sign == " " else _split(line, sign) for line in lines]
+    long = min(map(len, rows)) >= SHORTEST_LOG and max(map(len, rows)) == min(map(len, rows))
+    if not long or not all(is_number(one) for row in rows for one in row[1:]):
+        return text
+    return "\n".join(map((sign if sign != " " else "\t").join, zip(*rows, strict=True))) + "\n"
 
 
 def _in_decimals(text: str) -> str:
@@ -112,6 +134,19 @@ def _of_documents(text: str) -> str:
     return "\n".join([",".join(names), *body, ""])
 
 
+def _of_variables(text: str) -> str:
+    """A column of each variable that stands below its name, those as long as the first."""
+    _, *parts = _NAME_ABOVE.split(text)
+    columns = dict[str, list[str]]()
+    for name, body in zip(parts[::2], parts[1::2], strict=True):
+        rows = [line.split() for line in body.splitlines() if line.strip() and line[0] != "#"]
+        for k, cells in enumerate(zip(*rows, strict=False)):
+            columns[f"{name}[{k}]" if len(rows[0]) > 1 else name] = list(cells)
+    most = max(map(len, columns.values()), default=0)
+    long = {name: cells for name, cells in columns.items() if len(cells) == most}
+    return "\n".join([",".join(long), *map(",".join, zip(*long.values(), strict=True)), ""])
+
+
 def _leaves(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
     """The numbers below the keys of a document, by their path."""
     path, counts = list[tuple[int, str]](), dict[str, int]()
@@ -143,8 +178,10 @@ def _flat(text: str) -> str:
     """The text with a cell for each number of the vectors in brackets that each line holds."""
     lines = _seen(text)
     sizes = {tuple(map(_size, _VECTOR.findall(line))) for line in lines}
-    if len(lines) <= _FEWEST_LINES or len(sizes) != 1 or not (own := sizes.pop()) or 0 in own:
+    if len(lines) <= _FEWEST_LINES or len(sizes) != 1 or not any(own := sizes.pop()):
         return text
+    if 0 in own:  # a list of texts, as of names: none
+        return _flat(_VECTOR.sub(lambda one: one[0] if _size(one[1]) else "", text))
     bare = _VECTOR.sub("0", lines[-1])
     mark = next((one for one in _SEPARATORS if one in bare), "," if bare.strip() == "0" else " ")
 
@@ -254,4 +291,4 @@ def _numbers(line: str, delimiter: str, parts: Sequence[_Part]) -> str | None:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in line.split(delimiter)]
+    return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]

@@ -147,7 +147,7 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         if card.signals["t"].summed:
             whole["t"] = summed(whole["t"])
         rows, said = sound_rows(whole["t"], [x for key, x in whole.items() if key != "t"])
-        whole = whole if np.all(rows) else at_rows(whole, rows)
+        whole = at_rows(whole, rows) if said else whole
         whole["t"], late = even_stamps(whole["t"])
         said = (*said, late) if late else said
         whole, of_speeds = _with_sums(whole, card.signals)

@@ -170,6 +170,7 @@ def damaged(path: Path, form: str, error: Exception) -> BadLog:
 
 
 LABELS = ("name", "label", "signalname", "title")  # keys of what a table within a list is called
+UNIT_KEYS = ("unit", "units", "einheit", "unité", "単位")  # of what gives a unit
 WIDEST_ARRAY = 32  # of an array of numbers that become columns; above, it is an image
 DEEPEST = 6  # tables in each other
 SINGLE_VALUES = (bool, int, float, str, type(None))
@@ -185,6 +186,14 @@ def vectors_of(tree: Any) -> dict[str, RawColumn]:
         name = path if path not in out else f"{path}_{len(out)}"
         out[name] = values
     return out
+
+
+def of_tree(tree: Any, spec: FileSpec) -> Table:
+    """The table of the vectors and single values of a tree, with the units that it gives."""
+    found = vectors_of(tree)
+    keys = [f"{name.removesuffix('.value')}.unit" for name in found]
+    units = tuple(str(found[key][0]) if key in found else "" for key in keys)
+    return replace(of_vectors(tuple(found), found.__getitem__, spec), units=units)
 
 
 def plain_tree(value: Any) -> Any:
@@ -207,7 +216,7 @@ def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]
         ]
         long = [x for _, x in own if x.size > 1]
         if path and (name := _label(value)) and len(long) == 1:
-            own = [(name, long[0])]
+            own = [(name, long[0]), *_unit(name, value)]
         yield from own
     elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
         yield from _entries(path, value, depth)
@@ -230,6 +239,13 @@ def _entries(
         name = _label(one) or f"{path}[{k}]"
         for key, x in long if len(long) == 1 else own:
             yield (name if len(long) == 1 else f"{name}.{key}"), x
+        yield from _unit(name, one) if len(long) == 1 else ()
+
+
+def _unit(name: str, one: Mapping[str, Any]) -> Iterator[tuple[str, RawColumn]]:
+    """The unit that a table gives of its only vector, as a single value behind that's name."""
+    if unit := _label(one, UNIT_KEYS):
+        yield f"{name}.unit", np.array([unit])
 
 
 def records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
@@ -252,9 +268,9 @@ def _numbers(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def _label(one: Mapping[str, Any]) -> str:
-    """What a table calls itself, else nothing."""
-    found = (v for key, v in one.items() if key.lower() in LABELS and isinstance(v, str) and v)
+def _label(one: Mapping[str, Any], keys: Sequence[str] = LABELS) -> str:
+    """What a table calls itself, or the text of another of these keys, else nothing."""
+    found = (v for key, v in one.items() if key.lower() in keys and isinstance(v, str) and v)
     return next(found, "")
 
 

@@ -29,12 +29,12 @@ from workbench.logs.table import (
     Table,
     damaged,
     of_array,
+    of_tree,
     of_vectors,
     plain_tree,
     records,
     refuse_long,
     tags_are_sound,
-    vectors_of,
 )
 from workbench.logs.text import read_text_table
 
@@ -236,7 +236,7 @@ def _read_mat(path: Path, spec: FileSpec) -> Table:
     found = _part(path, variables, spec, f"no variable {spec.rows!r}")
     if isinstance(found, np.ndarray):
         return of_array(path, found, spec)
-    return _of_tree(found, spec)
+    return of_tree(found, spec)
 
 
 def _part(path: Path, tree: Any, spec: FileSpec, missing: str) -> Any:
@@ -253,11 +253,6 @@ def _part(path: Path, tree: Any, spec: FileSpec, missing: str) -> Any:
     return tree
 
 
-def _of_tree(tree: Any, spec: FileSpec) -> Table:
-    found = vectors_of(tree)
-    return of_vectors(tuple(found), found.__getitem__, spec)
-
-
 def _read_hdf5(path: Path, spec: FileSpec) -> Table:
     import h5py
 
@@ -269,7 +264,7 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
         if isinstance(root, h5py.Dataset):
             refuse_long(path, max(root.shape, default=0))
             return of_array(path, root[()].T if matlab else root[()], spec)
-        names: list[str] = []
+        columns = dict[str, tuple[str, int | None]]()
         variables = (root[name] for name in root if not name.startswith("#"))  # "#": MATLAB's own
         if matlab and all(_OBJECT_MARK in item.attrs for item in variables):
             raise BadLog(_objects(path))
@@ -277,16 +272,22 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
         def visit(name: str, item: Any) -> None:
             if isinstance(item, h5py.Dataset) and not name.startswith("#refs#"):
                 refuse_long(path, item.size)
-                names.append(name)
+                wide = min(item.shape) if len(item.shape) == 2 else 1
+                if 1 < wide <= WIDEST_ARRAY:
+                    columns.update({f"{name}[{k}]": (name, k) for k in range(wide)})
+                else:
+                    columns[name] = name, None
 
         root.visititems(visit)
         place = root.name
 
     def read(name: str) -> RawColumn:
+        of, k = columns[name]
         with h5py.File(path, "r") as file:
-            return np.asarray(file[place][name][()])
+            values = np.asarray(file[place][of][()])
+        return values if k is None else np.take(values, k, axis=int(np.argmin(values.shape)))
 
-    return of_vectors(names, read, spec)
+    return of_vectors(tuple(columns), read, spec)
 
 
 def _objects(path: Path) -> str:
@@ -311,7 +312,7 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
             raise _no_json(path, text, error) from None
     rows = _part(path, content, spec, f"no key {spec.rows!r} for the rows")
     if isinstance(rows, dict):
-        return _of_tree(rows, spec)
+        return of_tree(rows, spec)
     if not isinstance(rows, list) or not rows:
         raise BadLog(f"{path}: holds no list of rows; name its key in the card, [file] rows")
     if isinstance(rows[0], dict):
@@ -378,4 +379,4 @@ def read_numpy(path: Path, spec: FileSpec) -> Table:
     vectors = {name: np.squeeze(x) for name, x in found.items()}
     longest = max(vectors.values(), key=lambda x: max(x.shape, default=0))
     refuse_long(path, max(longest.shape, default=0))
-    return of_array(path, longest, spec) if longest.ndim == 2 else _of_tree(vectors, spec)
+    return of_array(path, longest, spec) if longest.ndim == 2 else of_tree(vectors, spec)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
-from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of
@@ -20,7 +19,7 @@ from workbench.logs.clocks import clock_groups, long_groups, topic_groups
 from workbench.logs.layout import Layout, find_layout, is_number, period_above
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.rewritten import as_table
-from workbench.logs.table import Table, of_array
+from workbench.logs.table import Table
 from workbench.logs.times import are_few, with_one_clock
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
@@ -68,10 +67,6 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
             f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
             " that it is the right file"
         )
-    if not found.names and len(names) >= SHORTEST_LOG:
-        long = _of_long_rows(path, body, marks, spec)
-        if long is not None:
-            return long
     first_row = start + found.data + 1
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
@@ -88,17 +83,6 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     if (long := long_groups(table, rows)) or not headed:
         return long or table
     return topic_groups(table, rows) or _grouped(table, rows, marks)
-
-
-def _of_long_rows(path: Path, body: str, marks: _Marks, spec: FileSpec) -> Table | None:
-    """The table of rows of numbers that are a signal each, where they are far fewer than long."""
-    if body.count("\n", 0, len(body) - 1) >= SHORTEST_LOG:
-        return None
-    rows = [_split(line, marks) for line in body.splitlines() if line.strip()]
-    if any(len(row) != len(rows[0]) or not all(map(is_number, row)) for row in rows):
-        return None
-    numbers = [[float(cell.replace(marks.decimal, ".") or "nan") for cell in row] for row in rows]
-    return of_array(path, np.array(numbers), spec.model_copy(update={"skip_rows": 0}))
 
 
 def _blocks(text: str, spec: FileSpec) -> list[Block]:

@@ -26,7 +26,7 @@ _PER_SECOND = {
     **{"day": 86400.0, "days": 86400.0},
 }
 _DURATION = re.compile(rf"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) ?({'|'.join(_PER_SECOND)})")
-_OF_DAY = r"(\d{1,3}):(\d\d)(?::(\d\d)(?:[.,:](\d{1,9}))?)?"
+_OF_DAY = r"(\d{1,3}):(\d\d)(?::(\d\d)(?:[.,:;](\d{1,9}))?)?"
 _DATE = (
     r"\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4}|\d{1,2}-[A-Z][a-z]{2}-\d{4}|\d{4}/\d\d?/\d\d?|"
     r"\d{1,2}/\d{1,2}/\d{4}"
@@ -261,15 +261,18 @@ def numbers_in(raw: NDArray[Any]) -> Numbers:
     return Numbers(values, is_text, first)
 
 
-def sound_rows(t: Array, others: Sequence[Array]) -> tuple[BoolArray, tuple[str, ...]]:
-    """Which rows (n,) are samples, and what is said of the others: rows without a time or with
-    nothing else, where they are few, and rows that are the one before once more, in time and all
-    signals. others: the columns beside the time."""
+def sound_rows(t: Array, others: Sequence[Array]) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Which rows are samples, by number, in the order of time, and what is said of the others: rows
+    without a time or with nothing else, where they are few, and rows that are the one before once
+    more, in time and all signals. others: the columns beside the time."""
     timed: BoolArray = np.isfinite(t)
-    remarks = list[str]()
+    number, remarks = np.arange(len(t)), list[str]()
     untimed = int(np.sum(~timed))
     if not are_few(untimed, len(t)):
-        return np.ones(len(t), dtype=bool), ()
+        return number, ()
+    if len(t) > 1 and np.all(np.diff(t[timed]) < 0.0):
+        number = number[::-1]
+        remarks.append("rows stand from the last to the first: read the other way round")
     if untimed:
         remarks.append(f"{rows_of(untimed)} without a time left out")
     bare = np.all([~np.isfinite(x) for x in others], axis=0) & timed
@@ -282,7 +285,7 @@ def sound_rows(t: Array, others: Sequence[Array]) -> tuple[BoolArray, tuple[str,
         twice[1:] = np.all([t[1:] == t[:-1], *same], axis=0)
     if repeated := int(np.sum(twice)):
         remarks.append(f"{rows_of(repeated)} that repeat the row before left out")
-    return timed & ~twice, tuple(remarks)
+    return number[(timed & ~twice)[number]], tuple(remarks)
 
 
 def even_stamps(t: Array) -> tuple[Array, str]:

@@ -165,7 +165,9 @@ def read_unknown(path: Path) -> UnknownLog:
                     values, why, below = times, "", "s"
         group = table.groups[number] if table.groups else ""
         one = RawColumn(number, key, text, below, values, why, group)
-        (scalars if len(values) == 1 else found).append(one)
+        found.append(one)
+        if np.count_nonzero(known := np.isfinite(values)) == 1:  # a period, in the first row alone
+            scalars.append(replace(found.pop(), header=table.names[number], values=values[known]))
     found = on_clock_of_most(found, table.clocks)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)
     if longest < SHORTEST_LOG:
@@ -259,7 +261,8 @@ def _rows_of(path: Path) -> tuple[str | None, str]:
         return ".".join(own[0][1]) or None, said or _more_runs(lists, *own[0])
     levels = zip(*(place for _, place in own), strict=False)
     place = tuple(keys[0] for keys in takewhile(lambda keys: len(set(keys)) == 1, levels))
-    return ".".join(place[:-1] if len(own) == 1 else place) or None, said
+    alone = len(own) == 1 or own[0][1][len(place)].isdigit()  # a list of signals, a table each
+    return ".".join(place[:-1] if alone else place) or None, said
 
 
 def _more_runs(
@@ -316,8 +319,10 @@ def _struct_of(path: Path) -> str | None:
     except Exception:  # v7.3, or damaged: the reader of tables says so
         return None
     vectors = [one for one in content if one[2] != "struct" and max(one[1]) >= SHORTEST_LOG]
-    if any(min(shape) == 1 for _, shape, _ in vectors):
-        return None
     matrices = [name for name, shape, _ in vectors if min(shape) > 1]
+    if len(matrices) < len(vectors) or len({max(shape) for _, shape, _ in vectors}) == 1 < len(
+        vectors
+    ):
+        return None  # vectors, or matrices of one clock
     structs = [name for name, _, kind in content if kind == "struct"]
     return next(iter([*matrices, *structs]), None)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from workbench.output import Row, next_step
 from workbench.screen import Screen, listed, screen, tabled
-from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
+from workbench.steps.first_card.proposal import Proposal, SignalGuess
+from workbench.steps.first_card.rig_guess import RigGuess
 
 MOST_LEFT_OUT = 5  # columns that one screen names
 

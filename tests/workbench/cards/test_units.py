@@ -27,6 +27,8 @@ from workbench.cards.units import Motion, column_scale, conversion, in_unit_of
         ("%", "u", "linear", 1e-2),
         ("1", "u", "linear", 1.0),
         ("inch/s", "velocity", "linear", 0.0254),
+        ("0.001 mm", "y", "linear", 1e-6),
+        ("0.1 %", "u", "linear", 1e-3),
     ],
 )
 def test_known_conversions(unit: str, signal: str, motion: Motion, factor: float) -> None:
@@ -67,7 +69,7 @@ def test_temperature_has_an_offset() -> None:
         ("deg", "y", "is not a length"),
         ("furlung", "y", "unit 'furlung' is unknown"),
         ("m m)", "y", "is unknown"),
-        ("3 mm", "y", "is unknown"),
+        ("3 furlung", "y", "is unknown"),
         ("dBm", "power", "not linear"),
     ],
 )

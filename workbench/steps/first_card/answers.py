@@ -11,6 +11,7 @@ from workbench.cards.headers import written_unit
 from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale, over_time
 from workbench.steps.first_card.column import COLUMN, Column
+from workbench.steps.first_card.motion_guess import parts_of, written_gain
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEAVE_OUT, THE_OTHER = "-", "+"
@@ -19,7 +20,7 @@ OTHER_MOTION = {"m": "rad", "mm": "deg", "um": "deg", "rad": "m", "deg": "mm", "
                 "N": "N m", "kN": "N m", "mN": "mN m", "N m": "N", "mN m": "N"}  # fmt: skip
 NEXT_UNIT = {"m": "mm", "mm": "m", "rad": "deg", "deg": "rad", "N m": "mN m", "N": "kN"}
 OTHER_GAIN = {"mm": "turn", "turn": "mm"}
-WRITTEN_GAIN = re.compile(r"[\d.]+ \S+/\S+")
+WRITTEN_GAIN = re.compile(r"[\d.]+ [^/\d][^/]*/[^/]+")
 
 
 class BadAnswer(UserError):
@@ -97,9 +98,8 @@ def _turned(one: SignalGuess) -> SignalGuess:
     """A signal as a guess for the other kind of motion: its unit, and per what its gain is."""
     gain = one.gain
     if isinstance(gain, str):
-        number, _, per = gain.partition(" ")
-        above, _, below = per.partition("/")
-        gain = f"{number} {above}/{OTHER_GAIN.get(below, OTHER_MOTION.get(below, below))}"
+        number, above, below = parts_of(gain)
+        gain = written_gain(number, above, OTHER_GAIN.get(below, OTHER_MOTION.get(below, below)))
     rival = OTHER_MOTION.get(one.rival, "") if one.rival != one.column else one.rival
     unit = OTHER_MOTION.get(one.unit, one.unit)
     rival = NEXT_UNIT.get(unit, "") if rival in ("", unit) else rival

@@ -41,8 +41,11 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     end = key[key.index("*") + 1 :]
     others = _beginnings(words, heads, end, best)
     out = {}
+    of_axes = [own for own in words if set(own) & set(best)]
+    in_all = {word for word in best if all(word in own for own in of_axes)}  # of the machine's name
     for (_, number), own in zip(columns, words, strict=True):
-        named = [word for word in dict.fromkeys(own) if word in best]
+        told = [word for k, word in enumerate(own) if word not in in_all or word in own[:k]]
+        named = [word for word in dict.fromkeys(told) if word in best]
         named += ["_".join(one) for one in others if tuple(own[: len(one)]) == one]
         out[number] = named[0] if len(named) == 1 else ""
     return out
@@ -109,8 +112,9 @@ def as_position(head: Header) -> Header:
     """The header of a speed, as one of what the speed sums up to."""
     unit = head.unit
     if unit is not None and unit.quantity == "velocity":
-        card = OF_TURNS.get(unit.card, unit.card.partition("/")[0])
-        unit = WrittenUnit(card, "position", unit.rotary)
+        whole = OF_TURNS.get(unit.plain, unit.plain.partition("/")[0])
+        number = unit.card.removesuffix(unit.plain)
+        unit = WrittenUnit(number + whole, "position", unit.rotary)
     return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
 
 

@@ -138,8 +138,9 @@ def _are_steps(x: Array) -> bool:
     which they go up and down."""
     if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
         return False
-    rise, far = np.diff(x), np.mean(x > LONGEST_GAP * np.median(x))
-    return bool(TWICE * np.sum(rise < 0.0) >= np.sum(rise > 0.0) and far < MOST_UNEVEN)
+    up, down = (np.sum(sign * np.diff(x) > 0.0) for sign in (1.0, -1.0))
+    far = np.mean(x > LONGEST_GAP * np.median(x))
+    return bool(TWICE * down >= up and TWICE * up >= down and far < MOST_UNEVEN)
 
 
 def _wrong_with_clock(t: Array) -> str:

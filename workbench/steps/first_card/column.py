@@ -176,7 +176,7 @@ class Column:
         """Whether it is a current, by its unit or by its name."""
         text = f" {' '.join(words_of(self.header.name))} "
         if self.header.unit is not None:
-            return self.header.unit.card in ("A", "mA")
+            return self.header.unit.plain in ("A", "mA")
         return any(one in text for one in CURRENTS) or (" i " in text and not self.whole)
 
     @cached_property

@@ -15,12 +15,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
-from workbench.logs.times import (
-    even_stamps,
-    sound_rows,
-    stretches,
-    told_of_starts,
-)
+from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
@@ -148,13 +143,13 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             rows, said = sound_rows(one.values, beside)
             runs = stretches(one.values[rows])
             longest = max(runs, key=lambda run: run.stop - run.start)
-            at = np.flatnonzero(rows)[longest]
+            at = rows[longest]
             even, late = even_stamps(one.values[at])
             if late:
                 clock = replace(one, values=even, x=even)
                 return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
                         for c in columns], (*said, late)  # fmt: skip
-            if len(at) < len(one.values) and ticks(replace(one, values=one.values[at])):
+            if (said or len(at) < len(rows)) and ticks(replace(one, values=one.values[at])):
                 if len(runs) > 1:
                     told = told_of_starts(one.values[rows], runs)
                     said = (*said, f"the {told}, of which this is what the longest shows")
@@ -244,7 +239,8 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
             families.append([one])
         else:
             family.append(one)
-    forces = {_begins(of[0]) for of in families if "force" in of[0].header.means}
+    forces = {_begins(of[0]) for of in families if "force" in of[0].header.means
+              and of[0].header.purpose != "reference"}  # fmt: skip
     for family in families:
         if is_position(family[0].header):  # the sort is stable: else the first stays so
             family.sort(key=lambda one: not (is_position(one.header) and _begins(one) in forces))

@@ -34,7 +34,7 @@ SIZES: Mapping[str, tuple[float, float]] = {
     "travel": (0.08, 8.0),
     "speed": (0.1, 10.0),
     "force": (80.0, 12.0),
-    "pressure": (5e5, 4.0),
+    "pressure": (5e5, 2.5),
     "mass": (3.0, 12.0),
     "travel rotary": (2.0, 6.0),
     "speed rotary": (5.0, 10.0),
@@ -43,6 +43,7 @@ SIZES: Mapping[str, tuple[float, float]] = {
     "travel rotor": (20.0, 20.0),  # of a motor's own shaft
     "speed rotor": (30.0, 10.0),
 }
+OF_OIL = (1e7, 3.0)  # the same of a hydraulic pressure
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,21 @@ def metre(unit: str, guess: UnitGuess | None) -> float:
     """What one of the position's unit is in SI, its gain reckoned with."""
     if guess is None or guess.gain is None:
         return factor(unit)
-    number, _, per = guess.gain.partition(" ")
-    above, _, below = per.partition("/")
+    number, above, below = parts_of(guess.gain)
     return factor(unit) * factor(below) / (factor(above) * abs(float(number)))
+
+
+def written_gain(number: float | str, unit: str, per: str) -> str:
+    """A gain as a card has it: so many of a unit per another one."""
+    size = number if isinstance(number, str) else f"{number:.9g}"
+    return f"{size} {unit}/({per})" if " " in per else f"{size} {unit}/{per}"
+
+
+def parts_of(gain: str) -> tuple[str, str, str]:
+    """Number, unit, and what it is per, of a gain so written."""
+    number, _, both = gain.partition(" ")
+    above, _, below = both.rpartition("/")
+    return number, above, below.strip("()")
 
 
 def near(quantity: str, value: float, machine: str) -> float:
@@ -82,10 +95,10 @@ def near(quantity: str, value: float, machine: str) -> float:
     """
     keys = {"linear": (quantity,), "rotor": (f"{quantity} rotor", f"{quantity} rotary", quantity)}
     key = next(one for one in keys.get(machine, (f"{quantity} rotary", quantity)) if one in SIZES)
-    middle, by = SIZES[key]
     if not value > 0.0:
         return 0.0
-    return -0.5 * float((np.log(value / middle) / np.log(by)) ** 2)
+    of_it = [SIZES[key], OF_OIL] if quantity == "pressure" else [SIZES[key]]
+    return max(-0.5 * float((np.log(value / middle) / np.log(by)) ** 2) for middle, by in of_it)
 
 
 def likeliest(
@@ -148,7 +161,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
     if turn is not None:
         return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
     y = roles.columns["y"]
-    if "u" in roles.columns and is_count(y) and roles.columns["u"].current:
+    if is_count(y) and any(one.current for one in (*beside, *roles.columns.values())):
         why = "counts of an encoder beside a motor's current are mostly those of a shaft"
         return MotionGuess("rotary", why, False, rotor)
     if is_count(y) and y.header.unit is None and not y.header.means:

@@ -8,14 +8,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.differentiate import Motion, low_pass
-from identification.signals.relations import (
-    ForceLaw,
-    Lead,
-    beside,
-    changed_by,
-    force_laws,
-    lead,
-)
+from identification.signals.relations import ForceLaw, Lead, beside, changed_by, force_laws, lead
 from workbench.steps.first_card.axes import correlation, normed, stem
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 

@@ -269,6 +269,11 @@ def refuse_error(columns: Columns, roles: Roles) -> None:
     y = roles.columns["y"]
     for one in columns.read if said(y, "y") < SAID_SO else ():
         e, x = one.values, y.values
+        if {one.header.purpose, y.header.purpose} == {"error", "reference"}:
+            raise BadLog(
+                f"{columns.log.path}: no position but its reference {y.shown} and the error"
+                f" {one.shown}; add a column of the one less the other (the position), and give it"
+            )
         if one.header.purpose != "error" or len(e) != len(x) or not np.all(np.isfinite(e * x)):
             continue
         of_error = np.column_stack([e, np.cumsum(e), np.gradient(e), np.ones(len(e))])

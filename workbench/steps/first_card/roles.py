@@ -218,7 +218,10 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
         if any(abs(seen.pairs.alike[at, k]) > EXACT_VELOCITY for at in forces):
             return -3.0  # the force once more, as the current that it was made of
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
-    return head + 1.0 if role == "F" else head - 1.0
+    if role == "F":  # beside two pressures, whose force it is like
+        alike = abs(float(np.corrcoef(way.force, one.x)[0, 1]))
+        return head + 1.0 if head > 0.0 or alike > WORK_GIVES_SIGN else -3.0
+    return head - 1.0
 
 
 def _gives_sign(law: ForceLaw) -> bool:

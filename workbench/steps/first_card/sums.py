@@ -56,7 +56,7 @@ def _summed(columns: Columns, kept: Sequence[Column], own: Column) -> tuple[Colu
     unit, clock = own.header.unit, columns.clock.header.unit
     usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
     second = factor(clock.card if clock and clock.quantity == "time" else usual)
-    h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.card if unit else "", 1.0)
+    h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.plain if unit else "", 1.0)
     x = summed(own.x, np.full(len(own.x), h))
     position = replace(own, header=as_position(own.header), x=x, summed=True)
     return replace(columns, signals=(*kept, position)), position

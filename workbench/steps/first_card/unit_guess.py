@@ -12,26 +12,34 @@ from itertools import product
 
 import numpy as np
 
-from identification.arrays import Array
-from identification.signals.relations import derivative, lead
 from workbench.cards.headers import read_header
-from workbench.cards.units import Motion, force_unit
+from workbench.cards.units import force_unit
 from workbench.logs.layout import NUMBER, says_period
-from workbench.steps.first_card.column import BITS, Column
+from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
     USUAL,
     MotionGuess,
     UnitGuess,
-    counts_per_turn,
     factor,
     is_count,
     likeliest,
     metre,
     near,
     unit_by_turn,
+    written_gain,
 )
 from workbench.steps.first_card.roles import Roles
+from workbench.steps.first_card.scale_guess import (
+    DATA_SHEET,
+    SENSOR_OUTPUTS,
+    by_reference,
+    by_sample_number,
+    counts_samples,
+    sensible,
+    slope_of,
+    slow_ratio,
+)
 
 EPOCHS = {"s": (1e9, 3e9), "ms": (1e12, 3e12), "us": (1e15, 3e15), "ns": (1e18, 3e18)}
 AGREES = 0.1  # relative error up to which a logged velocity is the position's derivative in SI
@@ -53,14 +61,6 @@ SHARES = ("pwm", "duty", "tastgrad")  # words of a share
 MOST_AMPERES = 100.0  # of a current in whole numbers
 NEARLY_ALL_OF_IT, ALL_OF_IT = 95.0, 100.0  # the whole, in %
 USUAL_COMMANDS = {"V": "A", "A": "V", "1": "%", "%": "1"}  # and what it is otherwise
-WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
-ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
-ABOUT = 0.05  # that a round gain is off what the log shows
-SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
-REGISTERS = tuple(2**bits for bits in BITS)  # ranges that counters have whatever a turn is
-SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
-DATA_SHEET = "not in the log: see the sensor's data sheet"
-SENSOR_OUTPUTS = ("command", "count")
 
 Units = dict[str, UnitGuess]
 
@@ -96,16 +96,33 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
             out[name] = _alone(name, column, motion)
-    return {name: _of_a_sensor(name, column, out[name]) for name, column in found.items()}
+    if chambers := {"p_p", "p_n"} & found.keys() - given.keys():  # of one supply: in one unit
+        whole = {"p_p", "p_n"} & given.keys() or chambers
+        larger = max(whole, key=lambda name: float(np.max(np.abs(found[name].x))))
+        out |= dict.fromkeys(chambers, replace(out[larger], sure=False))
+    return {name: _of_a_sensor(name, column, out, roles, motion) for name, column in found.items()}
 
 
-def _of_a_sensor(name: str, column: Column, guess: UnitGuess) -> UnitGuess:
-    """The unit of a force or pressure; of one in volts that, and a gain to be looked up."""
-    own = column.header.unit
-    if name not in ("F", "p_p", "p_n") or own is None or own.quantity not in SENSOR_OUTPUTS:
+def _of_a_sensor(
+    name: str, column: Column, units: Units, roles: Roles, motion: MotionGuess
+) -> UnitGuess:
+    """The unit of a signal; of a force or pressure in volts that, and a gain to be looked up; so of
+    what stands before a gear or screw, that turns where the position slides."""
+    own, guess = column.header.unit, units[name]
+    if name in ("F", "p_p", "p_n") and own and own.quantity in SENSOR_OUTPUTS:
+        gain, other = (written_gain(1.0, own.card, unit) for unit in (guess.unit, guess.rival))
+        return UnitGuess(own.card, gain, False, DATA_SHEET, other)
+    linked = own is not None and own.quantity == ("position" if name == "r" else "force")
+    if name not in ("r", "F", "u") or own is None or not linked or guess.gain or units["y"].gain:
         return guess
-    gain, other = (f"1 {own.card}/{unit}" for unit in (guess.unit, guess.rival))
-    return UnitGuess(own.card, gain, False, DATA_SHEET, other)
+    if own.rotary == (motion.motion == "rotary"):
+        return guess
+    per, size = force_unit(motion.motion), 1.0
+    why = "before a gear or screw: its ratio or lead is in no log"
+    if name == "r":
+        per, why = units["y"].unit, "by its size beside the position, behind a gear or screw"
+        size = sensible(abs(slow_ratio(column.x, roles.columns["y"].x)))
+    return UnitGuess(own.card, written_gain(size, own.card, per), False, why)
 
 
 def _of_header(name: str, column: Column) -> UnitGuess | None:
@@ -132,7 +149,7 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
     for name in ("F", "v"):
         usual[name] = USUAL[f"{name}{turns}"] if name in roles.columns else {"": 0.0}
     open_of = {k: {given[k].unit: 0.0} if k in given else of for k, of in usual.items()}
-    slope = _slope(columns, roles)
+    slope = slope_of(columns, roles)
     scored = []
     for units in product(*(of.items() for of in open_of.values())):
         names = dict(zip(open_of, (unit for unit, _ in units), strict=True))
@@ -210,14 +227,6 @@ def _second(units: Mapping[str, str], given: Units) -> float:
     return metre(units["t"], clock) if clock and clock.gain else factor(units["t"])
 
 
-def _slope(columns: Columns, roles: Roles) -> float | None:
-    """How large the velocity column is beside the position's change in one unit of the clock."""
-    y, v = roles.columns["y"], roles.columns.get("v")
-    if v is None or y.motion is None:
-        return None
-    return abs(derivative(y.motion, v.x).factor) * columns.step * columns.grid
-
-
 def _off(units: Mapping[str, str], given: Units, slope: float | None) -> float | None:
     """Logarithm of the velocity over the position's derivative, both in SI."""
     if slope is None or not units["v"]:
@@ -241,7 +250,7 @@ def contradicted_clock(columns: Columns, roles: Roles, units: Units) -> float | 
     None where the two agree, no velocity is logged, or its unit or the position's is a guess: by
     other units it would be another.
     """
-    slope = _slope(columns, roles)
+    slope = slope_of(columns, roles)
     if slope is None or not (units["y"].sure and units["v"].sure):
         return None
     names = {name: units[name].unit for name in ("t", "y", "v")}
@@ -310,100 +319,3 @@ def _stops_at_all(column: Column) -> bool:
 
 def _command(unit: str, why: str) -> UnitGuess:
     return UnitGuess(unit, None, False, why, USUAL_COMMANDS[unit])
-
-
-def by_reference(
-    columns: Columns, roles: Roles, given: Mapping[str, UnitGuess], motion: Motion
-) -> UnitGuess | None:
-    """The gain of a position in counts or volts: by where it leaps back, by a velocity or a
-    reference whose unit is known, else a usual one."""
-    y, r = roles.columns["y"], roles.columns.get("r")
-    if not is_output(y):
-        return None
-    own = y.header.unit
-    unit = own.card if own and own.quantity == "command" else "count"
-    per = "turn" if motion == "rotary" else "mm"
-    turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
-    if turn is not None and turn not in REGISTERS:
-        return UnitGuess(unit, f"{turn} count/turn", True, "it leaps back after a turn")
-
-    def guess(number: float, why: str, rival: float | None = None) -> UnitGuess:
-        other = "" if rival is None else f"{rival:.9g} {unit}/{per}"
-        return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, other)
-
-    if (rate := _by_velocity(columns, roles, given, motion)) is not None:
-        return guess(_sensible(rate, per == "turn"), "by the velocity beside it")
-    if r is not None and not is_output(r):
-        known = given.get("r")
-        usual = USUAL["y" if motion == "linear" else "y rotary"]
-        per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)[0]
-        if abs(lead(r.x, y.x).likeness) > WELL_KNOWN:
-            number = _sensible(_slow_ratio(y.x, r.x), per == "turn")
-            return guess(number, f"by its size beside the reference {r.shown}")
-    number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
-    if turn is not None:
-        return guess(turn, f"it leaps by {turn}, a turn or the range of a counter", number)
-    if unit != "count":
-        of_range = float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0)
-        return guess(_sensible(of_range), DATA_SHEET)
-    return guess(number, DATA_SHEET, other)
-
-
-def _by_velocity(
-    columns: Columns, roles: Roles, given: Mapping[str, UnitGuess], motion: Motion
-) -> float | None:
-    """Counts a turn or a millimetre, where clock and velocity have known units."""
-    slope = _slope(columns, roles)
-    if not slope or not {"t", "v"} <= given.keys():
-        return None
-    size = 2.0 * np.pi if motion == "rotary" else 1e-3
-    return size / (slope * factor(given["v"].unit) * factor(given["t"].unit))
-
-
-def is_output(column: Column) -> bool:
-    """Whether a position is what a sensor gives: counts, volts, or whole numbers without a unit."""
-    unit = column.header.unit
-    return is_count(column) or (unit is not None and unit.quantity in SENSOR_OUTPUTS)
-
-
-def _slow_ratio(y: Array, r: Array) -> float:
-    """How large a position is beside its reference where both are slow: it overshoots fast ones."""
-    count = max(SLOW_STRETCHES, 2)
-    size = max(1, len(y) // count)
-    a, b = (x[: len(x) // size * size].reshape(-1, size).mean(axis=1) for x in (y, r))
-    a, b = a - a.mean(), b - b.mean()
-    return float(a @ b / (b @ b))
-
-
-def _sensible(number: float, of_turn: bool = False) -> float:
-    """The number to three digits, or a round one (of a turn a power of two) that is as near."""
-    if number == 0.0:
-        return 1.0
-    size = abs(number)
-    decade = 10.0 ** np.floor(np.log10(size))
-    round_ones = [digit * decade for digit in ROUND_DIGITS]
-    round_ones += [2.0 ** round(np.log2(size))] if of_turn else []
-    nearest = min(round_ones, key=lambda one: abs(np.log(one / size)))
-    if abs(nearest / size - 1.0) < ABOUT:
-        return float(np.sign(number) * nearest)
-    return float(f"{number:.3g}")
-
-
-def counts_samples(clock: Column) -> bool:
-    """Whether the clock is the number of a sample: by its name, or by its name and step."""
-    means = clock.header.means
-    called = means.get("count", 0.0) - means.get("time", 0.0)
-    by_ones = float(np.median(np.diff(clock.values))) == 1.0
-    return clock.whole and (called >= SURELY_A_NUMBER or (called > 0.0 and by_ones))
-
-
-def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:
-    """The rate of a log that counts its samples: by a velocity of known unit, else a usual one."""
-    rate, why = 1000.0, "a usual one: nothing in the log gives the time of a sample"
-    slope = _slope(columns, roles)
-    if slope is not None and {"y", "v"} <= given.keys():
-        rate = _sensible(slope * factor(given["v"].unit) / metre(given["y"].unit, given["y"]))
-        why = "by the velocity and the position"
-    elif slope is not None and not {"y", "v"} & given.keys():
-        rate, why = _sensible(slope), "by the velocity, if it is the position's unit a second"
-    return UnitGuess("1", f"{rate:.9g} 1/s", False, why)

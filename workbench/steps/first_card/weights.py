@@ -56,10 +56,7 @@ STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which
 RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
-A_DECADE_ALIKE, MOST_ALIKE = (
-    1.5,
-    4.5,
-)  # a decade by which a reference is nearer to the position
+A_DECADE_ALIKE, MOST_ALIKE = (1.5, 4.5)  # a decade by which a reference is nearer to the position
 A_DECADE_LEFT, MOST_LEFT = 2.5, 5.0  # a decade by which less than a tenth of a force is unexplained
 TURNED_WITH_IT = ("work", "balance", "coulomb", "m", "inertia")  # by the sign of a force
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
@@ -119,7 +116,12 @@ def _by_unit(one: Column, role: str) -> float:
 
 
 def together(one: Column, other: Column) -> float:
-    """Log-odds of two columns in one card, by the axes that their headers name."""
+    """Log-odds of two columns in one card, by the axes that their headers name, and by their units:
+    what turns and what slides have another body between them."""
+    units = [x.header.unit for x in (one, other) if not x.header.doubtful]
+    moved = [unit.rotary for unit in units if unit and unit.quantity in ("position", "force")]
+    if moved in ([True, False], [False, True]):
+        return OTHER_AXIS
     if not (one.axis and other.axis):
         return 0.0
     return SAME_AXIS if one.axis == other.axis else OTHER_AXIS
