@@ -43,8 +43,8 @@ def evolved(
 
     search: Any = differential_evolution  # its stubs know no vectorised cost
     found = search(
-        cost_of, [(0.0, 1.0)] * first.shape[1], init=first, maxiter=generations, strategy="currenttobest1bin", mutation=MUTATION,
-        recombination=CROSSOVER, tol=CONVERGED, polish=False, vectorized=True,
-        updating="deferred", callback=generated, rng=rng,
+        cost_of, [(0.0, 1.0)] * first.shape[1], init=first, maxiter=generations,
+        strategy="currenttobest1bin", mutation=MUTATION, recombination=CROSSOVER, tol=CONVERGED,
+        polish=False, vectorized=True, updating="deferred", callback=generated, rng=rng,
     )  # fmt: skip
     return np.asarray(found.x, dtype=np.float64)
