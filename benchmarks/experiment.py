@@ -50,8 +50,6 @@ from identification.model.plant import Motor, Plant
 from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
-from workbench.cards.parameter_units import shown
-from workbench.documents.drive import present_file
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.steps.experiment.plan import experiment
@@ -124,7 +122,7 @@ def model_of(one: Machine, log: Log, seed: int) -> Model:
     force = None if one.force is None else CardForceLoop(one.force.k_i, one.force.T_i, None)
     output: Literal["command", "force"] = "command" if one.kind == "motor" else "force"
     card = CardController("RST", {}, polynomials, H, output, force, None, None)
-    own = present_file(present(card, rig, H), one.limit, shown(False, rig.command_unit))
+    own = present(card, rig, H)
     fit = replace(model.fit, noise_y=NOISE_Y, noise_F=0.0 if one.kind == "motor" else NOISE_F)
     return replace(model, controller=own, fit=fit)
 

@@ -130,8 +130,8 @@ def loops(model: Model, found: Robust) -> Iterator[tuple[str, DrivenLoop]]:
         yield NOMINAL, driven_loop(model, nominal, nominal.controllers[own.controller], value)
     if nominal.pid is not None:
         yield PID, driven_loop(model, nominal, nominal.pid, None)
-    if model.present is not None:
-        yield PRESENT, present_loop(model, model.present)
+    if model.controller is not None:
+        yield PRESENT, present_loop(model, model.controller)
 
 
 def main() -> None:

@@ -153,7 +153,7 @@ def design() -> Iterator[Screen]:
     promises = dict.fromkeys((ROBUST, NOMINAL, PRESENT), promise)
     for missed in ((), tuple(f"limit {n} is kept by too few" for n in range(9))):
         robust = Robust(found, RobustAsked(), promises, 40, 1e-3, missed, REMARKS)
-        yield robust_view(robust, False).screen(OUT)
+        yield robust_view(robust).screen(OUT)
 
 
 def demo() -> Iterator[Screen]:

@@ -49,7 +49,7 @@ def command(
         traced, validation = found.traced, found.validation
         rotary = traced.model.rotary
         traced_view(traced).write(folder)
-        design_view(found.design, rotary).write(folder, "design.html")
+        design_view(found.design).write(folder, "design.html")
         validation_view(validation, found.traces, rotary).write(folder, "validation.html")
     result = {
         "recipe": RECIPE,

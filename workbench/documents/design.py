@@ -19,10 +19,8 @@ from pydantic import (
 )
 
 from design.cascade import CascadeGains
-from design.compensator import Compensator
 from design.drive_law import DriveLaw, drive_law
 from design.feed_forward import FeedForward
-from design.filters import CompensatorFilters
 from design.loop_frequencies import LoopFrequencies
 from design.margins import Margins
 from design.pid import PIDGains
@@ -31,9 +29,7 @@ from design.schedule import Over, Schedule
 from design.series_filters import FilterKind, SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from identification.model.karnopp import NAMES, Karnopp
-from identification.signals.filters import slope_filter
-from workbench.cards.parameter_units import in_unit
+from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.units import Motion
 from workbench.documents.codec import (
     NOT_WRITTEN,
@@ -49,18 +45,16 @@ from workbench.documents.codec import (
     numbers_of,
     written,
 )
+from workbench.documents.compensator import CompensatorValues
 from workbench.documents.drive import (
     FORCE_LOOP_UNITS,
     PRESENT_LOOP,
-    FiltersFile,
     ForceLoop,
     LawFile,
     Present,
-    filters_of,
     law_file,
     law_of,
 )
-from workbench.documents.model import used
 from workbench.documents.reading import PLACEHOLDER
 
 From = Literal["physical", "arx"]
@@ -73,6 +67,9 @@ FRICTION_AHEAD = {"F_cp": "force", "F_cn": "force", "F_vp": "viscous", "F_vn": "
 PID_UNITS = {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"}
 CASCADE_UNITS = {"k_v": "1/s", "k_p": "damping", "T_n": "s", "eps": "s", "v_ff": "1"}
 AHEAD_UNITS = {**FRICTION_AHEAD, "band": "velocity", "m": "mass", "most": "force"}
+MARGINS_TAKEN = (
+    "modulus", "gain_up", "gain_down", "phase_deg", "delay_s", "S_yp_max_db", "S_up_max_db",
+)  # fmt: skip
 POLES = numbers(lambda w_n, zeta: (w_n, zeta), {"w_n": "rad/s", "zeta": "1"}, above_0=True)
 
 
@@ -135,13 +132,6 @@ class SeriesFile:
     a: tuple[float, ...]
 
 
-def _series_file(one: SeriesFilter, _around: Around) -> SeriesFile:
-    return SeriesFile(
-        one.kind, one.frequency, one.numerator, one.denominator, one.width, one.depth_db,
-        one.filter.b, one.filter.a,
-    )  # fmt: skip
-
-
 def _series(found: SeriesFile, info: Any) -> SeriesFilter:
     """The filter; raises BadModel where its coefficients are not those of its numbers."""
     h = info.data.get("h", math.nan)  # of its controller; where that is refused, so is this
@@ -154,6 +144,12 @@ def _series(found: SeriesFile, info: Any) -> SeriesFilter:
                 " run 'workbench design' again"
             )
     return one
+
+
+SERIES = Through(SeriesFile, _series, lambda one, _around: SeriesFile(
+    one.kind, one.frequency, one.numerator, one.denominator, one.width, one.depth_db,
+    one.filter.b, one.filter.a,
+))  # fmt: skip
 
 
 def _anti_windup(found: LawFile, info: Any) -> tuple[float, ...]:
@@ -201,9 +197,7 @@ class Controller:
     cascade: Annotated[
         CascadeGains | None, numbers(CascadeGains, CASCADE_UNITS, derived=("k_p_command",))
     ] = None
-    series: Annotated[
-        SeriesFilter | None, Through(SeriesFile, _series, _series_file), Field(alias="filter")
-    ] = None
+    series: Annotated[SeriesFilter | None, SERIES, Field(alias="filter")] = None
     feed_forward: Annotated[FeedForward | None, numbers(FeedForward, AHEAD_UNITS)] = None
     acceleration: Annotated[
         float | None, InUnit("acceleration", above_0=True), Field(alias="reference_acceleration")
@@ -242,76 +236,6 @@ class Controller:
         per = command.force_per_command
         forget = 1.0 / self.dominant[0] if per is None else 0.0
         return drive_law(self.rst, forget, 1.0 if per is None else per, self.W)
-
-
-@dataclass(frozen=True)
-class CompensatorValues:
-    """Parameters of the compensator (4): N_c [-], e_T [m], the nine as the model has them.
-
-    filters: around it, and their period [s]; None in older files. excess: see `Compensator`.
-    """
-
-    N_c: float
-    e_T: float
-    friction: Mapping[str, Estimate]
-    filters: CompensatorFilters | None = None
-    h: float | None = None
-    excess: bool = False
-
-    def __post_init__(self) -> None:
-        for name in NAMES:
-            if name not in self.friction:
-                raise BadModel(f"[compensator.friction] has no {name!r}; all nine are needed")
-        _ = self.value
-
-    @property
-    def assumed(self) -> tuple[str, ...]:
-        """Names of the nine that no log identifies."""
-        return tuple(name for name in NAMES if self.friction[name].value is None)
-
-    @property
-    def value(self) -> Compensator:
-        """The compensator for the loop."""
-        friction = Karnopp(**{name: used(self.friction[name]) for name in NAMES})
-        return Compensator(friction, self.N_c, self.e_T, excess=self.excess)
-
-
-@dataclass(frozen=True)
-class CompensatorFile:
-    """`CompensatorValues` as a result has it."""
-
-    N_c: Annotated[float, InUnit("1")]
-    e_T: Annotated[float, InUnit("position")]
-    friction: Mapping[str, Parameter]
-    filters: FiltersFile | None = None
-    excess: bool = False
-
-
-def _compensator_file(one: CompensatorValues, _around: Around) -> CompensatorFile:
-    filters, own = None, one.filters
-    if own is not None and one.h is not None:
-        slope = slope_filter(one.h, own.N_d).b
-        filters = FiltersFile(own.velocity, own.error, own.force, slope, one.h)
-    return CompensatorFile(one.N_c, one.e_T, one.friction, filters, one.excess)
-
-
-def _compensator(found: CompensatorFile, info: Any) -> CompensatorValues:
-    units, filters = info.context.units.friction, found.filters
-    nine = {name: _nine(one, name, units) for name, one in found.friction.items()}
-    if filters is None:
-        return CompensatorValues(found.N_c, found.e_T, nine, excess=found.excess)
-    return CompensatorValues(
-        found.N_c, found.e_T, nine, filters_of(filters), filters.h, found.excess
-    )
-
-
-def _nine(found: Estimate, name: str, units: Mapping[str, str]) -> Estimate:
-    where = f"[{PLACEHOLDER}.friction.{name}]"
-    if name not in units:
-        raise BadModel(f"{where} is none of the nine: {', '.join(units)}")
-    if found.value is None and (not found.reason or found.assumed is None):
-        raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
-    return in_unit(found, units[name], where)
 
 
 @dataclass(frozen=True)
@@ -425,9 +349,7 @@ class Design:
     pid: Controller | None
     refused: Mapping[str, str]
     recommended: Recommended
-    compensator: Annotated[
-        CompensatorValues, Through(CompensatorFile, _compensator, _compensator_file)
-    ]
+    compensator: CompensatorValues
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
     command: Command | None = None
@@ -447,6 +369,21 @@ class Design:
         every = (self.rst, self.pid, self.p_pi)
         return {k: c for k, c in zip(DESIGNED_STRUCTURES, every, strict=True) if c is not None}
 
+    def scheduled(self, name: str) -> ScheduledController | None:
+        """A controller as the gain schedule has it; None where it does not."""
+        own = self.schedule.controllers.items() if self.schedule else ()
+        return next((one for key, one in own if key == name), None)
+
+    @property
+    def rotary(self) -> bool:
+        """Whether positions are angles [rad]."""
+        return self.motion == "rotary"
+
+    @property
+    def units(self) -> Shown:
+        """Units of its numbers."""
+        return shown(self.rotary, self.command.unit if self.command else "V")
+
     @property
     def output(self) -> Output:
         """What its laws give: the command, or the reference of the force loop."""
@@ -457,17 +394,7 @@ def margin_values(
     found: Margins, worst: float | None, at: LoopFrequencies | None = None
 ) -> MarginValues:
     """The margins as results carry them."""
-    return MarginValues(
-        modulus=found.modulus,
-        gain_up=found.gain_up,
-        gain_down=found.gain_down,
-        phase_deg=found.phase_deg,
-        delay_s=found.delay_s,
-        delay_samples=None if found.delay_s is None else found.delay_s / found.h,
-        S_yp_max_db=found.S_yp_max_db,
-        S_up_max_db=found.S_up_max_db,
-        worst_modulus=worst,
-        crossover_hz=at.crossover if at else None,
-        bandwidth_hz=at.bandwidth if at else None,
-        rejection_hz=at.rejection if at else None,
-    )
+    samples = None if found.delay_s is None else found.delay_s / found.h
+    own = {name: getattr(found, name) for name in MARGINS_TAKEN}
+    hertz = {f"{name}_hz": value for name, value in vars(at).items()} if at else {}
+    return MarginValues(**own, **hertz, delay_samples=samples, worst_modulus=worst)

@@ -12,7 +12,6 @@ import numpy as np
 
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.codec import Around, around_in, pairs, said_of, written
 from workbench.documents.design import Design
 from workbench.documents.model import used
@@ -24,7 +23,7 @@ DESIGN_SCHEMA = "design/2"
 
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document = written(found, Around(units_of(found), found.command, found.output))
+    document = written(found, Around(found.units, found.command, found.output))
     return {"schema": document.pop("schema"), **document}
 
 
@@ -32,10 +31,6 @@ def design_digest(found: Design) -> str:
     """By what a validation names the design that it is of: the SHA-256 of its content."""
     text = json.dumps(design_document(found), sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def units_of(found: Design) -> Shown:
-    return shown(found.motion == "rotary", found.command.unit if found.command else "V")
 
 
 def read_design(path: Path | Stored) -> Design:

@@ -6,17 +6,13 @@ Values are plain numbers in SI and in the unit of the command; a file has each w
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
-
-import numpy as np
+from typing import Annotated, Any
 
 from design.drive_law import DriveLaw
-from design.filters import CompensatorFilters, sampled
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
-from identification.signals.filters import Filter, slope_filter
 from workbench.cards.parameter_units import Shown
-from workbench.documents.codec import Around, Command, InUnit, Output, Parameter, Through
+from workbench.documents.codec import Around, InUnit, Output, Parameter, Through
 from workbench.documents.reading import PLACEHOLDER
 
 
@@ -37,14 +33,14 @@ class ForceLoopFile(ForceLoop):
     equation: tuple[str, ...] = ()
 
 
-def _force_file(one: ForceLoop, around: Around) -> ForceLoopFile:
-    lines = force_lines(one, around.limit, around.units)
-    return ForceLoopFile(one.k_i, one.T_i, one.h, around.limit, tuple(lines))
-
-
 FORCE_LOOP_UNITS = Through(
-    ForceLoopFile, lambda found, _info: ForceLoop(found.k_i, found.T_i, found.h), _force_file
-)
+    ForceLoopFile,
+    lambda found, _info: ForceLoop(found.k_i, found.T_i, found.h),
+    lambda one, around: ForceLoopFile(
+        **vars(one), limit=around.limit,
+        equation=tuple(force_lines(one, around.limit, around.units)),
+    ),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,58 +109,18 @@ class PresentFile:
     reference_rate: Annotated[float | None, InUnit("velocity", above_0=True)] = None
 
 
-def present_file(found: Present, limit: float | None, units: Shown) -> PresentFile:
-    """The machine's own controller as a result writes it; limit: of the command."""
-    around = Around(units, Command(units.command, limit, None), found.output)
-    law = law_file(found.law, around)
-    return PresentFile(found.kind, found.gains, law, found.force, found.rate)
+def _present_file(one: Present, around: Around) -> PresentFile:
+    law = law_file(one.law, around._replace(output=one.output))
+    return PresentFile(one.kind, one.gains, law, one.force, one.rate)
 
 
-def present_of(found: PresentFile, units: Shown, where: str) -> Present:
-    """The machine's own controller of a file; raises BadModel where it is none."""
-    law = law_of(found.law, units, f"{where}.law")
-    return Present(
-        found.kind, found.gains, found.law.output, law, found.force, found.reference_rate
-    )
+def _present(found: PresentFile, info: Any) -> Present:
+    law = law_of(found.law, info.context.units, f"{PLACEHOLDER}.law")
+    rate, output = found.reference_rate, found.law.output
+    return Present(found.kind, found.gains, output, law, found.force, rate)
 
 
-PRESENT_LOOP = Through(
-    PresentFile,
-    lambda found, info: present_of(found, info.context.units, PLACEHOLDER),
-    lambda one, around: present_file(one, around.limit, around.units),
-)
-
-
-@dataclass(frozen=True)
-class FiltersFile:
-    """The compensator's filters of figure 4 and its velocity (5), every h.
-
-    A: of the position whose slope the velocity is, B: of the position in r - y, C: of F_comp;
-    slope: from the positions behind A to the velocity.
-    """
-
-    A: Filter
-    B: Filter
-    C: Filter
-    slope: tuple[float, ...]
-    h: Annotated[float, InUnit("s", above_0=True)]
-
-
-def filters_of(written: FiltersFile) -> CompensatorFilters:
-    """The compensator's filters of a file; raises BadModel where they are none."""
-    found = CompensatorFilters(written.A, written.B, written.C, len(written.slope))
-    try:
-        slope = slope_filter(written.h, found.N_d).b
-        for one in (written.A, written.B, written.C):
-            sampled(one)
-    except BadSpecification as error:
-        raise BadModel(f"[compensator.filters] {error}") from None
-    if not np.allclose(slope, written.slope, rtol=1e-9):
-        raise BadModel(
-            f"[compensator.filters] slope = {written.slope}: the velocity (5) at h ="
-            f" {written.h:g} s needs {slope}"
-        )
-    return found
+PRESENT_LOOP = Through(PresentFile, _present, _present_file)
 
 
 def equation_lines(law: DriveLaw, output: Output, limit: float | None, units: Shown) -> list[str]:

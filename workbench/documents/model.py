@@ -18,9 +18,9 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, MATERIAL
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import in_unit, shown
+from workbench.cards.parameter_units import in_unit
 from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through, in_units, no_key
-from workbench.documents.drive import Present, PresentFile, present_of
+from workbench.documents.drive import PRESENT_LOOP, Present
 from workbench.documents.reading import PLACEHOLDER, as_number
 
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
@@ -244,7 +244,7 @@ class Model:
     correlation: ParameterCorrelation | None = None
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
-    controller: PresentFile | None = None
+    controller: Annotated[Present | None, PRESENT_LOOP] = None
     identifiability: tuple[Identifiable, ...] = ()
     lag: Parameter | None = None
     resonance: Mapping[str, Parameter] | None = None
@@ -273,7 +273,7 @@ class Model:
         for table, found in tables.items():
             for name, estimate in found.items():
                 _check_estimate(f"[{table}.{name}]", estimate)
-        _ = self.simulated, self.present
+        _ = self.simulated
 
     @property
     def karnopp(self) -> Karnopp:
@@ -349,13 +349,6 @@ class Model:
         """Whether the motion was prescribed by a rig: no drive of its own shows in the logs."""
         driven = self.rig.kind == "motor" or self.actuator is not None
         return self.by_equation and not driven
-
-    @property
-    def present(self) -> Present | None:
-        """The controller that the machine has now; None where its card named none."""
-        if self.controller is None:
-            return None
-        return present_of(self.controller, shown(self.rotary, self.rig.command_unit), "controller")
 
     @property
     def rotary(self) -> bool:

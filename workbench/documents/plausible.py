@@ -78,27 +78,27 @@ def log_remarks(
     """
     other = contradicted_units(signals, rig)
     named = {name: f"signals.{name}, read in {spec.unit!r}" for name, spec in signals.items()}
-    periods, travels = [log.h for log in logs], [float(np.ptp(log["y"])) for log in logs]
-    where = named.get("t", "signals.t")
+
+    def peak(name: str, logged: str = "") -> float:
+        return max(float(np.max(np.abs(log.signals.get(logged, log[name])))) for log in logs)
+
+    periods = [log.h for log in logs]
+    seen = [("t", "period", h, "sampled every") for h in _extremes(periods)]
+    seen += [("y", "travel", max(map(_travel, logs)), "the position covers")]
+    if "F" in signals:
+        seen += [("F", "force", peak("F", "F_logged"), "the force is at most")]
+    pressures = (name for name in ("p_p", "p_n") if name in signals)
+    seen += [(name, "pressure", peak(name), "the pressure is at most") for name in pressures]
     lines = [*other.values()] + [
-        _judged("period", x, rig, where, "sampled every") for x in _extremes(periods)
-        if "t" not in other
-    ]  # fmt: skip
-    where = named.get("y", "signals.y")
-    if "y" not in other:
-        lines += [_judged("travel", max(travels), rig, where, "the position covers")]
-    if "F" in signals and "F" not in other:
-        peak = max(float(np.max(np.abs(log.signals.get("F_logged", log["F"])))) for log in logs)
-        lines += [_judged("force", peak, rig, named["F"], "the force is at most")]
-    for name in ("p_p", "p_n"):
-        if name in signals and name not in other:
-            peak = max(float(np.max(np.abs(log[name]))) for log in logs)
-            lines += [_judged("pressure", peak, rig, named[name], "the pressure is at most")]
+        _judged(quantity, value, rig, named.get(name, f"signals.{name}"), said)
+        for name, quantity, value, said in seen
+        if name not in other
+    ]
     if rig.control_limit and "u" in signals and "u" not in other:
-        peak = max(float(np.max(np.abs(log["u"]))) for log in logs)
-        if 0 < peak < _UNUSED * rig.control_limit:
+        most = peak("u")
+        if 0 < most < _UNUSED * rig.control_limit:
             lines += [
-                f"{named['u']}: the command reaches {peak:.3g} of a control_limit_v ="
+                f"{named['u']}: the command reaches {most:.3g} of a control_limit_v ="
                 f" {rig.control_limit:g}; check both units"
             ]
     return tuple(dict.fromkeys(line for line in (*lines, *_of_rig(rig)) if line))

@@ -4,15 +4,14 @@ co-simulation with that source, which the importer compiles."""
 import hashlib
 import io
 import zipfile
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
 from design.program import Program, Variable
 from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, heading_of, rows
-from workbench.export.syntax import INDENT, Syntax, braced
+from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Python's names that are keywords of C, and one of a function of its library.
 C_KEYWORDS = (
@@ -22,32 +21,10 @@ C_KEYWORDS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class C(Syntax):
-    """C99; states are members of a structure `s`."""
-
-    def number(self, value: float) -> str:
-        suffix = "f" if self.precision == "single" else ""
-        return repr(self.rounded(value)) + suffix
-
-    def assigned(self, target: str, value: str) -> str:
-        return f"{target} = {value};"
-
-    def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
-        head = [f"if ({condition}) {{", *braced(then)]
-        return [*head, "}"] if not otherwise else [*head, "} else {", *braced(otherwise), "}"]
-
-    def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
-        return [f"for ({index} = 0; {index} < {count}; ++{index}) {{", *braced(body), "}"]
-
-    def remark(self, text: str) -> str:
-        return f"/* {text.replace('*/', '* /')} */"
-
-
-def c_syntax(program: Program, precision: Precision) -> C:
+def c_syntax(program: Program, precision: Precision) -> Syntax:
     """C for this program: its functions for min, max and abs bear its name."""
     short = program.name
-    return C(
+    return Syntax(
         precision=precision,
         symbols={
             "+": "+", "-": "-", "*": "*", "/": "/", "negative": "-", "not": "!", "and": "&&",
@@ -55,6 +32,11 @@ def c_syntax(program: Program, precision: Precision) -> C:
         },
         functions={"min": f"{short}_min", "max": f"{short}_max", "abs": f"{short}_abs"},
         names={word: f"{word}_" for word in C_KEYWORDS},
+        literal=(lambda digits: f"{digits}f") if precision == "single" else str,
+        assign="{} = {};",
+        choice=("if ({}) {{", "} else {", "}"),
+        loop=("for ({0} = 0; {0} < {1}; ++{0}) {{", "}"),
+        comment=("/*", "*/"),
         states=frozenset(one.name for one in program.states),
         state_prefix="s->",
     )  # fmt: skip
@@ -86,25 +68,21 @@ def c_files(what: Exported) -> dict[str, str]:
         ],
     }
     reset = [line for one in program.states for line in c.reset(one)]
+    step = c.lines(program.statements)
     source = filled(
         "controller.c",
         **common,
         zero=c.number(0.0),
         constants=[{**vars(one), "value": c.number(one.value)} for one in program.constants],
-        tables=[
-            {"name": one.name, "meaning": one.meaning, **_numbers(one.values, c)}
-            for one in program.tables
+        arrays=[
+            {"name": name, "meaning": said, "size": len(own), "lines": rows(map(c.number, own))}
+            for name, said, own in arrays_of(program)
         ],
-        starts=[
-            {"name": one.name, **_numbers(one.at_rest, c)}
-            for one in program.states
-            if one.array and any(one.at_rest)
-        ],
-        helpers=list(_helpers(what, c)),
+        used=[key for key, name in c.functions.items() if f"{name}(" in "\n".join(step)],
         reset=reset,
         loops=any(line.startswith("for (j ") for line in reset),
         locals=_declared_locals((*program.locals, Variable(program.output.name)), c),
-        step=c.lines(program.statements),
+        step=step,
         test_inputs=rows(
             "{" + ", ".join(c.number(v) for v in row) + "}" for row in test.inputs.tolist()
         ),
@@ -113,11 +91,7 @@ def c_files(what: Exported) -> dict[str, str]:
     return {f"{program.name}.h": filled("controller.h", **common), f"{program.name}.c": source}
 
 
-def _numbers(values: tuple[float, ...], c: C) -> dict[str, object]:
-    return {"size": len(values), "lines": rows(c.number(v) for v in values)}
-
-
-def _declared_locals(variables: tuple[Variable, ...], c: C) -> list[str]:
+def _declared_locals(variables: tuple[Variable, ...], c: Syntax) -> list[str]:
     """Declarations, one a kind."""
     kinds: dict[str, list[str]] = {}
     for one in variables:
@@ -128,20 +102,6 @@ def _declared_locals(variables: tuple[Variable, ...], c: C) -> list[str]:
         lines += [f"{kind} {first}", *(INDENT + line for line in others)]
         lines[-1] += ";"
     return lines
-
-
-def _helpers(what: Exported, c: C) -> Iterator[str]:
-    """Functions that the step uses. They are Python's min and max, which the simulation has."""
-    used = "\n".join(c.lines(what.program.statements))
-    bodies = {
-        "min": ("real a, real b", "b < a ? b : a"),
-        "max": ("real a, real b", "b > a ? b : a"),
-        "abs": ("real a", f"a > {c.number(0.0)} ? a : {c.number(0.0)} - a"),
-    }
-    for key, (given, body) in bodies.items():
-        function = c.functions[key]
-        if f"{function}(" in used:
-            yield f"static real {function}({given})\n{{\n    return {body};\n}}"
 
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of the files inside, so that the same design gives the same bytes
@@ -159,22 +119,10 @@ BASE_UNITS: Mapping[str, Mapping[str, float]] = {
 }
 
 
-@dataclass(frozen=True)
-class FMUVariable:
-    """A variable of the model; place: where its value stands in an instance."""
-
-    name: str
-    reference: int
-    causality: str
-    unit: str
-    meaning: str
-    place: str
-
-
 def fmu_file(what: Exported) -> dict[str, bytes]:
     """The FMU, which holds no binary."""
     program, files = what.program, c_files(what)
-    variables = tuple(_variables(what))
+    variables = _variables(what)
     token = hashlib.sha256("".join(files.values()).encode()).hexdigest()
     common: dict[str, Any] = {
         **heading_of(what),
@@ -183,7 +131,7 @@ def fmu_file(what: Exported) -> dict[str, bytes]:
         "token": token,
     }
     position = next(at for at, one in enumerate(program.inputs) if one.name == "y")
-    used = {one.unit for one in variables}
+    used = {one["unit"] for one in variables}
     description = filled(
         "modelDescription.xml",
         markup=True,
@@ -204,13 +152,15 @@ def fmu_file(what: Exported) -> dict[str, bytes]:
     return {f"{program.name}.fmu": packed.getvalue()}
 
 
-def _variables(what: Exported) -> Iterator[FMUVariable]:
-    """Inputs, the command, and what is worth watching inside."""
-    program = what.program
-    for at, one in enumerate(program.inputs):
-        yield FMUVariable(one.name, at + 1, "input", one.unit, one.meaning, f"input[{at}]")
-    output, first = program.output, len(program.inputs) + 1
-    yield FMUVariable(output.name, first, "output", output.unit, output.meaning, "output")
-    watched = [one for one in program.states if one.kind == "real" and not one.array]
-    for at, state in enumerate(watched, first + 1):
-        yield FMUVariable(state.name, at, "local", "", state.meaning, f"state.{state.name}")
+def _variables(what: Exported) -> list[dict[str, Any]]:
+    """Inputs, the command, and what is worth watching inside; place: where the value of each
+    stands in an instance."""
+    program, keys = what.program, ("causality", "name", "meaning", "unit", "place")
+    signals = [("input", one, f"input[{at}]") for at, one in enumerate(program.inputs)]
+    every = [
+        *((causality, one.name, one.meaning, one.unit, place)
+          for causality, one, place in (*signals, ("output", program.output, "output"))),
+        *(("local", one.name, one.meaning, "", f"state.{one.name}") for one in program.states
+          if one.kind == "real" and not one.array),
+    ]  # fmt: skip
+    return [dict(zip(keys, one, strict=True), reference=at) for at, one in enumerate(every, 1)]

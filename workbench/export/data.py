@@ -12,12 +12,10 @@ from design.program import (
     Choice,
     Constant,
     Element,
-    Expression,
     Number,
     Operation,
     Remark,
     Repeat,
-    Statement,
     Variable,
 )
 from design.servo import Compensation
@@ -28,6 +26,7 @@ from workbench.export.filled import lead_of, title_of
 from workbench.output import dumps
 
 PROGRAM_SCHEMA = "program/1"
+PROGRAM_KEYS = ("inputs", "output", "constants", "tables", "states", "locals")
 
 
 def json_file(what: Exported) -> dict[str, str]:
@@ -41,13 +40,8 @@ def json_file(what: Exported) -> dict[str, str]:
         "controller": what.controller,
         "h": program.h,
         "ratio": program.ratio,
-        "inputs": program.inputs,
-        "output": program.output,
-        "constants": program.constants,
-        "tables": program.tables,
-        "states": program.states,
-        "locals": program.locals,
-        "program": [_statement(one) for one in program.statements],
+        **{key: getattr(program, key) for key in PROGRAM_KEYS},
+        "program": _tree(program.statements),
         "values": values_of(what),
         "test": {"inputs": what.test.inputs, "outputs": what.test.outputs},
     }
@@ -135,28 +129,24 @@ def _filled_in(value: Any) -> Any:
     return value
 
 
-def _statement(one: Statement) -> list[Any]:
-    """A statement as a list, what it is first."""
+def _tree(one: Any) -> Any:
+    """A statement or an operation as a list, what it is first; a number, a name."""
     match one:
+        case tuple():
+            return [_tree(each) for each in one]
         case Assign(target, value):
-            return ["=", _expression(target), _expression(value)]
+            return ["=", _tree(target), _tree(value)]
         case Choice(condition, then, otherwise):
-            branches = [[_statement(each) for each in branch] for branch in (then, otherwise)]
-            return ["if", _expression(condition), *branches]
+            return ["if", _tree(condition), _tree(then), _tree(otherwise)]
         case Repeat(index, count, body):
-            return ["for", index.name, count, [_statement(each) for each in body]]
+            return ["for", index.name, count, _tree(body)]
         case Remark(text):
             return ["#", text]
-
-
-def _expression(value: Expression) -> Any:
-    """A number, a name, or a list with the operator first."""
-    match value:
         case Number(number):
             return number
         case Constant(name) | Variable(name):
             return name
         case Element(array, index):
-            return ["[]", array, _expression(index)]
+            return ["[]", array, _tree(index)]
         case Operation(operator, arguments):
-            return [operator, *(_expression(one) for one in arguments)]
+            return [operator, *_tree(arguments)]

@@ -108,7 +108,8 @@ def _without_unread(program: Program) -> Program:
     had."""
     kept = program.statements
     while True:
-        read = {program.output.name, *_read_in(kept)}
+        parts_read = (part for one in flat(kept) for part in _parts_of(one))
+        read = {program.output.name, *(p.name for p in parts_read if isinstance(p, Variable))}
         unread = {one.name for one in program.locals} - read
         less = tuple(
             one for one in kept
@@ -127,16 +128,8 @@ def _without_unread(program: Program) -> Program:
     )  # fmt: skip
 
 
-def _read_in(statements: tuple[Statement, ...]) -> Iterator[str]:
-    """Names of the variables that the statements read, and of those that count."""
-    for one in flat(statements):
-        yield from (part.name for part in _parts_of(one) if isinstance(part, Variable))
-        if isinstance(one, Repeat):
-            yield one.index.name
-
-
 def _parts_of(one: Statement) -> Iterator[Expression]:
-    """What a statement reads."""
+    """What a statement reads, and what it counts by."""
     match one:
         case Assign(target, value):
             yield from parts(value)
@@ -144,14 +137,15 @@ def _parts_of(one: Statement) -> Iterator[Expression]:
                 yield from parts(target.index)
         case Choice(condition):
             yield from parts(condition)
+        case Repeat(index):
+            yield index
 
 
 def _with_schedule(
     found: Design, chosen: str, loop: DrivenLoop, scheduled: bool | None
 ) -> DrivenLoop:
     """The loop with the gain schedule of its controller, where that is asked or recommended."""
-    table, one = found.schedule, found.controllers.get(chosen)
-    own = next((s for n, s in table.controllers.items() if n == chosen), None) if table else None
+    table, one, own = found.schedule, found.controllers.get(chosen), found.scheduled(chosen)
     if scheduled is None:
         scheduled = own is not None and own.recommended
     if not scheduled:
@@ -204,10 +198,9 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
         out.append(
             "compensator: F_sp and F_sn are what breakaway needs beyond sliding, F_cp, F_cn 0"
         )
-    if loop.schedule is not None and found.schedule is not None:
-        own_of = {str(name): one for name, one in found.schedule.controllers.items()}
+    if loop.schedule is not None and (own := found.scheduled(chosen)):
         over = f"scheduled over the {loop.schedule.over}, {len(loop.schedule.at)} points"
-        out.append(f"{over}: {own_of[chosen].why}")
+        out.append(f"{over}: {own.why}")
     if found.command.limit is None:
         out.append("no limit of the command is known: it is not clipped")
     if beside and found.compensator.assumed:

@@ -1,7 +1,7 @@
 """Feed-forward of acceleration, velocity and friction as C99 and Structured Text."""
 
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -13,11 +13,12 @@ from identification.model.plant import Motor
 from workbench.export.compensation import (
     IDENTIFIED_BY_SLIDING,
     Compensation,
+    Content,
     Cost,
-    TableFile,
+    Format,
     friction_costs,
 )
-from workbench.export.filled import filled, rows
+from workbench.export.filled import rows
 from workbench.export.friction_formats import both_ways
 from workbench.export.structured_text import st_syntax
 
@@ -63,33 +64,6 @@ def is_included(one: Acting) -> bool:
     return is_cogging(one) or one.key in ("constant_force", "spring", "gravity")
 
 
-def feed_forward_c(what: Compensation) -> tuple[TableFile, ...]:
-    """The feed-forward as C99: a header and a source."""
-    values = _values(what, "C")
-    source = _file(what, "c", values, "C99: call it every sample")
-    return source, _file(what, "h", values, "C99: its header")
-
-
-def feed_forward_st(what: Compensation) -> tuple[TableFile, ...]:
-    """The feed-forward as a function block of IEC 61131-3."""
-    where = "a PLC: import it, call it in the axis's task"
-    return (_file(what, "st", _values(what, "ST"), where),)
-
-
-def _file(what: Compensation, ending: str, values: dict[str, Any], where: str) -> TableFile:
-    name, text = f"feed_forward.{ending}", filled(f"feed_forward.{ending}", **values)
-    v, _, error = both_ways(what, FEED_FORWARD_POINTS)
-    units = ("rad, rad/s, rad/s^2, N m" if what.rotary else "m, m/s, m/s^2, N") + " of the axis"
-    return TableFile(
-        f"{what.name}_{name}", text, "feed-forward", "", units, where, len(v), error, _costs(what),
-        _remarks_of(what),
-    )  # fmt: skip
-
-
-def _remarks_of(what: Compensation) -> tuple[str, ...]:
-    return (*what.small((*IDENTIFIED_BY_SLIDING, "m")), *what.unidentified_places, *what.beyond)
-
-
 def _costs(what: Compensation) -> tuple[Cost, ...]:
     """As of a friction table, but for the position-dependent forces that it has."""
     included = {one.key.replace("_", " ") for one in what.model.acting if is_included(one)}
@@ -100,22 +74,19 @@ def _costs(what: Compensation) -> tuple[Cost, ...]:
     )
 
 
-def _values(what: Compensation, language: str) -> dict[str, Any]:
-    """What the templates are filled with."""
+def feed_forward(what: Compensation, language: str) -> Content:
+    """The feed-forward as C99, or as a function block of IEC 61131-3."""
     what.need("a feed-forward", ("m",))
-    model = what.model
-    v, F, _ = both_ways(what, FEED_FORWARD_POINTS)
+    (v, F, error), model = both_ways(what, FEED_FORWARD_POINTS), what.model
     along_travel = place_force(tuple(one for one in what.places if is_included(one)))
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
     form = (lambda value: repr(float(value))) if language == "C" else st_syntax("double").number
-    return {
-        "card": model.card,
+    length = "rad" if what.rotary else "m"
+    values = {
         "name": what.name,
-        "costs": [one.in_words(what.force_unit) for one in _costs(what)],
-        "remarks": _remarks_of(what),
-        "length": "rad" if what.rotary else "m",
+        "length": length,
         "force": what.force_unit,
         "mass_unit": "kg m^2" if what.rotary else "kg",
         "m": form(model.karnopp.m),
@@ -134,3 +105,17 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
         "command": model.rig.command_unit,
         "zero": form(0.0),
     }
+    units = f"{length}, {length}/s, {length}/s^2, {what.force_unit} of the axis"
+    small = what.small((*IDENTIFIED_BY_SLIDING, "m"))
+    remarks = (*small, *what.unidentified_places, *what.beyond)
+    return Content(units, len(v), error, values, _costs(what), remarks)
+
+
+_IN_C = partial(feed_forward, language="C")
+FEED_FORWARD_FILES = {
+    "c": (Format("feed_forward.c", "feed-forward", "", "C99: call it every sample", _IN_C),
+          Format("feed_forward.h", "feed-forward", "", "C99: its header", _IN_C)),
+    "st": (Format("feed_forward.st", "feed-forward", "",
+                  "a PLC: import it, call it in the axis's task",
+                  partial(feed_forward, language="ST")),),
+}  # fmt: skip

@@ -1,5 +1,6 @@
 """A controller as function blocks of IEC 61131-3, in Structured Text and in PLCopen XML."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -7,52 +8,11 @@ from importlib.metadata import version
 from design.program import Kind
 from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, heading_of, rows
-from workbench.export.syntax import AT_POSITION_1, INDENT, Syntax, braced
+from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Words of the standard, and operators of its Instruction List, that a name here may meet.
 RESERVED = ("s", "n", "d", "l", "p", "t", "in", "to", "by", "of", "on", "step", "limit", "mod")
 OWN = "_1"  # behind such a name
-
-
-@dataclass(frozen=True)
-class StructuredText(Syntax):
-    """Structured Text with the plain elements of every edition."""
-
-    def number(self, value: float) -> str:
-        digits, _, power = repr(self.rounded(value)).upper().partition("E")
-        mantissa = digits if "." in digits else digits + ".0"
-        return f"{mantissa}E{int(power)}" if power else mantissa
-
-    def assigned(self, target: str, value: str) -> str:
-        return f"{target} := {value};"
-
-    def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
-        head = [f"IF {condition} THEN", *braced(then)]
-        return [*head, *(["ELSE", *braced(otherwise)] if otherwise else []), "END_IF;"]
-
-    def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
-        return [f"FOR {index} := 0 TO {count - 1} DO", *braced(body), "END_FOR;"]
-
-    def remark(self, text: str) -> str:
-        return f"(* {text.replace('*)', '* )')} *)"
-
-
-def st_syntax(precision: Precision) -> StructuredText:
-    """Structured Text in LREAL or REAL."""
-    return StructuredText(
-        precision=precision,
-        symbols={
-            "+": "+", "-": "-", "*": "*", "/": "/", "negative": "-", "not": "NOT ",
-            "and": "AND", "or": "OR", "==": "=", "!=": "<>", "<": "<", "<=": "<=", ">": ">",
-            ">=": ">=",
-        },
-        functions={"min": "MIN", "max": "MAX", "abs": "ABS"},
-        names={"r": "r_ref", **{word: word + OWN for word in RESERVED}},
-    )  # fmt: skip
-
-
-NEVER = "begun"  # whether the block has run before
-EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
 
 
 @dataclass(frozen=True)
@@ -79,6 +39,44 @@ class Declared:
         return f"{self.name} : {kind} := [{said}\n{values}\n{INDENT * 2}];"
 
 
+def _literal(digits: str) -> str:
+    mantissa, _, power = digits.upper().partition("E")
+    mantissa += "" if "." in mantissa else ".0"
+    return f"{mantissa}E{int(power)}" if power else mantissa
+
+
+def _declared(
+    st: Syntax, name: str, kind: Kind, said: str = "", values: Sequence[float] = (), size: int = 0
+) -> Declared:
+    """A variable of a block; values: its first ones, of an array of this size."""
+    real = "REAL" if st.precision == "single" else "LREAL"
+    types = {"real": real, "integer": "DINT", "boolean": "BOOL"}
+    return Declared(st.name(name), types[kind], said, size, tuple(map(st.number, values)))
+
+
+def st_syntax(precision: Precision) -> Syntax:
+    """Structured Text in LREAL or REAL."""
+    return Syntax(
+        precision=precision,
+        symbols={
+            "+": "+", "-": "-", "*": "*", "/": "/", "negative": "-", "not": "NOT ",
+            "and": "AND", "or": "OR", "==": "=", "!=": "<>", "<": "<", "<=": "<=", ">": ">",
+            ">=": ">=",
+        },
+        functions={"min": "MIN", "max": "MAX", "abs": "ABS"},
+        names={"r": "r_ref", **{word: word + OWN for word in RESERVED}},
+        literal=_literal,
+        assign="{} := {};",
+        choice=("IF {} THEN", "ELSE", "END_IF;"),
+        loop=("FOR {0} := 0 TO {2} DO", "END_FOR;"),
+        comment=("(*", "*)"),
+    )  # fmt: skip
+
+
+NEVER = "begun"  # whether the block has run before
+EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
+
+
 @dataclass(frozen=True)
 class Block:
     """A function block: its variables by role, and its statements."""
@@ -103,65 +101,44 @@ def blocks(what: Exported) -> tuple[Block, Block]:
     return _controller(what, st), _test(what, st)
 
 
-def _types(what: Exported) -> dict[Kind, str]:
-    real = "REAL" if what.precision == "single" else "LREAL"
-    return {"real": real, "integer": "DINT", "boolean": "BOOL"}
-
-
-def _controller(what: Exported, st: StructuredText) -> Block:
-    program, types = what.program, _types(what)
-    real = types["real"]
-    inputs = [
-        Declared(st.name(one.name), real, f"[{one.unit}] {one.meaning}") for one in program.inputs
-    ]
-    begin = Declared("reset", "BOOL", "TRUE: begin anew, the machine stands at y")
+def _controller(what: Exported, st: Syntax) -> Block:
+    program = what.program
+    signals = {one.name: f"[{one.unit}] {one.meaning}" for one in (*program.inputs, program.output)}
     constants = [
-        Declared(st.name(one.name), real, f"[{one.unit}] {one.meaning}", 0, (st.number(one.value),))
+        _declared(st, one.name, "real", f"[{one.unit}] {one.meaning}", (one.value,))
         for one in program.constants
     ]
-    tables = [(one.name, one.values, one.meaning) for one in program.tables]
-    stood = "where the machine has stood at position 1"
-    tables += [
-        (one.name + AT_POSITION_1, one.at_rest, f"{one.name} {stood}")
-        for one in program.states
-        if one.array and any(one.at_rest)
-    ]
     constants += [
-        Declared(st.name(name), real, meaning, len(values), tuple(map(st.number, values)))
-        for name, values, meaning in tables
+        _declared(st, name, "real", said, own, len(own)) for name, said, own in arrays_of(program)
     ]
-    stored = [
-        Declared(
-            st.name(one.name), types[one.kind], one.meaning, len(one.at_rest) if one.array else 0
-        )
+    variables = [
+        _declared(st, one.name, one.kind, one.meaning, size=len(one.at_rest) if one.array else 0)
         for one in program.states
     ]
-    own = [Declared(st.name(one.name), types[one.kind], "") for one in program.locals]
-    started = Declared(NEVER, "BOOL", "whether it has run before")
-    if not any(one.name == "j" for one in own):
-        own.append(Declared("j", types["integer"], ""))
-    output = program.output
+    variables.append(_declared(st, NEVER, "boolean", "whether it has run before"))
+    variables += [_declared(st, one.name, one.kind) for one in program.locals]
+    if not any(one.name == "j" for one in program.locals):
+        variables.append(_declared(st, "j", "integer"))
     first = [f"IF reset OR NOT {NEVER} THEN", f"{INDENT}{NEVER} := TRUE;"]
     first += [INDENT + line for one in program.states for line in st.reset(one)]
     return Block(
         f"FB_{program.name}",
-        (*inputs, begin),
-        (Declared(st.name(output.name), real, f"[{output.unit}] {output.meaning}"),),
+        (*(_declared(st, one.name, "real", signals[one.name]) for one in program.inputs),
+         _declared(st, "reset", "boolean", "TRUE: begin anew, the machine stands at y")),
+        (_declared(st, program.output.name, "real", signals[program.output.name]),),
         tuple(constants),
-        (*stored, started, *own),
+        tuple(variables),
         (*first, "END_IF;", *st.lines(program.statements)),
-    )
+    )  # fmt: skip
 
 
-def _test(what: Exported, st: StructuredText) -> Block:
+def _test(what: Exported, st: Syntax) -> Block:
     """The block that runs the vector once and says whether the controller's block gives it."""
-    program, types, test = what.program, _types(what), what.test
-    real, n = types["real"], len(test.outputs)
+    program, test, n = what.program, what.test, len(what.test.outputs)
     tables = [
-        Declared(f"in_{one.name}", real, f"[{one.unit}]", n, tuple(map(st.number, column)))
+        _declared(st, f"in_{one.name}", "real", f"[{one.unit}]", column, n)
         for one, column in zip(program.inputs, test.inputs.T.tolist(), strict=True)
     ]
-    wanted = Declared("wanted", real, "", n, tuple(map(st.number, test.outputs.tolist())))
     most = max(abs(test.outputs).max(), 1.0) * EXACT[what.precision]
     given = ", ".join(f"{st.name(one.name)} := in_{one.name}[k]" for one in program.inputs)
     body = (
@@ -175,10 +152,10 @@ def _test(what: Exported, st: StructuredText) -> Block:
     return Block(
         f"FB_{program.name}_test",
         (),
-        (Declared("passed", "BOOL", "whether the block gives what the simulation gave"),
-         Declared("worst", real, f"[{program.output.unit}] largest difference")),
-        (*tables, wanted),
-        (Declared("block", f"FB_{program.name}", ""), Declared("k", types["integer"], "")),
+        (_declared(st, "passed", "boolean", "whether the block gives what the simulation gave"),
+         _declared(st, "worst", "real", f"[{program.output.unit}] largest difference")),
+        (*tables, _declared(st, "wanted", "real", "", test.outputs.tolist(), n)),
+        (Declared("block", f"FB_{program.name}", ""), _declared(st, "k", "integer")),
         body,
     )  # fmt: skip
 

@@ -1,8 +1,7 @@
 """A program's statements in the syntax of C and of Structured Text."""
 
 import math
-from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from design.program import (
     Number,
     Operation,
     Operator,
+    Program,
     Remark,
     Repeat,
     State,
@@ -41,42 +41,29 @@ class Syntax:
     """How a language writes a program.
 
     symbols: of its operators; functions: for min, max and abs; names: for what it would take for
-    something else; state_prefix: what stands before a state.
+    something else; literal: of a number in Python's digits. assign: of target and value; choice:
+    head with the condition, else, end; loop: head with index, count and last index, end; comment:
+    begin, end; state_prefix: what stands before a state.
     """
 
     precision: Precision
     symbols: Mapping[Operator, str]
     functions: Mapping[str, str]
     names: Mapping[str, str]
+    literal: Callable[[str], str]
+    assign: str
+    choice: tuple[str, str, str]
+    loop: tuple[str, str]
+    comment: tuple[str, str]
     states: frozenset[str] = frozenset()
     state_prefix: str = ""
 
-    @abstractmethod
     def number(self, value: float) -> str:
-        """A number of the program's precision as a literal."""
-
-    @abstractmethod
-    def assigned(self, target: str, value: str) -> str:
-        """A statement that gives a value."""
-
-    @abstractmethod
-    def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
-        """The lines of a choice."""
-
-    @abstractmethod
-    def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
-        """The lines of a loop."""
-
-    @abstractmethod
-    def remark(self, text: str) -> str:
-        """A comment in one line."""
-
-    def rounded(self, value: float) -> float:
-        """The value in the program's precision; raises BadModel where it is none."""
+        """A number of the program's precision as a literal; raises BadModel where it is none."""
         found = float(np.float32(value)) if self.precision == "single" else float(value)
         if not math.isfinite(found):
             raise BadModel(f"{value:g} has no form in {self.precision} precision")
-        return found
+        return self.literal(repr(found))
 
     def name(self, name: str) -> str:
         """A name as the language takes it."""
@@ -89,26 +76,37 @@ class Syntax:
         if one.array:
             moved = f"{self.name(one.name + AT_POSITION_1)}[j] * {y}"
             value = moved if any(one.at_rest) else self.number(0.0)
-            return self.repeated("j", len(one.at_rest), [self.assigned(f"{place}[j]", value)])
+            body = [INDENT + self.assign.format(f"{place}[j]", value)]
+            return self._repeated("j", len(one.at_rest), body)
         still = "0" if one.kind == "integer" else self.number(0.0)
         at = one.at_rest[0]
-        return [self.assigned(place, {0.0: still, 1.0: y}.get(at, f"{self.number(at)} * {y}"))]
+        value = {0.0: still, 1.0: y}.get(at, f"{self.number(at)} * {y}")
+        return [self.assign.format(place, value)]
 
     def lines(self, statements: Sequence[Statement], depth: int = 0) -> list[str]:
         """The statements, indented by `depth`."""
         return [INDENT * depth + line for one in statements for line in self._written(one)]
 
+    def _repeated(self, index: str, count: int, body: Sequence[str]) -> list[str]:
+        head, end = self.loop
+        return [head.format(index, count, count - 1), *body, end]
+
     def _written(self, one: Statement) -> Iterator[str]:
         match one:
             case Assign(target, value):
-                yield self.assigned(self.expression(target), self.expression(value))
+                yield self.assign.format(self.expression(target), self.expression(value))
             case Choice(condition, then, otherwise):
-                said = self.expression(condition)
-                yield from self.chosen(said, self.lines(then), self.lines(otherwise))
+                head, between, end = self.choice
+                yield head.format(self.expression(condition))
+                yield from self.lines(then, 1)
+                yield from [between, *self.lines(otherwise, 1)] if otherwise else []
+                yield end
             case Repeat(index, count, body):
-                yield from self.repeated(self.name(index.name), count, self.lines(body))
+                yield from self._repeated(self.name(index.name), count, self.lines(body, 1))
             case Remark(text):
-                yield self.remark(" ".join(text.split()))
+                begin, end = self.comment
+                said = " ".join(text.split()).replace(end, " ".join(end))
+                yield f"{begin} {said} {end}"
 
     def expression(self, value: Expression) -> str:
         """The expression, in parentheses only where its order needs them."""
@@ -142,6 +140,12 @@ class Syntax:
         return f"({said})" if rank < least or mixed else said
 
 
-def braced(lines: list[str]) -> list[str]:
-    """The lines, indented once."""
-    return [INDENT + line for line in lines]
+def arrays_of(program: Program) -> list[tuple[str, str, tuple[float, ...]]]:
+    """Name, meaning and entries of the tables, and of arrays that at position 1 are not 0."""
+    at_rest = [
+        (one.name + AT_POSITION_1, f"{one.name} where the machine has stood at position 1",
+         one.at_rest)
+        for one in program.states
+        if one.array and any(one.at_rest)
+    ]  # fmt: skip
+    return [*((one.name, one.meaning, one.values) for one in program.tables), *at_rest]

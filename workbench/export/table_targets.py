@@ -2,7 +2,7 @@
 files are written and which not, and what they hold, for a terminal and as a document."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from workbench.cards.units import in_unit_of
 from workbench.export.backlash_formats import BACKLASH
 from workbench.export.cogging_formats import COGGING, NO_COGGING_TABLE
 from workbench.export.compensation import (
-    AtMotor,
     Compensation,
     Cost,
     Encoder,
@@ -23,7 +22,7 @@ from workbench.export.compensation import (
     TableFile,
     TablesAsked,
 )
-from workbench.export.feed_forward import feed_forward_c, feed_forward_st
+from workbench.export.feed_forward import FEED_FORWARD_FILES
 from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE
 from workbench.output import written
 from workbench.screen import Screen, instead, listed, more, screen, tabled
@@ -37,10 +36,6 @@ NOT_THERE: Mapping[str, Mapping[str, str]] = {
     "friction-table": {"codesys": NO_FRICTION_TABLE},
     "cogging-table": NO_COGGING_TABLE,
     "backlash": {},
-}
-CODE: Mapping[str, Callable[[Compensation], tuple[TableFile, ...]]] = {
-    "c": feed_forward_c,
-    "st": feed_forward_st,
 }
 
 
@@ -65,8 +60,8 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
                 files += _tried(_of(table, ""), what, left)
             if not files:
                 raise BadModel("; ".join(left))
-        elif target in CODE:
-            files += CODE[target](what)
+        elif target in FEED_FORWARD_FILES:
+            files += [one(what) for one in FEED_FORWARD_FILES[target]]
         else:
             files += [one(what) for one in _of(target, "")]
             files += _for_controls(target, what, controls, left)
@@ -109,6 +104,8 @@ def _for_controls(
 
 FILES_HEAD = ("file", "units", "points", "off the model by")
 TABLES_SCHEMA = "tables/1"
+FILE_KEYS = {"file": "name", **{key: key for key in (
+    "table", "control", "units", "where", "points", "error", "costs", "remarks")}}  # fmt: skip
 
 
 def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str, Any]:
@@ -120,15 +117,9 @@ def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str
         "name": what.name,
         "files": [
             {
-                "file": one.name,
-                "table": one.table,
+                **{key: getattr(one, name) for key, name in FILE_KEYS.items()},
                 "control": one.control or None,
-                "units": one.units,
-                "where": one.where,
-                "points": one.points,
-                "error": one.error,
                 "costs": [{"what": c.what, "value": c.force, "unit": unit} for c in one.costs],
-                "remarks": one.remarks,
             }
             for one in found.files
         ],
@@ -199,14 +190,9 @@ def tables_asked(
     turn = _positive(per_turn, "deg" if rotary else "mm", "--per-turn")
     travel = None if turn is None else (math.radians(turn) if rotary else 1e-3 * turn)
     high = _positive(speed, "rad/s" if rotary else "mm/s", "--speed")
-    unit = AtMotor(rotary, travel).torque_unit
-    return TablesAsked(
-        name=name,
-        high=high if high is None or rotary else 1e-3 * high,
-        per_turn=travel,
-        rated=_positive(rated, unit, "--rated"),
-        encoder=encoder,
-    )
+    high = high if high is None or rotary else 1e-3 * high
+    unit = "N m" if rotary or travel else "N"
+    return TablesAsked(name, high, travel, _positive(rated, unit, "--rated"), encoder)
 
 
 def _positive(written: str | None, unit: str, option: str) -> float | None:

@@ -95,7 +95,7 @@ class DesignResult(Result):
         return DesignResult(found, self.model)
 
     def _made(self) -> View:
-        return design_view(self.design, self.model.rotary)
+        return design_view(self.design)
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,7 +124,7 @@ class RobustResult(Result):
         return pd.DataFrame(dict(self.found.promises[ROBUST].found.values))
 
     def _made(self) -> View:
-        return robust_view(self.found, self.model.rotary)
+        return robust_view(self.found)
 
 
 @dataclass(frozen=True, repr=False)

@@ -219,8 +219,7 @@ def design_page(design: str) -> str:
     """The report of a design's document."""
     from workbench.report.reports import design_view
 
-    found = _design(design)
-    return design_view(found, found.motion == "rotary").page()
+    return design_view(_design(design)).page()
 
 
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:

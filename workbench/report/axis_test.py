@@ -37,18 +37,15 @@ def _row(one: Quantity) -> Row:
     if one.allowed is not None:
         low, high = (number(factor * x, 4) for x in (one.allowed.low, one.allowed.high))
         limits = f"{low} to {high} ({SOURCE_OF_LIMITS[one.allowed.source]})"
-    if estimate.value is None:
-        why = (estimate.reason or "not identifiable").partition(";")[0]
-        return one.meaning, "-", unit, why, limits, LAMPS[one.light]
-    if estimate.low is None or estimate.high is None:
-        return one.meaning, number(factor * estimate.value, 4), unit, "", limits, LAMPS[one.light]
-    spread = 0.25 * (estimate.high - estimate.low)
-    value, low, high = in_digits(
-        [factor * x for x in (estimate.value, estimate.low, estimate.high)],
-        factor * estimate.value,
-        factor * spread,
-    )  # fmt: skip
-    return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]
+    value, interval = "-", (estimate.reason or "not identifiable").partition(";")[0]
+    if estimate.value is not None:
+        value, interval = number(factor * estimate.value, 4), ""
+        if estimate.low is not None and estimate.high is not None:
+            every = [factor * x for x in (estimate.value, estimate.low, estimate.high)]
+            sd = factor * (0.25 * (estimate.high - estimate.low))
+            value, *ends = in_digits(every, every[0], sd)
+            interval = " to ".join(ends)
+    return one.meaning, value, unit, interval, limits, LAMPS[one.light]
 
 
 def axis_view(test: AxisTest) -> View:

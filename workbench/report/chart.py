@@ -6,8 +6,8 @@ once: uPlot, the script that draws, and their style, to be inlined or served as 
 
 import base64
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
@@ -161,31 +161,30 @@ PANEL_KEYS = ("x", "y", "title", "x_range", "y_range", "log_x", "log_y", "names"
 
 
 class _Column(NamedTuple):
-    """A column of numbers to draw; edges of an area come in pairs, the lower first."""
+    """A column of numbers to draw, its name, colour and look as JSON has them; edges of an area
+    come in pairs, the lower first."""
 
-    line: Line
-    edge: Literal["", "lower", "upper"] = ""
-
-    @property
-    def entry(self) -> dict[str, Any]:
-        """Name, colour and look, as JSON has them."""
-        line, upper = self.line, {"upper": self.edge == "upper"} if self.edge else {}
-        look = "edge" if self.edge else line.style
-        return {"name": line.name, "colour": line.colour, "look": look, **upper}
+    x: Array
+    y: Array
+    entry: Mapping[str, Any]
 
 
 def _columns(panel: Panel) -> list[_Column]:
     out = []
     for area in panel.areas:
-        low = Line("", area.x, area.low, area.colour)
-        out += [_Column(low, "lower"), _Column(replace(low, name=area.name, y=area.high), "upper")]
-    return out + [_Column(line) for line in panel.lines]
+        edge = {"colour": area.colour, "look": "edge"}
+        out.append(_Column(area.x, area.low, {"name": "", **edge, "upper": False}))
+        out.append(_Column(area.x, area.high, {"name": area.name, **edge, "upper": True}))
+    for one in panel.lines:
+        entry = {"name": one.name, "colour": one.colour, "look": one.style}
+        out.append(_Column(one.x, one.y, entry))
+    return out
 
 
 def _panel(panel: Panel, points: int) -> dict[str, Any]:
     groups: list[list[_Column]] = []
     for column in _columns(panel):
-        same = [g for g in groups if g[0].line.x is column.line.x and not _dots(g[0], column)]
+        same = [g for g in groups if g[0].x is column.x and not _dots(g[0], column)]
         if same:
             same[0].append(column)
         else:
@@ -202,11 +201,11 @@ def _panel(panel: Panel, points: int) -> dict[str, Any]:
 
 
 def _dots(*columns: _Column) -> bool:
-    return any(column.line.style == "dots" for column in columns)
+    return any(column.entry["look"] == "dots" for column in columns)
 
 
 def _table(group: list[_Column], points: int) -> dict[str, Any]:
-    x, values = np.asarray(group[0].line.x, dtype=np.float64), [c.line.y for c in group]
+    x, values = np.asarray(group[0].x, dtype=np.float64), [column.y for column in group]
     if _dots(*group):
         order = np.argsort(x, kind="stable")
         x, values = x[order], [np.asarray(y)[order] for y in values]

@@ -45,7 +45,7 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
         SIMULATED,
         trace_sentence(traced),
         replace(errors, entries=(rows[0], rows[2])),
-        tabled(TRUTH_HEAD, [*_friction(found), *_effects(found)]),
+        tabled(TRUTH_HEAD, _beside_truth(found)),
         LETTERS,
         f"Largest error of mass and friction parameters: {number(100 * found.worst_error, 2)} %.",
         controller_sentence(found),
@@ -53,7 +53,7 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
         more(validation_sentence(found.validation)),
         more(validation_table(found.validation, rotary)),
         more(listed(validation_lines(found.validation, rotary))),
-        more(listed(design_lines(found.design, rotary))),
+        more(listed(design_lines(found.design))),
         more(notes((*traced.remarks, *traced.trace.remarks), logs_of_trace(traced))),
         written(folder, "report.html", "design.html", "validation.html"),
         next_step("your own log: `workbench init LOG`, then `workbench identify LOG --card"
@@ -91,23 +91,20 @@ def _figures(one: LoopFigures) -> Row:
     return (*error_cells(one), margin)
 
 
-def _friction(found: Demonstration) -> list[Row]:
-    truth = found.truth["friction"]
-    return [
-        (name, *_beside(e, _true(truth[name]["value"], e.unit)))
-        for name, e in found.traced.model.friction.items()
-    ]
-
-
-def _effects(found: Demonstration) -> list[Row]:
-    """Parameters of the effects found, and what they are in truth."""
-    out: list[Row] = []
-    for e in found.traced.trace.effects:
-        estimates = effect_estimates(e, found.traced.model.rig)
-        for p in e.effect.params:
-            true = found.truth["effects"].get(e.effect.key, {}).get(p.name)
-            said = _true(true["value"], p.unit) if true else "absent"
-            out.append((f"{words(e.effect.key)} {p.name}", *_beside(estimates[p.name], said)))
+def _beside_truth(found: Demonstration) -> list[Row]:
+    """Parameters of friction and of the effects found, and what they are in truth."""
+    model, out = found.traced.model, list[Row]()
+    for name, e in model.friction.items():
+        true = found.truth["friction"][name]["value"]
+        out.append((name, *_beside(e, f"{shown_unit(e.unit).factor * true:g}")))
+    for one in found.traced.trace.effects:
+        estimates = effect_estimates(one, model.rig)
+        known = found.truth["effects"].get(one.effect.key, {})
+        for p in one.effect.params:
+            said = "absent"
+            if p.name in known:
+                said = f"{shown_unit(p.unit).factor * known[p.name]['value']:g}"
+            out.append((f"{words(one.effect.key)} {p.name}", *_beside(estimates[p.name], said)))
     return out
 
 
@@ -117,8 +114,3 @@ def _beside(e: Estimate, true: str) -> Row:
     if None in (e.value, e.low, e.high):
         value, interval = "-", not_identified(interval.partition(";")[0].partition(":")[0])
     return (value, "" if unit == "1" else unit, interval, true)
-
-
-def _true(value: float, unit: str) -> str:
-    """A true value in the unit in which its estimate is shown."""
-    return f"{shown_unit(unit).factor * value:g}"

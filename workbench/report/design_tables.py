@@ -1,11 +1,9 @@
 """A design as tables and lines, for a terminal and a report."""
 
 from design.drive_law import DriveLaw
-from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number
 from workbench.documents.codec import Output
 from workbench.documents.design import Controller, Design
-from workbench.documents.design_file import units_of
 from workbench.documents.drive import equation_lines, force_lines
 from workbench.output import Row
 from workbench.report.view import notes
@@ -41,18 +39,14 @@ def margins_table(found: Design) -> Part:
 
 def drive_table(found: Design) -> Part:
     """The same in a drive engineer's words; without rows of an older file."""
-    rows = []
+    rows = list[Row]()
     for name, m in ((name, one.margins) for name, one in found.controllers.items()):
-        said = (
-            *(
-                "-" if f is None else f"{number(f)} Hz"
-                for f in (m.crossover_hz, m.rejection_hz, m.bandwidth_hz)
-            ),
-            "any" if m.gain_db is None else f"{number(m.gain_db)} dB",
-            "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
-            "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
-        )
-        if said[:3] != ("-", "-", "-"):
+        ends = (m.crossover_hz, m.rejection_hz, m.bandwidth_hz)
+        delay = None if m.delay_s is None else 1e3 * m.delay_s
+        margins = ((m.gain_db, "dB"), (m.phase_deg, "deg"), (delay, "ms"))
+        if any(f is not None for f in ends):
+            said = ["-" if f is None else f"{number(f)} Hz" for f in ends]
+            said += ["any" if one is None else f"{number(one)} {unit}" for one, unit in margins]
             rows.append((name.upper(), *said))
     return tabled(IN_DRIVES_HEAD, rows)
 
@@ -77,17 +71,15 @@ def _margins(one: Controller) -> Row:
     )
 
 
-def design_lines(found: Design, rotary: bool = False) -> list[str]:
+def design_lines(found: Design) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    every = [one if isinstance(one, Part) else listed([one]) for one in design_parts(found, rotary)]
+    every = [one if isinstance(one, Part) else listed([one]) for one in design_parts(found)]
     return [str(line) for one in every if not one.full_head for line in one.whole]
 
 
-def loop_lines(found: Design, rotary: bool = False) -> list[str]:
+def loop_lines(found: Design) -> list[str]:
     """Periods, gains and the compensator of the loops."""
-    p, c = found.plant, found.compensator
-    units = shown(rotary, found.command.unit if found.command else "V")
-    output, command = "", found.command
+    c, units, output, command = found.compensator, found.units, "", found.command
     if command is not None:
         most = (
             "no limit" if command.limit is None else f"at most {command.limit:.4g} {command.unit}"
@@ -98,38 +90,36 @@ def loop_lines(found: Design, rotary: bool = False) -> list[str]:
                 f", its output the force reference in {units.force} for the force loop, whose"
                 f" command is in {command.unit}, {most}"
             )
-    lines = [f"position loop every {1e3 * p.h:.4g} ms{output}"]
-    if found.force:
-        f = found.force
+    lines = [f"position loop every {1e3 * found.plant.h:.4g} ms{output}"]
+    if f := found.force:
         lines.append(
             f"force loop: k_i = {f.k_i:.4g} {units.force_gain}, T_i = {f.T_i:.4g} s,"
             f" every {1e3 * f.h:.4g} ms"
         )
-    if found.pid and found.pid.gains:
-        g = found.pid.gains
+    if found.pid and (g := found.pid.gains):
         lines.append(
             f"PID: k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s,"
             f" eps = {g.eps:.4g} s"
         )
-    lines += cascade_lines(found, rotary)
+    lines += cascade_lines(found)
     if not any(takes_compensator(found, name) for name in found.controllers):
         return lines
     pushed = "what breakaway needs beyond sliding" if c.excess else "the whole breakaway force"
     return [
         *lines,
         f"compensator: pushes with {pushed} at a position error of"
-        f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)",
+        f" {length(c.e_T, found.rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)",
     ]
 
 
-def cascade_lines(found: Design, rotary: bool = False) -> list[str]:
+def cascade_lines(found: Design) -> list[str]:
     """The P-PI cascade in the units of a drive's parameter list, its filter and feed-forward."""
     one = found.p_pi
     if one is None or one.cascade is None:
         return []
-    g, units, command = one.cascade, shown(rotary), found.command
+    g, units, command = one.cascade, found.units, found.command
     k_v = f"{number(g.k_v)} 1/s"
-    if not rotary:
+    if not found.rotary:
         k_v += f" ({number(METRES_PER_MINUTE * g.k_v)} m/min/mm)"
     k_p = f"{number(g.k_p)} {units.force} s/{units.position}"
     per = command.force_per_command if command else None
@@ -141,37 +131,35 @@ def cascade_lines(found: Design, rotary: bool = False) -> list[str]:
     ]
     if one.series is not None:
         lines.append(f"P-PI: {filter_words(one.series)}, in R, S and T")
-    if one.feed_forward is not None:
-        f = one.feed_forward
-        mass = "kg m^2" if rotary else "kg"
+    if f := one.feed_forward:
         lines.append(
-            f"P-PI: fed forward {number(f.m)} {mass} of acceleration, friction of {number(f.F_cp)}"
-            f" and {number(f.F_cn)} {units.force}, {number(f.F_vp)} and {number(f.F_vn)}"
-            f" {units.force} s/{units.position}; the reference moved with at most"
+            f"P-PI: fed forward {number(f.m)} {units.named('mass')} of acceleration, friction of"
+            f" {number(f.F_cp)} and {number(f.F_cn)} {units.force}, {number(f.F_vp)} and"
+            f" {number(f.F_vn)} {units.force} s/{units.position}; the reference moved with at most"
             f" {number(one.acceleration or 0.0)} {units.position}/s^2"
         )
     return lines
 
 
-def schedule_lines(found: Design, rotary: bool = False) -> list[str]:
+def schedule_lines(found: Design) -> list[str]:
     """Of each controller with a gain schedule whether to take it, and why."""
     table = found.schedule
     if table is None:
         return []
-    unit = _unit_over(table.over, rotary)
-    span = f"{len(table.at)} points from {number(table.at[0])} to {number(table.at[-1])}{unit}"
+    first, last = number(table.at[0]), number(table.at[-1])
+    span = f"{len(table.at)} points from {first} to {last}{_unit_over(found, table.over)}"
     return [
         f"{name.upper()} over {table.over}, {span}: {one.why}"
         for name, one in table.controllers.items()
     ]
 
 
-def schedule_rows(found: Design, rotary: bool = False) -> list[str]:
+def schedule_rows(found: Design) -> list[str]:
     """The gains and the friction at each point of a schedule."""
     table, out = found.schedule, list[str]()
     if table is None:
         return out
-    units, over = shown(rotary), _unit_over(table.over, rotary)
+    units, over = found.units, _unit_over(found, table.over)
     for name, one in table.controllers.items():
         for at, point, rubs in zip(table.at, one.points, table.friction, strict=True):
             said = "R, S, T in design.json"
@@ -188,9 +176,9 @@ def schedule_rows(found: Design, rotary: bool = False) -> list[str]:
     return out
 
 
-def _unit_over(over: str, rotary: bool) -> str:
+def _unit_over(found: Design, over: str) -> str:
     """The unit of what a schedule goes over, with a space before it."""
-    units = shown(rotary)
+    units = found.units
     return {"place": f" {units.position}", "load": f" {units.force}"}.get(over, "")
 
 
@@ -221,7 +209,7 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
     """The difference equation of each controller, or of one, as its drive runs it."""
     if found.command is None:
         return []
-    units, limit, out = units_of(found), found.command.limit, list[str]()
+    units, limit, out = found.units, found.command.limit, list[str]()
     laws: dict[str, tuple[DriveLaw, Output]] = {
         name: (one.law(found.command), found.output) for name, one in found.controllers.items()
     }
@@ -237,7 +225,7 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
     return out
 
 
-def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
+def design_parts(found: Design) -> list[Part | str]:
     """The margins, what the design rests on, and remarks; behind --verbose also the plant and the
     other controllers' ramps."""
     chosen = None if found.recommended == "none" else found.recommended
@@ -252,9 +240,9 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
         listed([others] if others else []),
         more(FIGURES_SAID),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
-        listed(loop_lines(found, rotary)),
-        listed(schedule_lines(found, rotary)),
-        *map(more, schedule_rows(found, rotary)),
+        listed(loop_lines(found)),
+        listed(schedule_lines(found)),
+        *map(more, schedule_rows(found)),
         listed(f"no {name.upper()}: {why}" for name, why in found.refused.items()),
         listed(f"{name.upper()} misses: {one}" for name, one in missed),
         instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),

@@ -54,16 +54,12 @@ def drift_view(found: Drifted, model_name: str) -> View:
 
 
 def _sections(found: Drifted) -> list[Section]:
-    sections, logs = [], Section("The logs", run_table(found))
-    judged = _judged(found)
-    if judged:
+    sections = [Section("The logs", run_table(found))]
+    if judged := _judged(found):
         last = judged[-1]
-        picture = drift_chart(found, last)
-        sections.append(Section("Before and after, and over the logs", picture))
-    sections.append(logs)
-    if judged:
-        title = f"Parameters before and after, {last.source.file}"
-        sections.append(Section(title, shift_table(last)))
+        picture = Section("Before and after, and over the logs", drift_chart(found, last))
+        table = Section(f"Parameters before and after, {last.source.file}", shift_table(last))
+        sections = [picture, *sections, table]
     lines = [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
     return [*sections, Section("Notes", report_notes(lines, logs_of_drift(found)))]
 
@@ -229,20 +225,14 @@ def signed_percent(value: float) -> str:
 def run_table(found: Drifted) -> Part:
     """Every run's verdict and statistics."""
     head = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
-    return tabled(head, [_run_row(one) for one in found.tests], right=(), latest=True)
-
-
-def _run_row(one: Tested) -> Row:
-    test = one.test
-    chi = "-" if test.chi_square is None else f"{test.chi_square:.3g} of {test.allowed:.3g}"
-    return (
-        one.source.file,
-        in_words(test.verdict),
-        _over(test.single),
-        _over(test.mean),
-        chi,
-        ", ".join([*(shift.name for shift in test.moved), *(f"{n}?" for n in test.unsure)]) or "-",
-    )
+    rows = list[Row]()
+    for one in found.tests:
+        test, verdict = one.test, in_words(one.test.verdict)
+        chi = "-" if test.chi_square is None else f"{test.chi_square:.3g} of {test.allowed:.3g}"
+        names = ", ".join([*(shift.name for shift in test.moved), *(f"{n}?" for n in test.unsure)])
+        statistics = (_over(test.single), _over(test.mean), chi)
+        rows.append((one.source.file, verdict, *statistics, names or "-"))
+    return tabled(head, rows, right=(), latest=True)
 
 
 def _over(found: Statistic | None) -> str:
@@ -252,18 +242,16 @@ def _over(found: Statistic | None) -> str:
 def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     """Every parameter of a run before and after; those inconclusive with the reason."""
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
-    rows = [_shift_row(shift) for shift in one.test.shifts.values()]
+    rows = list[Row]()
+    for shift in one.test.shifts.values():
+        change, low, high = map(signed_percent, (shift.change, shift.low, shift.high))
+        pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
+        values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
+        unit, factor = shown_unit(shift.unit)
+        both = ("-" if value is None else number(factor * value, 5) for value in values)
+        rows.append((shift.name, *both, unit, change, f"{low} to {high}"))
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
     return tabled(head, reasons_once(rows, logs, (4, 3, 5)), right=(1, 2), whole=rows)
-
-
-def _shift_row(shift: Shift) -> Row:
-    interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
-    pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
-    values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
-    unit, factor = shown_unit(shift.unit)
-    before, after = ("-" if value is None else number(factor * value, 5) for value in values)
-    return (shift.name, before, after, unit, signed_percent(shift.change), interval)
 
 
 def advice(found: Drifted) -> list[str]:

@@ -7,7 +7,7 @@ from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, listed, more, tabled
-from workbench.steps.experiment.planned import Experiment, Promised, experiment_document
+from workbench.steps.experiment.planned import Experiment, experiment_document
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
 PIECE_NAMES = {
@@ -37,16 +37,15 @@ def reference_text(found: Experiment) -> str:
 
 
 def _promised(found: Experiment) -> Part:
-    return tabled(PROMISE_HEAD, map(_row, found.promise), right=(1, 3, 4, 5))
-
-
-def _row(one: Promised) -> Row:
-    now = "not identifiable" if one.before is None else f"{one.before:.2g}"
-    after = "not identifiable" if one.after is None else f"{one.after:.2g}"
-    share = "-"
-    if one.after is not None and one.value != 0.0:
-        share = f"{100.0 * one.after / abs(one.value):.2g} %"
-    return one.name, f"{one.value:.4g}", one.unit, now, after, share
+    rows = list[Row]()
+    for one in found.promise:
+        share = "-"
+        if one.after is not None and one.value != 0.0:
+            share = f"{100.0 * one.after / abs(one.value):.2g} %"
+        both = (one.before, one.after)
+        halves = ("not identifiable" if x is None else f"{x:.2g}" for x in both)
+        rows.append((one.name, f"{one.value:.4g}", one.unit, *halves, share))
+    return tabled(PROMISE_HEAD, rows, right=(1, 3, 4, 5))
 
 
 def experiment_lead(found: Experiment) -> str:

@@ -13,7 +13,7 @@ from identification.model.estimates import NORMAL_95
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
-from identification.tracing.result import MissingForce, Trace
+from identification.tracing.result import Trace
 from workbench.cards.readable import force, times, units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
@@ -214,23 +214,15 @@ def _residual_caption(model: Model) -> str:
     )
 
 
-def missing_over_time(
+def missing_chart(
     found: Trace, rotary: bool, logs: Sequence[str], which: Which = "training"
-) -> list[Section]:
-    """The force that the model lacks over time; none where no body slides.
+) -> Chart:
+    """The force that the model lacks over time, where a body slides.
 
     logs: names of those that it is of, `which` they are.
     """
-    if found.missing_force is None:
-        return []
-    chart = missing_chart(found, found.missing_force, rotary, logs, which)
-    return [Section("Force that the model lacks", chart)]
-
-
-def missing_chart(
-    found: Trace, force: MissingForce, rotary: bool, logs: Sequence[str], which: Which = "training"
-) -> Chart:
-    """The chart of `missing_over_time`."""
+    force = found.missing_force
+    assert force is not None
     caption = (
         "Applied force less modelled, smoothed, as the measured position shows it, with its 95 %"
         " band. Where the body rests or turns, friction takes whatever is applied: the band is"

@@ -15,7 +15,7 @@ from identification.model.karnopp import NAMES, Karnopp
 from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
-from workbench.cards.readable import Units, units_of
+from workbench.cards.readable import units_of
 from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
@@ -31,6 +31,7 @@ SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
 SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
 LOW_IN_BANDS, LOW_SHARE = 4.0, 0.25  # low speeds: in widths of the band, and of all speeds
 UNSEEN_BAND = 1e-4  # of all speeds, up to which a band is not seen
+Curve = tuple[Karnopp, Sequence[Acting], Colour, str]  # colour and name of its line
 
 
 def _friction_data(model: Model, log: Log) -> tuple[Array, Array]:
@@ -68,27 +69,44 @@ def _inertia(model: Model, a: Array, h: float) -> Array:
 
 def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> Section:
     """Friction of the logs' samples against velocity, with the Karnopp curve and its band."""
-    p, dots, panels = model.karnopp, _dots("log: F_e − m a", model, sources), []
-    v = dots.x
-    reach = (min(float(v.min()), 1.2 * p.dv_n), max(float(v.max()), 1.2 * p.dv_p))
-    low = low_speeds(p, reach)
-    for title, (begin, end) in (("all speeds", reach), ("low speeds", low)):
-        v_n, v_p = np.linspace(begin, p.dv_n, POINTS), np.linspace(p.dv_p, end, POINTS)
-        curve = _curve("Karnopp model", p, [], v_n, v_p, "model")
-        bottom, top = min(p.F_sn, -p.F_cn + p.F_vn * begin), max(p.F_sp, p.F_cp + p.F_vp * end)
-        panels.append(
-            friction_panel(
-                title, units_of(model.rotary), dots, [curve],
-                (begin, end), (SHOWN_RANGE * bottom, SHOWN_RANGE * top), p,
-                [
-                    Area("95 % interval", v_n, *_interval(fit, p, v_n)),
-                    Area("", v_p, *_interval(fit, p, v_p)),
-                ],
-            )
-        )  # fmt: skip
+    p, dots = model.karnopp, _dots("log: F_e − m a", model, sources)
+    reach = min(float(dots.x.min()), 1.2 * p.dv_n), max(float(dots.x.max()), 1.2 * p.dv_p)
+    panels = _panels(model, dots, [(p, [], "model", "Karnopp model")], reach, fit)
     what = "friction force against velocity, samples of the logs and the model"
     chart = Chart("friction", what, panels, 2, shared_x=False, caption=_caption(model))
     return Section("Friction", chart)
+
+
+def _panels(
+    model: Model, dots: Line, curves: Sequence[Curve], reach: tuple[float, float],
+    fit: KarnoppFit | None = None,
+) -> list[Panel]:  # fmt: skip
+    """All speeds and the low ones; fit: of the one curve, for its band. Dots are those samples
+    that lie in the range shown."""
+    p, units, out = model.karnopp, units_of(model.rotary), list[Panel]()
+    (speed, factor), points = units.velocity, POINTS if fit else CURVE
+    for title, (begin, end) in (("all speeds", reach), ("low speeds", low_speeds(p, reach))):
+        lines = [_curve(*one, begin, end, points) for one in curves]
+        bottom = min(float(np.nanmin(one.y)) for one in lines)
+        top = max(float(np.nanmax(one.y)) for one in lines)
+        if fit is None:
+            top = max(top, -bottom)
+            bottom = -top
+        inside = np.flatnonzero((dots.x >= begin) & (dots.x <= end))
+        inside = inside[evenly_spread(len(inside), FRICTION_DOTS)]
+        shown = [replace(dots, x=dots.x[inside], y=dots.y[inside]), *lines]
+        areas = _interval(fit, p, begin, end) if fit else []
+        out.append(
+            Panel(
+                f"velocity [{speed}]", f"friction force [{units.force.name}]",
+                [replace(one, x=factor * one.x) for one in shown], title,
+                areas=[replace(one, x=factor * one.x) for one in areas],
+                bands=[Band("stick band", factor * p.dv_n, factor * p.dv_p, "x")],
+                x_range=(factor * begin, factor * end),
+                y_range=(SHOWN_RANGE * bottom, SHOWN_RANGE * top), height=280,
+            )
+        )  # fmt: skip
+    return out
 
 
 def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
@@ -108,10 +126,17 @@ def _dots(name: str, model: Model, sources: Sequence[Source]) -> Line:
     return Line(name, v, F_f, "measured", "dots")
 
 
+def _branches(p: Karnopp, begin: float, end: float, points: int) -> tuple[Array, Array]:
+    """Speeds of either direction outside the stick band [m/s]."""
+    return np.linspace(begin, p.dv_n, points), np.linspace(p.dv_p, end, points)
+
+
 def _curve(
-    name: str, p: Karnopp, acting: Sequence[Acting], v_n: Array, v_p: Array, colour: Colour
-) -> Line:
+    p: Karnopp, acting: Sequence[Acting], colour: Colour, name: str, begin: float, end: float,
+    points: int,
+) -> Line:  # fmt: skip
     """Friction at these speeds [m/s], and between both ways the bar of breakaway at rest."""
+    v_n, v_p = _branches(p, begin, end, points)
     at_rest, gap = 1e-6 * (v_p[-1] - v_n[0]), [np.nan]
     v = np.concatenate([v_n, [-3 * at_rest, -at_rest, at_rest, 3 * at_rest], v_p])
     F_n, F_p = (sliding_friction(branch, p, acting) for branch in (v_n, v_p))
@@ -127,40 +152,18 @@ def sliding_friction(v: Array, p: Karnopp, acting: Sequence[Acting]) -> Array:
     return np.asarray(plain + np.sum(more, axis=0)) if more else plain
 
 
-def friction_panel(
-    title: str,
-    units: Units,
-    samples: Line,
-    lines: Sequence[Line],
-    x_range: tuple[float, float],
-    y_range: tuple[float, float],
-    p: Karnopp,
-    areas: Sequence[Area] = (),
-) -> Panel:
-    """Friction [N] against velocity [m/s], the dots those samples that lie in the range shown."""
-    (speed, factor), (force, _) = units.velocity, units.force
-    v = samples.x
-    inside = np.flatnonzero((v >= x_range[0]) & (v <= x_range[1]))
-    inside = inside[evenly_spread(len(inside), FRICTION_DOTS)]
-    dots = replace(samples, x=factor * v[inside], y=samples.y[inside])
-    return Panel(
-        f"velocity [{speed}]", f"friction force [{force}]",
-        [dots, *(replace(one, x=factor * one.x) for one in lines)], title,
-        areas=[replace(one, x=factor * one.x) for one in areas],
-        bands=[Band("stick band", factor * p.dv_n, factor * p.dv_p, "x")],
-        x_range=(factor * x_range[0], factor * x_range[1]), y_range=y_range, height=280,
-    )  # fmt: skip
-
-
-def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
-    """95 % interval of the sliding friction at `v`, by the covariance of its parameters."""
-    up, at = 1.0 * (v > 0), [fit.free.index(n) for n in SLIDING_PARAMETERS if n in fit.free]
-    change = dict(zip(SLIDING_PARAMETERS, (up, up - 1.0, up * v, (1.0 - up) * v), strict=True))
-    J = np.array([change[fit.free[i]] for i in at])
-    variance = np.einsum("in,ij,jn->n", J, fit.covariance[np.ix_(at, at)], J)
-    half = NORMAL_95 * np.sqrt(np.maximum(variance, 0.0))
-    middle = sliding_friction(v, p, ())
-    return middle - half, middle + half
+def _interval(fit: KarnoppFit, p: Karnopp, begin: float, end: float) -> list[Area]:
+    """95 % interval of the sliding friction each way, by the covariance of its parameters."""
+    out, at = list[Area](), [fit.free.index(n) for n in SLIDING_PARAMETERS if n in fit.free]
+    for name, v in zip(("95 % interval", ""), _branches(p, begin, end, POINTS), strict=True):
+        up = 1.0 * (v > 0)
+        change = dict(zip(SLIDING_PARAMETERS, (up, up - 1.0, up * v, (1.0 - up) * v), strict=True))
+        J = np.array([change[fit.free[i]] for i in at])
+        variance = np.einsum("in,ij,jn->n", J, fit.covariance[np.ix_(at, at)], J)
+        half = NORMAL_95 * np.sqrt(np.maximum(variance, 0.0))
+        middle = sliding_friction(v, p, ())
+        out.append(Area(name, v, middle - half, middle + half))
+    return out
 
 
 def _caption(model: Model) -> str:
@@ -183,9 +186,7 @@ def trace_friction_chart(traced: Traced) -> Chart:
     every = model.acting
     speeds = [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
     drifted = bool(found.drift) and not found.effects
-    curves: list[tuple[Karnopp, list[Acting], Colour, str]] = [
-        (after, speeds, "model", "after" if found.effects else "model")
-    ]
+    curves: list[Curve] = [(after, speeds, "model", "after" if found.effects else "model")]
     if found.effects:
         before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
         curves.insert(0, (before, [], "reference", "before"))
@@ -197,21 +198,9 @@ def trace_friction_chart(traced: Traced) -> Chart:
         ]
     sources = traced.test if drifted and traced.test else traced.train
     name = "logs: F_e − m a" if len(sources) > 1 else f"{sources[0].file}: F_e − m a"
-    dots, panels = _dots(name, model, sources), []
+    dots = _dots(name, model, sources)
     reach = max(float(np.quantile(np.abs(dots.x), 0.999)), 2 * max(after.dv_p, -after.dv_n))
-    low = low_speeds(after, (-reach, reach))[1]
-    for title, high in (("all speeds", reach), ("low speeds", low)):
-        lines = [
-            _curve(said, p, acting, np.linspace(-high, p.dv_n, CURVE),
-                   np.linspace(p.dv_p, high, CURVE), colour)
-            for p, acting, colour, said in curves
-        ]  # fmt: skip
-        top = SHOWN_RANGE * max(float(np.nanmax(np.abs(one.y))) for one in lines)
-        panels.append(
-            friction_panel(
-                title, units_of(model.rotary), dots, lines, (-high, high), (-top, top), after
-            )
-        )
+    panels = _panels(model, dots, curves, (-reach, reach))
     caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
     other = [words(a.key) for a in every if a not in speeds]
     if other:

@@ -148,7 +148,7 @@ def after_validate(
     if alone != found.judged and found.figures[alone]["model"].passed:
         return step("a design without the compensator", *words)
     one, limits = failed["model"], found.limits
-    controller = next(it for name, it in of.controllers.items() if name == alone)
+    controller = of.controllers[alone]
     m, pushed = one.margins, one.force_peak > limits.force * one.force_seen or one.limited > 0.0
     slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
     if one.stable and not (m is not None and m.modulus >= limits.modulus and slow):

@@ -24,6 +24,11 @@ FORCE_COLUMNS: Columns = (
     ("force_predicted", "model", "predicted: inverse model"),
     ("force_simulated", "other", "simulated"),
 )
+FORCE_ERRORS = {
+    "force_predicted_rms": "force, inverse model: error {} rms while sliding, the acceleration's"
+    " noise in it",
+    "force_simulated_rms": "force, simulated: error {} rms",
+}
 
 
 def error_lines(found: Predicted, rotary: bool) -> list[str]:
@@ -38,14 +43,9 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
         lines.append(f"position ({start}, driven by {by}): error {rms} rms")
     if summary["run_refused"] is not None:
         lines.append(f"position: {summary['run_refused']}")
-    if summary["force_predicted_rms"] is not None:
-        rms = force(summary["force_predicted_rms"], rotary)
-        lines.append(
-            f"force, inverse model: error {rms} rms while sliding, the acceleration's noise in it"
-        )
-    if summary["force_simulated_rms"] is not None:
-        rms = force(summary["force_simulated_rms"], rotary)
-        lines.append(f"force, simulated: error {rms} rms")
+    for key, said in FORCE_ERRORS.items():
+        if summary[key] is not None:
+            lines.append(said.format(force(summary[key], rotary)))
     return lines
 
 

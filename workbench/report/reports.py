@@ -13,7 +13,6 @@ from design.rst import RST, closed_loop
 from identification.arrays import Array
 from identification.estimation.windowed_run.parameters import AT_ZERO
 from identification.simulation.free_run import FreeRun
-from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design
 from workbench.documents.design_file import design_document
 from workbench.documents.model import Model, used
@@ -79,7 +78,7 @@ def identified_view(found: Identified) -> View:
     )
 
 
-def design_view(found: Design, rotary: bool = False) -> View:
+def design_view(found: Design) -> View:
     """The controllers, their margins, what they do to noise, how fast they are.
 
     Behind --verbose: the equations that a drive runs, which `export` writes as code.
@@ -87,20 +86,19 @@ def design_view(found: Design, rotary: bool = False) -> View:
     chosen = None if found.recommended == "none" else found.recommended
 
     def sections() -> Sequence[Section]:
-        one = found.p_pi
-        has_filter = one is not None and one.cascade is not None and one.series is not None
+        has_filter = found.p_pi is not None and found.p_pi.series is not None
         return (
             Section("Step response", step_chart(found)),
-            controllers(found, rotary),
+            controllers(found),
             *([Section(BODE_TITLE, bode_chart(found))] if has_filter else []),
-            Section("Sensitivity", sensitivity_chart(found, rotary)),
+            Section("Sensitivity", sensitivity_chart(found)),
             *program_sections(found),
         )
 
     return View(
         f"Design for {found.card}",
         design_sentence(found),
-        [*design_parts(found, rotary), *map(more, drive_lines(found, chosen))],
+        [*design_parts(found), *map(more, drive_lines(found, chosen))],
         {"design.json": lambda: design_document(found)},
         sections,
         lambda: step_chart(found),
@@ -123,9 +121,9 @@ def parameters_section(model: Model) -> Section:
 MOST_DB = float(20 * np.log10(2.0))  # of |S_yp| at a modulus margin of 0.5
 
 
-def controllers(found: Design, rotary: bool = False) -> Section:
+def controllers(found: Design) -> Section:
     """Margins of both loops and what they rest on."""
-    margins = table(margins_table(found), design_lines(found, rotary))
+    margins = table(margins_table(found), design_lines(found))
     return Section("Controllers", margins + table(drive_table(found)))
 
 
@@ -141,7 +139,7 @@ def program_sections(found: Design) -> tuple[Section, Section]:
     return Section("Coefficients", text), Section("As the drive runs it", drive_lines(found))
 
 
-def sensitivity_chart(found: Design, rotary: bool = False) -> Chart:
+def sensitivity_chart(found: Design) -> Chart:
     """|S_yp| with its limit, and |S_up|."""
     A, B = np.array(found.plant.A), np.array(found.plant.B)
     w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h
@@ -152,7 +150,7 @@ def sensitivity_chart(found: Design, rotary: bool = False) -> Chart:
         disturbance.append(Line(name.upper(), w, _db(s.S_yp), colour))
         noise.append(Line(name.upper(), w, _db(s.S_up), colour))
     top = max(float(line.y.max()) for line in noise) + 5.0 if noise else 0.0
-    unit, frequency = shown(rotary).stiffness, "frequency [rad/s]"
+    unit, frequency = found.units.stiffness, "frequency [rad/s]"
     panels = (
         Panel(frequency, "|S_yp| [dB]", disturbance, "disturbance to position", log_x=True),
         Panel(

@@ -16,7 +16,7 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.report.chart import Area, Chart, Line, Mark, Panel, chart_html
+from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, report_notes, table
 from workbench.screen import Part, listed, tabled
 from workbench.steps.response import (
@@ -252,27 +252,24 @@ def _bode(
     x = f[use]
     H = np.where(one.seen, one.H, np.nan)[use]
     half = np.where(one.seen, one.half_band, np.nan)[use]
-    size, phase = decibels(np.abs(H)), degrees(H)
+    phase = degrees(H)
     spread = np.minimum(np.degrees(half), 180.0)
     low = decibels(np.maximum(np.abs(H) * (1.0 - np.minimum(half, 0.99)), 1e-300))
     areas = (
         Area("95 %", x, low, decibels(np.abs(H) * (1.0 + half)), "measured"),
         Area("95 %", x, phase - spread, phase + spread, "measured"),
     )
-    magnitude, turn, coherence = list[Line](), list[Line](), list[Line]()
+    drawn: list[tuple[str, ComplexArray, Colour, LineStyle]] = [("measured", H, "measured", "line")]
+    coherence = [Line("measured", x, one.coherence[use], "measured")]
     if beside is not None:
         name, left_in = "friction left in", np.where(beside.seen, beside.H, np.nan)[use]
-        magnitude.append(Line(name, x, decibels(np.abs(left_in)), "before"))
-        turn.append(Line(name, x, _near(degrees(left_in), phase), "before"))
-        coherence.append(Line(name, x, beside.coherence[use], "before"))
-    magnitude.append(Line("measured", x, size, "measured"))
-    turn.append(Line("measured", x, phase, "measured"))
-    coherence.append(Line("measured", x, one.coherence[use], "measured"))
-    for name, curve in others:
-        if curve is not None:
-            own = curve[use]
-            magnitude.append(Line(name, x, decibels(np.abs(own)), "model", "dashed"))
-            turn.append(Line(name, x, _near(degrees(own), phase), "model", "dashed"))
+        drawn.insert(0, (name, left_in, "before", "line"))
+        coherence.insert(0, Line(name, x, beside.coherence[use], "before"))
+    drawn += [(name, own[use], "model", "dashed") for name, own in others if own is not None]
+    magnitude, turn = list[Line](), list[Line]()
+    for name, own, colour, style in drawn:
+        magnitude.append(Line(name, x, decibels(np.abs(own)), colour, style))
+        turn.append(Line(name, x, _near(degrees(own), phase), colour, style))
     shown_range = _round_range(x)
     level = [[], []] if levels is None else [[Mark(one)] for one in levels]
     return [

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from identification.arrays import Array
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import length, number, shown_unit
+from workbench.cards.readable import length, number, units_of
 from workbench.documents.design_file import design_document
+from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
@@ -56,46 +56,37 @@ def robust_sentence(found: Robust) -> str:
     )
 
 
-def promise_table(found: Robust, rotary: bool) -> Part:
+def promise_table(found: Robust) -> Part:
     """A row a measure of the robust loop."""
-    rows = [
-        (
-            one.words,
-            "" if spread.limit is None else _limit(one, spread.limit, rotary),
-            "" if spread.share is None else f"{100 * spread.share:.0f} %",
-            *(_said(one, value, rotary) for value in (spread.low, spread.median, spread.high)),
-        )
-        for one, spread in _of(found.promises[ROBUST])
-    ]
+    rotary, rows = found.design.rotary, list[Row]()
+    for one, spread in _of(found.promises[ROBUST]):
+        limit = "" if spread.limit is None else _said(one, spread.limit, rotary)
+        if limit not in ("", "none"):
+            limit = f"{'at least' if one.floor else 'at most'} {limit}"
+        values = (_said(one, value, rotary) for value in (spread.low, spread.median, spread.high))
+        rows.append((one.words, limit, _percent(spread), *values))
     return tabled(ROBUST_HEAD, rows, right=(2, 3, 4, 5))
 
 
-def beside_table(found: Robust, rotary: bool) -> Part:
+def beside_table(found: Robust) -> Part:
     """The medians of every loop, and the shares."""
-    rows = [
-        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_STYLES))
-        for one, _ in _of(found.promises[ROBUST])
-    ]
+    rows = list[Row]()
+    for one, _ in _of(found.promises[ROBUST]):
+        cells = dict.fromkeys(CURVE_STYLES, "-")
+        for name, promise in found.promises.items():
+            if spread := promise.measures.get(one.name):
+                share = f" ({_percent(spread)})" if _percent(spread) else ""
+                cells[name] = _said(one, spread.median, found.design.rotary) + share
+        rows.append((one.words, *cells.values()))
     return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
 
 
-def _beside(one: Measure, promise: Promise | None, rotary: bool) -> str:
-    spread = None if promise is None else promise.measures.get(one.name)
-    if spread is None:
-        return "-"
-    share = "" if spread.share is None else f" ({100 * spread.share:.0f} %)"
-    return f"{_said(one, spread.median, rotary)}{share}"
+def _percent(spread: Spread) -> str:
+    return "" if spread.share is None else f"{100 * spread.share:.0f} %"
 
 
 def _of(promise: Promise) -> list[tuple[Measure, Spread]]:
     return [(one, promise.measures[one.name]) for one in MEASURES if one.name in promise.measures]
-
-
-def _limit(one: Measure, value: float, rotary: bool) -> str:
-    said = _said(one, value, rotary)
-    if said == "none":
-        return said
-    return f"at least {said}" if one.floor else f"at most {said}"
 
 
 def _said(one: Measure, value: float, rotary: bool) -> str:
@@ -108,15 +99,15 @@ def _said(one: Measure, value: float, rotary: bool) -> str:
     return f"{number(factor * value)} {unit}".rstrip()
 
 
-def robust_lines(found: Robust, rotary: bool) -> list[str]:
+def robust_lines(found: Robust) -> list[str]:
     """How it was chosen, what it misses, and remarks."""
     remarks = (*found.missed, *found.remarks)
-    return [*choice_lines(found, rotary), *(f"note: {one}" for one in remarks)]
+    return [*choice_lines(found), *(f"note: {one}" for one in remarks)]
 
 
-def choice_lines(found: Robust, rotary: bool) -> list[str]:
+def choice_lines(found: Robust) -> list[str]:
     """How it was chosen."""
-    speed, (unit, factor) = found.speed, shown_unit(shown(rotary).velocity)
+    speed, factor = units_of(found.design.rotary).velocity
     drift = ", ".join(f"{n} {100 * s:.2g} %" for n, s in (found.asked.drift or {}).items())
     return [
         f"the best of {found.tried} loops on {found.asked.draws} machines: of those whose limits"
@@ -125,49 +116,45 @@ def choice_lines(found: Robust, rotary: bool) -> list[str]:
         f" drawn anew (seed {found.asked.seed})",
         FIGURES_SAID,
         *([f"drawn with the drift found so far: {drift}"] if drift else []),
-        f"slow ramp: {number(factor * speed)} {unit}, half the narrowest stick band",
+        f"slow ramp: {number(factor * found.speed)} {speed}, half the narrowest stick band",
     ]
 
 
-def robust_view(found: Robust, rotary: bool) -> View:
+def robust_view(found: Robust) -> View:
     """The shares of the machines, the curves over them, the controllers and their equations."""
     return View(
         f"Robust design for {found.design.card}",
         robust_sentence(found),
         [
-            promise_table(found, rotary),
-            beside_table(found, rotary),
-            listed(choice_lines(found, rotary)),
+            promise_table(found),
+            beside_table(found),
+            listed(choice_lines(found)),
             notes((*found.missed, *found.remarks)),
         ],
         {
             "design.json": lambda: design_document(found.design),
             "robust.json": lambda: robust_document(found),
         },
-        lambda: _sections(found, rotary),
-        lambda: robust_chart(found, rotary),
+        lambda: _sections(found),
+        lambda: robust_chart(found),
         step=after_robust(found, Path("MODEL"), Path()),
         content=lambda: robust_document(found),
     )
 
 
-def _sections(found: Robust, rotary: bool) -> list[Section]:
-    design, chart = found.design, robust_chart(found, rotary)
-    lines = robust_lines(found, rotary)
-    promised = table(promise_table(found, rotary), lines)
+def _sections(found: Robust) -> list[Section]:
+    chart = robust_chart(found)
+    promised = table(promise_table(found), robust_lines(found))
     picture = chart_html(chart) if chart.panels else ""
     return [
         Section("Over the machines that there may be", picture + promised),
-        Section(
-            "Beside the nominal design and the present controller",
-            beside_table(found, rotary),
-        ),
-        controllers(design, rotary),
-        *program_sections(design),
-    ]  # fmt: skip
+        Section("Beside the nominal design and the present controller", beside_table(found)),
+        controllers(found.design),
+        *program_sections(found.design),
+    ]
 
 
-def robust_chart(found: Robust, rotary: bool) -> Chart:
+def robust_chart(found: Robust) -> Chart:
     """The share of machines over each measure's value, for every loop."""
     panels = list[Panel]()
     for one, _ in _of(found.promises[ROBUST]):
@@ -175,15 +162,15 @@ def robust_chart(found: Robust, rotary: bool) -> Chart:
         values = np.concatenate([np.zeros(0), *(each for each in every if each is not None)])
         values = values[np.isfinite(values)]
         if values.size and float(np.ptp(values)) > 0.0:  # where all are one there is no curve
-            panels.append(_shares(found, one, rotary))
+            panels.append(_shares(found, one))
     what = "shares of machines by measure"
     return Chart("robust", what, panels, columns=2, shared_x=False, caption=ROBUST_CAPTION)
 
 
-def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
+def _shares(found: Robust, one: Measure) -> Panel:
     factor, unit = UNITS_OF_KIND.get(one.kind, (1.0, ""))
     if one.kind == "length":
-        unit, factor = shown_unit(shown(rotary).position)
+        unit, factor = units_of(found.design.rotary).position
     limit = found.promises[ROBUST].measures[one.name].limit
     lines = []
     for name, promise in found.promises.items():

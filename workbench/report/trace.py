@@ -15,7 +15,7 @@ from workbench.cards.readable import as_shown, in_digits, number, shown_unit, sm
 from workbench.documents.model_file import model_document
 from workbench.output import Row
 from workbench.report.chart import Chart
-from workbench.report.fit import Which, missing_chart, missing_over_time
+from workbench.report.fit import Which, missing_chart
 from workbench.report.friction import trace_friction_chart
 from workbench.report.model_tables import estimate_cells, is_left_out, reasons_once
 from workbench.report.next_steps import after_trace
@@ -69,16 +69,20 @@ def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
 
 
 def effects_table(found: Trace, rig: Rig, logs: Sequence[str] = ()) -> Part:
-    """Every effect's parameters; of one effect alone a screen has room for what they mean."""
-    rows: list[Row] = []
+    """Every effect's parameters; of one effect alone a screen has room for what they mean, and of
+    several a row names the effect and those of its parameters follow."""
+    rows, once, alone = list[Row](), list[Row](), len(found.effects) == 1
     for e in found.effects:
-        estimates = effect_estimates(e, rig)
+        name, estimates, own = words(e.effect.key), effect_estimates(e, rig), list[Row]()
         for p in shown_params(e):
             value, unit, interval = estimate_cells(estimates[p.name], "")
-            unit = "" if p.unit == "1" else unit
-            rows.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
-    once = effects_once(rows, found, logs)
-    if len(found.effects) == 1:
+            own.append((p.name, value, "" if p.unit == "1" else unit, interval, p.meaning))
+        rows += [(f"{name} {row[0]}", *row[1:]) for row in own]
+        if not alone:  # their reasons would push other effects from the screen
+            own = [row if row[1] != "-" else (*row[:3], "", row[4]) for row in own]
+        once.append((f"{name}:", "", "", "", ""))
+        once += [(f"  {row[0]}", *row[1:]) for row in reasons_once(own, logs)]
+    if alone:
         return tabled(EFFECT_HEAD, once, whole=rows)
     short = tabled(EFFECT_HEAD[:-1], [row[:-1] for row in once])
     return replace(short, whole=tuple(rows), whole_head=EFFECT_HEAD)
@@ -89,39 +93,19 @@ def shown_params(of: FoundEffect) -> list[Param]:
     return [p for p in of.effect.params if not is_left_out(p, of.params[p.name])]
 
 
-def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row]:
-    """The rows of `effects_table` for one screen: a row names the effect, those of its parameters
-    follow."""
-    out: list[Row] = []
-    left = iter(rows)
-    for e in found.effects:
-        name = words(e.effect.key)
-        own = [next(left) for _ in shown_params(e)]
-        short = [(row[0].removeprefix(f"{name} "), *row[1:]) for row in own]
-        out.append((f"{name}:", "", "", "", ""))
-        if len(found.effects) > 1:  # their reasons would push other effects from the screen
-            short = [row if row[1] != "-" else (*row[:3], "", row[4]) for row in short]
-        out += [(f"  {row[0]}", *row[1:]) for row in reasons_once(short, logs)]
-    return out
-
-
 def effect_lines(found: Trace) -> list[str]:
     """Equation, source and worth of every effect, once for those of the same."""
     said = dict[str, list[str]]()
     for e in found.effects:
+        chance = "p < 1e-4" if e.p_value < 1e-4 else f"p = {e.p_value:.2g}"
+        if math.isclose(e.p_value, FLOOR):
+            chance = f"p < {FLOOR:.1g}, none of {DRAWS} draws"
         line = (
-            f"{e.effect.equation}; {e.effect.place.gives}. {_worth(e)}. Source: {e.effect.source}."
+            f"{e.effect.equation}; {e.effect.place.gives}. It explains {100 * e.explained:.3g} % of"
+            f" what was missing where it shows (by chance: {chance}). Source: {e.effect.source}."
         )
         said.setdefault(line, []).append(words(e.effect.key))
     return [f"{', '.join(names)}: {line}" for line, names in said.items()]
-
-
-def _worth(e: FoundEffect) -> str:
-    chance = "p < 1e-4" if e.p_value < 1e-4 else f"p = {e.p_value:.2g}"
-    if math.isclose(e.p_value, FLOOR):
-        chance = f"p < {FLOOR:.1g}, none of {DRAWS} draws"
-    share = f"{100 * e.explained:.3g} %"
-    return f"It explains {share} of what was missing where it shows (by chance: {chance})"
 
 
 def rivals_table(found: Trace, rotary: bool) -> Part:
@@ -211,9 +195,7 @@ def _main_chart(traced: Traced) -> Chart:
     if drawn:
         return signal_chart(drawn[0], traced.model.rotary, rig.command_unit)
     if traced.trace.missing_force is not None:
-        return missing_chart(
-            traced.trace, traced.trace.missing_force, traced.model.rotary, *_unseen(traced)
-        )
+        return missing_chart(traced.trace, traced.model.rotary, *_unseen(traced))
     return trace_friction_chart(traced)
 
 
@@ -221,7 +203,10 @@ def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
     drawn, command = pictures(found), model.rig.command_unit
     logs = [source.file for source in traced.train]
-    sections = missing_over_time(found, model.rotary, *_unseen(traced))
+    sections = list[Section]()
+    if found.missing_force is not None:
+        chart = missing_chart(found, model.rotary, *_unseen(traced))
+        sections.append(Section("Force that the model lacks", chart))
     # What is left of each equation against every signal that explains it, then over time.
     sections += [against_signal(picture, model.rotary, command) for picture in drawn]
     left = {picture.residual.equation: picture.residual for picture in drawn}

@@ -238,45 +238,34 @@ def against_signal(picture: Picture, rotary: bool, command: str = "V") -> Sectio
 
 
 def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
-    """The chart of `against_signal`; command: unit of u."""
-    residual = picture.residual
+    """The chart of `against_signal`: points, and running medians and what the fitted effect takes
+    away in each direction of motion; command: unit of u."""
+    residual, ways, levels = picture.residual, by_direction(picture.residual), picture.levels
     label, x_factor = axis_of(picture.signal, rotary, command)
     unit, factor = residual_unit(residual.equation, rotary)
     x = x_factor * residual.signals[picture.signal]
     both = _both(residual)
     if len(both) > 1:
         both[0] = (picture.without, "before", picture.how)
-    limits = _limits(residual, factor, both[0][0])
+    limits, chosen = _limits(residual, factor, both[0][0]), evenly_spread(len(x), DOTS)
     panels: list[Panel] = []
     for values, colour, name in both:
-        title = name if len(both) > 1 else ""
-        lines = _cloud(residual, x, factor * values, colour, picture.levels)
+        lines = [Line("rows", x[chosen], factor * values[chosen], colour, "dots")]
+        for said, (at, way) in ways.items():
+            lines.append(
+                Line(said, *running_median(x[at], factor * values[at], levels), way, "bold")
+            )
         if picture.curve is not None and picture.effect and not panels:
-            lines += _fitted(picture, x, factor)
+            said = f"fitted: {words(picture.effect.key)}"
+            for at, _ in ways.values():
+                curve = running_median(x[at], factor * picture.curve[at], max(FINE, levels))
+                lines.append(Line(said, *curve, "measured", "dashed"))
+                said = ""
+        title = name if len(both) > 1 else ""
         panels.append(Panel(label, f"residual [{unit}]", lines, title, y_range=limits, height=260))
     what = f"residual of the {EQUATION_TITLES[residual.equation]} against {label}, before and after"
     name, caption = f"trace-{residual.equation}-{picture.signal}", _caption(picture)
     return Chart(name, what, panels, columns=2, caption=caption)
-
-
-def _cloud(residual: Residual, x: Array, values: Array, colour: Colour, levels: int) -> list[Line]:
-    """Points against a signal, and their running median in each direction of motion."""
-    chosen = evenly_spread(len(x), DOTS)
-    out = [Line("rows", x[chosen], values[chosen], colour, "dots")]
-    for name, (at, way) in by_direction(residual).items():
-        out.append(Line(name, *running_median(x[at], values[at], levels), way, "bold"))
-    return out
-
-
-def _fitted(picture: Picture, x: Array, factor: float) -> list[Line]:
-    """What the fitted effect takes away, in each direction of motion."""
-    assert picture.curve is not None and picture.effect
-    name = f"fitted: {words(picture.effect.key)}"
-    out: list[Line] = []
-    for at, _ in by_direction(picture.residual).values():
-        curve = running_median(x[at], factor * picture.curve[at], max(FINE, picture.levels))
-        out.append(Line("" if out else name, *curve, "measured", "dashed"))
-    return out
 
 
 def _caption(picture: Picture) -> str:

@@ -45,20 +45,14 @@ def trace_sentence(traced: Traced) -> str:
             " That is by the measured force; between it and the command something is missing"
             + (f", which acts like {like}." if like else ": the actuator is not linear.")
         )
-    if found.missing is not None and not traced.model.coulomb_unknown:
-        said += f" Force missing: {before_and_after(found)}."
+    force = found.missing_force
+    if found.missing is not None and force and not traced.model.coulomb_unknown:
+        was, now = map(share_of_friction, found.missing, (force.before, force.after))
+        both = f"{was} of friction before, {now} after" if force.lessened else f"{now} of friction"
+        said += f" Force missing: {both}."
     if found.not_tried:
         said += f" Ended early, so this is for now; not tried: {'; '.join(found.not_tried)}."
     return said
-
-
-def before_and_after(found: Trace) -> str:
-    """The force missing with and without the effects, as shares of friction."""
-    assert found.missing is not None and found.missing_force is not None
-    forces = (found.missing_force.before, found.missing_force.after)
-    was, now = map(share_of_friction, found.missing, forces)
-    both = f"{was} of friction before, {now} after"
-    return both if found.missing_force.lessened else f"{now} of friction"
 
 
 def share_of_friction(part: float, of: LatentForces) -> str:

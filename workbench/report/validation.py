@@ -203,13 +203,15 @@ def _step_chart(
     for begin in begins:
         height = factor * float(some.r[begin] - some.r[begin - 1])
         title = f"step of {number(height)} {unit}"
-        lines = [_cut(some, some.r, begin, span, factor, "reference", "other", "dotted")]
-        lines += [_of(name, run, run.y, begin, span, factor) for name, run in runs.items()]
+        part = slice(begin, begin + span)
+        lines = [Line("reference", *_since(some, some.r, part, factor), "other", "dotted")]
+        lines += [_of(name, run, run.y, part, factor) for name, run in runs.items()]
         panels.append(
             Panel(SINCE, f"position [{unit}]", lines, title, y_range=_near(lines, height))
         )
     for begin in begins:
-        lines = [_of(name, run, run.u, begin, span, 1.0) for name, run in runs.items()]
+        part = slice(begin, begin + span)
+        lines = [_of(name, run, run.u, part, 1.0) for name, run in runs.items()]
         marks = [] if limit is None else [Mark(-limit), Mark(limit)]
         panels.append(Panel(SINCE, f"command [{command}]", lines, marks=marks))
     what = "position and command after a step in the simulated loop, all controllers"
@@ -244,11 +246,8 @@ def _error_chart(
     panels = []
     for kind, start, title in shown_of:
         runs = _runs(traces, place, kind)
-        some = next(iter(runs.values()))
-        begin, span = 0, len(some.t)
-        if kind == "step":
-            begin, span = part.start, part.stop - part.start
-        lines = [_of(name, run, run.r - run.y, begin, span, factor) for name, run in runs.items()]
+        shown = part if kind == "step" else slice(len(next(iter(runs.values())).t))
+        lines = [_of(name, run, run.r - run.y, shown, factor) for name, run in runs.items()]
         panels.append(Panel(start, f"error [{unit}]", lines, title))
     what = "error along the smooth reference and at rest in the simulated loop, all controllers"
     caption = (
@@ -264,19 +263,15 @@ def _runs(
     return {name: getattr(run, kind) for (name, where), run in traces.items() if where == place}
 
 
-def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
+def _of(name: str, run: LoopRun, values: Array, part: slice, factor: float) -> Line:
     """A line of a loop, called and coloured by its controller."""
     alone, _, beside = name.partition(" + ")
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
     styles: dict[str, LineStyle] = {"": "line", "compensator": "dashed", "schedule": "dotted"}
-    style = styles[beside]
-    return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], style)
+    return Line(shown, *_since(run, values, part, factor), LOOP_COLOURS[alone], styles[beside])
 
 
-def _cut(
-    run: LoopRun, values: Array, begin: int, span: int, factor: float, name: str, colour: Colour,
-    style: LineStyle,
-) -> Line:  # fmt: skip
-    part = slice(begin, begin + span)
+def _since(run: LoopRun, values: Array, part: slice, factor: float) -> tuple[Array, Array]:
+    """Time from the beginning of a part of a run [s], and the values there."""
     t = run.t[part]
-    return Line(name, t - t[0], factor * np.asarray(values, dtype=np.float64)[part], colour, style)
+    return t - t[0], factor * np.asarray(values, dtype=np.float64)[part]

@@ -72,7 +72,7 @@ def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str]
 MOST_NOTES = 6
 
 
-def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_NOTES) -> Part:
+def notes(remarks: Iterable[str], logs: Collection[str] = ()) -> Part:
     """The remarks for a terminal: merged and without asides; with --verbose each as it is.
 
     logs: names with which a remark on one log begins.
@@ -80,7 +80,7 @@ def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_N
     every = tuple(remarks)
     main = printed_once((one for one in every if not isinstance(one, MinorRemark)), logs)
     shown = [one._replace(text=f"note: {one.text}") for one in report_notes(every, logs)]
-    return replace(instead(_noted(main), _noted(every), most, yields=True), merged=shown)
+    return replace(instead(_noted(main), _noted(every), MOST_NOTES, yields=True), merged=shown)
 
 
 def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:

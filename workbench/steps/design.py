@@ -113,7 +113,7 @@ def _tracks_better(model: Model, cascade: Design, found: Design) -> Iterator[str
 def usual_structures(model: Model, asked: Asked | None) -> tuple[Structure, ...]:
     """The structures that are designed where nobody says; poles that are asked for have no P-PI."""
     by_hand = asked is not None and (asked.dominant is not None or asked.auxiliary is not None)
-    now = model.present
+    now = model.controller
     cascade = model.resonance is not None or (now is not None and now.kind == "P-PI")
     asks_none = asked is not None and not asked.integrator
     return POLES_PLACED if by_hand or asks_none or not cascade else (*POLES_PLACED, "p-pi")
@@ -268,7 +268,7 @@ def _design_of(
         ),
         versions=versions(),
         command=command_of(model, force),
-        present=model.present,
+        present=model.controller,
         lacks=model.lacks,
     )
 

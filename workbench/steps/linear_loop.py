@@ -71,7 +71,7 @@ def periods(model: Model) -> tuple[float, ...]:
     The drive's own is that of the card's controller, else that of the logs: a log is not written
     faster than its drive runs. A position loop above a force loop leaves it a few samples.
     """
-    now = model.present
+    now = model.controller
     base = now.law.h if now else model.period
     if isinstance(model.simulated.actuator, Actuator):
         base = max(base, IN_FORCE_SAMPLES * force_period(model))
@@ -80,7 +80,7 @@ def periods(model: Model) -> tuple[float, ...]:
 
 def force_period(model: Model) -> float:
     """Sampling period of a force loop [s]: that of the card's own, else of the logs."""
-    now = model.present
+    now = model.controller
     return now.force.h if now and now.force else model.period
 
 
@@ -101,7 +101,7 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
 def law_to_force(model: Model) -> tuple[DriveLaw, float] | None:
     """The law that the machine has now, and by which its output becomes a force; None where there
     is none, or a force loop or an actuator stands between."""
-    now, drive = model.present, model.simulated.actuator
+    now, drive = model.controller, model.simulated.actuator
     if now is None or now.force is not None:
         return None
     if now.output == "force":

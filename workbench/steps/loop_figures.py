@@ -94,7 +94,7 @@ def present_figures(
 
     None where the card named none. Raises BadModel where it cannot be simulated.
     """
-    now = model.present
+    now = model.controller
     if now is None:
         return None
     return tried_loop(machine, model, found, present_loop(model, now), limits, rng)

@@ -14,8 +14,7 @@ from identification.errors import BadCard, BadSpecification
 from identification.log import Rig
 from workbench.cards.card import Card, load_card
 from workbench.cards.controller import CardController, Kind
-from workbench.cards.parameter_units import shown
-from workbench.documents.drive import ForceLoop, Present, PresentFile, present_file
+from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model
 from workbench.logs.sources import card_path
 
@@ -26,16 +25,15 @@ LAWS: Mapping[Kind, Callable[..., RST]] = {
 }
 
 
-def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
+def present_of_card(card: Card, rig: Rig, h: float) -> Present | None:
     """What model.json holds of the card's controller; h [s]: period of the logs.
 
     None where the card names none. Raises BadCard where it is none, or does not fit the rig.
     """
     if card.controller is None:
         return None
-    units = shown(rig.motion == "rotary", rig.command_unit)
     try:
-        return present_file(present(card.controller, rig, h), rig.control_limit, units)
+        return present(card.controller, rig, h)
     except (BadCard, BadSpecification) as error:
         raise BadCard(f"{card.path}: controller: {error}") from None
 

@@ -89,11 +89,11 @@ def recommended(model: Model, found: Design) -> Recommendation:
 def _no_clear_win(model: Model, found: Design, name: Structure, compensated: bool) -> str:
     """Why a controller does not clearly win over the present one, "" where it does or there is
     none that can be simulated."""
-    if model.present is None:
+    if model.controller is None:
         return ""
     beside = found.compensator.value if compensated else None
     try:
-        now = present_loop(model, model.present)
+        now = present_loop(model, model.controller)
         loop = driven_loop(model, found, found.controllers[name], beside)
         against = contest(model, found.force, loop, now)
     except BadModel:  # `validate` says why

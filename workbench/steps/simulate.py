@@ -26,7 +26,7 @@ from workbench.cards.effect_values import exact
 from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
 from workbench.documents.codec import written
-from workbench.documents.drive import PresentFile
+from workbench.documents.drive import Present
 from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
 from workbench.files import ABSURD
@@ -210,7 +210,7 @@ def truth(
     seed: int | None = None,
     *,
     rig: Rig | None = None,
-    controller: PresentFile | None = None,
+    controller: Present | None = None,
 ) -> dict[str, Any]:
     """What the log does not hold: parameters, effects, loop, noise and seed.
 

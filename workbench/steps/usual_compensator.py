@@ -11,7 +11,8 @@ import numpy as np
 
 from design.filters import filters_at, quick_filters
 from design.tracking import integrates
-from workbench.documents.design import CompensatorValues, Controller
+from workbench.documents.compensator import CompensatorValues, FiltersAt
+from workbench.documents.design import Controller
 from workbench.documents.model import Model
 
 N_C = 2.0  # the paper's, in simulation and on the rig
@@ -32,7 +33,7 @@ def whole_compensator(model: Model, h: float) -> CompensatorValues:
     """The paper's, which gives the whole friction, every h [s]. Source: paper, eqs. (2)-(4)."""
     low, high = model.travel
     e_T = E_T_PER_TRAVEL * (high - low)
-    return CompensatorValues(N_C, e_T, model.friction, filters_at(h), h)
+    return CompensatorValues(N_C, e_T, model.friction, FiltersAt.of(filters_at(h), h))
 
 
 def excess_compensator(model: Model, h: float, many: float = USUAL_EXCESS) -> CompensatorValues:
@@ -40,6 +41,6 @@ def excess_compensator(model: Model, h: float, many: float = USUAL_EXCESS) -> Co
     every h [s]; of a model without noise at the error of the whole one. Source: our own."""
     whole, noise = whole_compensator(model, h), model.fit.noise_y
     p = whole.value.friction
-    filters = quick_filters(h, noise, min(p.dv_p, -p.dv_n))
+    filters = FiltersAt.of(quick_filters(h, noise, min(p.dv_p, -p.dv_n)), h)
     e_T = many * noise if noise > 0.0 else whole.e_T
-    return CompensatorValues(EXCESS_N_C, e_T, model.friction, filters, h, excess=True)
+    return CompensatorValues(EXCESS_N_C, e_T, model.friction, filters, excess=True)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from identification.errors import BadModel
 from tests.workbench.export.designs import case
-from workbench.documents.design import CompensatorValues
+from workbench.documents.compensator import CompensatorValues
 from workbench.documents.drive import Present
 from workbench.export.exported import exported, identifier
 from workbench.export.filled import lead_of, rows, title_of
@@ -77,7 +77,7 @@ def test_what_to_know_of_it_stands_in_every_file() -> None:
     told = replace(
         found,
         compensator=CompensatorValues(
-            values.N_c, values.e_T, {**values.friction, "F_sn": blank}, values.filters, values.h
+            values.N_c, values.e_T, {**values.friction, "F_sn": blank}, values.filters
         ),
     )
     lead = "\n".join(lead_of(exported(told, compensated=True)))

@@ -97,7 +97,7 @@ def turned(found: Identified) -> Identified:
 def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     model = turned(identified()).model
     found = designed(model)
-    html = checked(design_view(found, model.rotary).page(), 2)
+    html = checked(design_view(found).page(), 2)
     assert "[dB, N m/rad]" in html and " V/(N m)," in html
     assert "N/m" not in html and "V/N," not in html
     result, _ = validate(model, found, np.random.default_rng(0))

@@ -19,8 +19,6 @@ from identification.model.karnopp import NAMES
 from identification.progress import KeepGoing, quiet
 from tests.chain import TABLES, model_of
 from workbench.cards.controller import CardController
-from workbench.cards.parameter_units import shown
-from workbench.documents.drive import present_file
 from workbench.documents.model import Model
 from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.drawn import drawn_plants, in_loop
@@ -48,7 +46,7 @@ def controlled(spread: float = 5e-3) -> Model:
     law = pid_to_rst(2000.0, 0.5, 0.1, 0.01, 2e-3)
     gains = {"R": tuple(law.R / K_A), "S": tuple(law.S), "T": tuple(law.T / K_A)}
     card = CardController("RST", {}, gains, 2e-3, "command", None, None, None)
-    own = present_file(present(card, model.rig, 2e-3), None, shown(False, "V"))
+    own = present(card, model.rig, 2e-3)
     entry = replace(model.log[0], speed=0.3, h=2e-3)
     return replace(model, controller=own, log=(entry,), fit=replace(model.fit, noise_F=0.0))
 

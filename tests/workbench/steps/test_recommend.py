@@ -11,9 +11,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.cards.controller import CardController
-from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design, Recommendation
-from workbench.documents.drive import present_file
 from workbench.documents.model import Model
 from workbench.report.design_tables import margins_table
 from workbench.report.validation import validation_table
@@ -33,8 +31,7 @@ def now(model: Model, k_d: float, period: float | None = None) -> Model:
     """The model of a machine that has a PD."""
     gains = {"k_d": Estimate(k_d, "V/m"), "T_d": Estimate(0.03, "s"), "eps": Estimate(0.01, "s")}
     given = CardController("PD", gains, {}, period, "command", None, None, None)
-    found = present(given, model.rig, model.period)
-    return replace(model, controller=present_file(found, None, shown(False, "V")))
+    return replace(model, controller=present(given, model.rig, model.period))
 
 
 @cache

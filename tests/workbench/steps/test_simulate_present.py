@@ -96,7 +96,7 @@ def test_it_is_the_run_of_validate(name: str, tmp_path: Path) -> None:
     assert recipe is not None and recipe.by_card
     log = record(card.name, recipe, None, card.rig(), card.controller)
     machine = machine_of(card)
-    now = machine.present
+    now = machine.controller
     assert now is not None
     loop = present_loop(machine, now)
     every = round(recipe.h / loop.h)

@@ -118,7 +118,7 @@ def bench_of(model: Model, found: Design | None) -> Bench:
         if not name:
             raise BadModel("the design recommends no controller; give one that does")
         return Bench(model, driven_loop(model, found, found.controllers[name]), name.upper())
-    now = model.present
+    now = model.controller
     if now is None:
         raise BadModel(
             "the model has no controller that would follow a reference; give --design DESIGN, or"

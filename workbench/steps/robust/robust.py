@@ -160,9 +160,9 @@ def _promises(
     if own is not None and own.controller != "none":
         one = Candidate(nominal, own.controller, own.compensator)
         loops[NOMINAL] = (one.name, one.compensator, one.loop(model))
-    if model.present is not None:
+    if model.controller is not None:
         with suppress(BadModel):  # `validate` says why
-            loops[PRESENT] = ("none", False, present_loop(model, model.present))
+            loops[PRESENT] = ("none", False, present_loop(model, model.controller))
     seeds, few = rng.spawn(len(machines.plants)), machines.plants[:MOST_BESIDE]
     out = {}
     for i, (name, (controller, compensator, loop)) in enumerate(loops.items()):

@@ -15,7 +15,8 @@ from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
 from identification.progress import Progress
-from workbench.documents.design import CompensatorValues, Controller, Design, Structure
+from workbench.documents.compensator import CompensatorValues, FiltersAt
+from workbench.documents.design import Controller, Design, Structure
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
 from workbench.steps.design import POLES_PLACED, placed_design
@@ -141,7 +142,8 @@ def compensators(model: Model, controller: Controller) -> Iterator[CompensatorVa
     h = controller.h
     whole = whole_compensator(model, h)
     for e_T, times in WHOLE_TRIED:
-        yield replace(whole, e_T=e_T * whole.e_T, filters=scaled_filters(h, times))
+        filters = FiltersAt.of(scaled_filters(h, times), h)
+        yield replace(whole, e_T=e_T * whole.e_T, filters=filters)
     friction = whole.value.friction
     excess = max(friction.F_sp - friction.F_cp, -friction.F_sn - friction.F_cn)
     if excess > 0.0 and model.fit.noise_y > 0.0 and integrates(np.ones(1), controller.rst):

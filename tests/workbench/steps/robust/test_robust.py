@@ -152,17 +152,17 @@ def test_the_document_is_json_and_names_every_loop() -> None:
 
 
 def test_the_report_shows_the_shares_and_the_design() -> None:
-    text = robust_view(found(), rotary=False).page()
+    text = robust_view(found()).page()
     assert text.count('<figure class="chart"') == 1
     assert "&lt;t" not in text
     assert "modulus margin" in text and "nominal" in text
-    assert any("drawn anew" in line for line in robust_lines(found(), rotary=False))
+    assert any("drawn anew" in line for line in robust_lines(found()))
 
 
 @pytest.mark.method
 def test_drift_so_far_is_told() -> None:
     one = robust_design(uncertain(0.005), replace(WANTED, drift={"F_cp": 0.1}), POLES)
-    assert any("F_cp 10 %" in line for line in robust_lines(one, rotary=False))
+    assert any("F_cp 10 %" in line for line in robust_lines(one))
     assert any("widened by the drift" in line for line in one.remarks)
 
 
