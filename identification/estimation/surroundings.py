@@ -48,6 +48,7 @@ from identification.thresholds import (
     HALF,
     MATERIAL,
     OF_ACCOUNT,
+    PENALTY,
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
@@ -234,13 +235,19 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
 
 def _has_gravity(found: LaggedRows) -> bool:
     """Whether the force depends on the sine of the angle, significantly, for much of what is left
-    without, and a spring, on the angle itself, would not leave clearly less: in a narrow motion
-    both do."""
+    without, and a spring, on the angle itself, is not clearly the likelier: in a narrow motion both
+    are as likely."""
     plain, spring, weight = (found.least(used) for used in (PLAIN, SPRING, GRAVITY))
-    if not explains(plain, weight) or explains(weight, spring):
+    if not explains(plain, weight) or is_likelier(spring, weight, found.rows / OVERLAP):
         return False
     theta, sd = _with_spread(found, GRAVITY, 0.0)
     return any(stands_out(float(theta[i]), float(sd[i])) for i in (-2, -1))
+
+
+def is_likelier(left: float, other: float, independent: float) -> bool:
+    """Whether what leaves this of a square of so many independent errors is clearly likelier than
+    what leaves another. Source: Schwarz, Ann. Stat. 6 (1978) 461."""
+    return other > left * float(np.exp(PENALTY / independent))
 
 
 def explains(without: float, left: float) -> bool:
