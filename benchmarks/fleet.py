@@ -28,8 +28,9 @@ from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.fleet.cluster import local_cluster
 from workbench.fleet.finding import find_logs
-from workbench.fleet.run import FleetRun, InRegistry, NoRegistry, Report
+from workbench.fleet.run import FleetRun, InRegistry, Report
 from workbench.fleet.store import ResultStore
+from workbench.fleet.values import Item
 from workbench.logs.sources import card_path
 from workbench.registry.store import Registry
 from workbench.steps.simulate import as_columns, record
@@ -76,7 +77,7 @@ def run(folder: Path, workers: int, card: Card, out: Path, registry: Path | None
         warm(cluster, logs[:1], url, text)
         with ResultStore(out) as store:
             if registry is None:
-                return FleetRun(cluster, store, NoRegistry(), url, clock, text)(logs)
+                return FleetRun(cluster, store, None, url, clock, text)(logs)
             with Registry(str(registry)) as there:
                 recorder = InRegistry(there, "benchmark", clock)
                 return FleetRun(cluster, store, recorder, url, clock, text)(logs)
@@ -86,7 +87,7 @@ def warm(cluster, logs, url: str, card: str) -> None:  # type: ignore[no-untyped
     """Every worker has loaded its libraries and kernels, which a long run does once."""
     from workbench.fleet.work import work
 
-    item = NoRegistry().item(url, logs[0], card, 0)
+    item = Item(url, logs[0], card, 0)
     cluster.client.run(work, item)
 
 

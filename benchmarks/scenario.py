@@ -25,7 +25,8 @@ from identification.log import Log
 from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.jobs.judge import Chain
-from workbench.jobs.passes import Pass, PassSettings
+from workbench.jobs.options import JobOptions
+from workbench.jobs.passes import Pass
 from workbench.logs.sources import card_path
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
@@ -106,11 +107,11 @@ def story(
     told = []
     with Registry(str(root / "registry.db")) as registry:
         every = list(days())
+        options = JobOptions(root / "machines", settle=0.0, first=True)
         for day in (every[number] for number in numbers):
             write(machine / "logs", day, seed)
-            settings = PassSettings("scenario", first=True, settle=timedelta(0))
             now = day.at + timedelta(minutes=5)
-            Pass(registry, Chain(), settings, partial(at, now), silent).run(root / "machines")
+            Pass(registry, Chain(), options, "scenario", partial(at, now), silent).run()
             (outcome,) = (one for one in Queue(registry.database).outcomes("rig") if one.at == now)
             version = registry.active_version("rig")
             value = None

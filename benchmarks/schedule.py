@@ -30,7 +30,6 @@ from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.steps.closed_loop import (
     DrivenLoop,
     driven_loop,
-    noise_of,
     run_plant,
     scheduled_loop,
 )
@@ -180,8 +179,7 @@ def judged(kind: Kind, seed: int) -> list[tuple[bool, bool]]:
 def _ride(axis: Axis, loop: DrivenLoop, seed: int) -> tuple[float, float]:
     """Root mean square error [m] and largest force [N] on the truth."""
     r = path(axis, loop.h, seed)
-    noise = noise_of(axis.model, len(r), np.random.default_rng(seed))
-    run = run_plant(axis.model, axis.truth, loop, r, noise)
+    run = run_plant(axis.model, axis.truth, loop, r, np.random.default_rng(seed))
     return float(np.sqrt(np.mean((run.r - run.y) ** 2))), float(np.max(np.abs(run.F)))
 
 

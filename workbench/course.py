@@ -34,8 +34,9 @@ class Course:
     """How far a computation has come, by its stages and by the clock, and whether it is to go on.
 
     advance: takes steps of the bar, which add up to 1; stages: the part of the bar of each; budget
-    [s]: after which it is to end; describe: shows what goes on, in words. A stage begins where the
-    last one has come to, if that is further on: some are left out, and others take their place.
+    [s]: after which it is to end; describe: shows what goes on, in words; stopped: whether it was
+    asked to end, before its budget. A stage begins where the last one has come to, if that is
+    further on: some are left out, and others take their place.
     """
 
     advance: Callable[[float], None]
@@ -44,13 +45,13 @@ class Course:
     budget: float = math.inf
     describe: Callable[[str], None] = lambda _words: None
     shown: float = 0.0
+    stopped: bool = False
     _begun: float = field(init=False)
     _stage: str = field(init=False, default="")
     _low: float = field(init=False, default=0.0)
     _here: float = field(init=False, default=0.0)
     _from: float = field(init=False, default=0.0)
     _since: float = field(init=False)
-    _stopped: bool = field(init=False, default=False)
     _compiled: float = field(init=False, default=0.0)
     _compiles: float | None = field(init=False, default=None)
     _moving: threading.Lock = field(init=False, default_factory=threading.Lock)
@@ -74,16 +75,7 @@ class Course:
 
         What kernels take to be compiled, once after an installation, does not count.
         """
-        return not self._stopped and self.clock() - self._begun - self._compiled < self.budget
-
-    def stop(self) -> None:
-        """From now on it is to end."""
-        self._stopped = True
-
-    @property
-    def stopped(self) -> bool:
-        """Whether it was asked to end, before its budget."""
-        return self._stopped
+        return not self.stopped and self.clock() - self._begun - self._compiled < self.budget
 
     def beat(self) -> None:
         """Move the bar to where the computation should be by now."""
@@ -188,7 +180,7 @@ def _first_ctrl_c(course: Course) -> Iterator[None]:
 
     def end(_number: int, _frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, usual)
-        course.stop()
+        course.stopped = True
 
     signal.signal(signal.SIGINT, end)
     try:

@@ -95,11 +95,7 @@ class OutputFolder:
 
     def write_json(self, name: str, result: object) -> Path:
         """Path of the file that now holds `result` as strict JSON."""
-        return self.write_text(name, dumps(result) + "\n")
-
-    def write_text(self, name: str, text: str) -> Path:
-        """Path of the file that now holds `text`."""
-        return self.write(name, text)
+        return self.write(name, dumps(result) + "\n")
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Path of the file that now holds the content, a text in UTF-8."""
@@ -219,19 +215,14 @@ def emit(result: object, view: Callable[[], Screen | str], then: Step | None = N
         click.echo(dumps({**result, **next_one} if isinstance(result, Mapping) else result))
         return
     verbose, shown = is_given(VERBOSE), view()
-    width = _width(verbose)
+    width: int | None = SCREEN_WIDTH  # one screen has at most 100 columns
+    if sys.stdout.isatty():
+        width = None if verbose else min(shutil.get_terminal_size().columns, SCREEN_WIDTH)
     last = then.lines(SCREEN_WIDTH, None if verbose else MOST_OF_A_STEP) if then else []
     found = screen(listed(shown.splitlines())) if isinstance(shown, str) else shown
     click.echo(found.text(width, verbose=verbose, room=SCREEN_LINES - len(last)), nl=False)
     for line in last:
         click.echo(line)
-
-
-def _width(verbose: bool) -> int | None:
-    """Columns: this terminal's, but one screen has at most 100; 100 without a terminal."""
-    if not sys.stdout.isatty():
-        return SCREEN_WIDTH
-    return None if verbose else min(shutil.get_terminal_size().columns, SCREEN_WIDTH)
 
 
 @contextmanager

@@ -29,19 +29,15 @@ def merged(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:
     """
     groups: dict[tuple[str, ...], list[str]] = {}
     for one in remarks:
-        groups.setdefault(_alike(one, logs), []).append(one)
+        log, said = _of_log(one, logs)
+        alike = (one,) if log is None else ("", FIGURE.sub(HOLE, PLACE.sub("", said)))
+        groups.setdefault(alike, []).append(one)
     return [Merged(_together(group, logs), tuple(group)) for group in groups.values()]
 
 
 def printed_once(remarks: Iterable[str], logs: Collection[str] = ()) -> list[str]:
     """The lines of `merged`."""
     return [one.text for one in merged(remarks, logs)]
-
-
-def _alike(remark: str, logs: Collection[str]) -> tuple[str, ...]:
-    """What remarks have in common that are printed together."""
-    log, said = _of_log(remark, logs)
-    return (remark,) if log is None else ("", FIGURE.sub(HOLE, PLACE.sub("", said)))
 
 
 def _of_log(remark: str, logs: Collection[str]) -> tuple[str | None, str]:

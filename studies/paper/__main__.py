@@ -45,7 +45,7 @@ def command(
             found = study(range(seed, seed + runs), report)
         document = paper_document(found)
         folder.write_json("paper.json", document)
-        folder.write_text("report.html", paper_report(found))
+        folder.write("report.html", paper_report(found))
     emit({**document, "out": folder.final}, lambda: paper_view(found, folder.final))
 
 

@@ -82,6 +82,6 @@ def test_a_stop_ends_it_and_compiling_is_said() -> None:
     one.compiling(False)
     assert words == ["first", COMPILING, "first"]
     with moving(one):
-        one.stop()
+        one.stopped = True
     assert (one.keep_going(), one.stopped) == (False, True)
     assert sum(steps) == pytest.approx(1.0)

@@ -42,7 +42,7 @@ def test_default_folder_is_named_by_time_and_command() -> None:
     with OutputFolder("identify", now=NOW) as folder:
         folder.write_json("model.json", {"m": 1.0})
         (folder.path / "parts").mkdir()
-        folder.write_text("parts/report.html", "µ")
+        folder.write("parts/report.html", "µ")
         assert not folder.final.exists()
     assert folder.final == Path("runs/20240506-070809-identify")
     assert tree(folder.final) == {
@@ -55,8 +55,8 @@ def test_default_folder_is_named_by_time_and_command() -> None:
 
 def test_runs_of_the_same_second_get_folders_of_their_own() -> None:
     with OutputFolder("demo", now=NOW) as first, OutputFolder("demo", now=NOW) as second:
-        first.write_text("a", "1")
-        second.write_text("a", "2")
+        first.write("a", "1")
+        second.write("a", "2")
     assert second.final == Path("runs/20240506-070809-demo")
     assert first.final == Path("runs/20240506-070809-demo-2")
     assert (first.final / "a").read_text() == "1"
@@ -74,7 +74,7 @@ def test_failure_leaves_no_trace(
 
     def fail() -> None:
         with OutputFolder("identify", out, now=NOW) as folder:
-            folder.write_text("model.json", "half")
+            folder.write("model.json", "half")
             raise error
 
     with pytest.raises(error):
@@ -99,8 +99,8 @@ def test_existing_folder_keeps_foreign_files() -> None:
     (old / "model.json").write_text("1")
     with OutputFolder("identify", old, now=NOW) as folder:
         (folder.path / "parts").mkdir()
-        folder.write_text("parts/b", "2")
-        folder.write_text("model.json", "2")
+        folder.write("parts/b", "2")
+        folder.write("model.json", "2")
         assert (old / "model.json").read_text() == "1"
     expected = {"model.json": "2", "notes.txt": "mine", "parts/a": "1", "parts/b": "2"}
     assert tree(old) == {**expected, "parts": "/"}
@@ -113,8 +113,8 @@ def test_folder_in_the_place_of_a_result_is_refused(tmp_path: Path) -> None:
         pytest.raises(BadOutput, match="is a folder"),
         OutputFolder("identify", Path("old"), now=NOW) as folder,
     ):
-        folder.write_text("a.csv", "1")
-        folder.write_text("model.json", "1")
+        folder.write("a.csv", "1")
+        folder.write("model.json", "1")
     assert tree(tmp_path) == before
 
 

@@ -15,7 +15,7 @@ from workbench.output import dumps, emit, progress
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
-    from workbench.fleet.run import Recorder, Report
+    from workbench.fleet.run import InRegistry, Report
     from workbench.screen import Screen
 
 MOST_BAD = 20  # results to look at on one screen; --verbose and --json have the first 1000
@@ -125,7 +125,6 @@ def after_fleet(
 
 def fleet_view(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
-    from workbench.fleet.run import per_core
     from workbench.screen import screen, tabled
     from workbench.verdicts import in_words
 
@@ -134,27 +133,27 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
     )
     left = f"{done.later} log(s) left: their machines are in another worker's hands"
     rows = [(one.log.machine, in_words(one.verdict), one.reason) for one in done.bad]
-    each, used = per_core(done), f"at most {done.memory / 2**20:.0f} MiB a worker"
+    new, used = sum(done.verdicts.values()), f"at most {done.memory / 2**20:.0f} MiB a worker"
     return screen(
         f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before",
         *([left] if done.later else []),
         tabled(("machine", "verdict", "reason"), rows, (), most=MOST_BAD),
-        *([] if each is None else
-          [f"{done.seconds:.1f} s, {each:.2f} processor seconds a log, {used}"]),
+        *([f"{done.seconds:.1f} s, {done.busy / new:.2f} processor seconds a log, {used}"]
+          if new else []),
         f"results: {out / 'results'}",
     )  # fmt: skip
 
 
 @contextmanager
-def _recorder(where: str | None) -> "Iterator[Recorder]":
+def _recorder(where: str | None) -> "Iterator[InRegistry | None]":
     """The registry at `where`, "": the default one, None: none."""
-    from workbench.fleet.run import InRegistry, NoRegistry
+    from workbench.fleet.run import InRegistry
     from workbench.jobs.lease import Patience
     from workbench.registry.database import location
     from workbench.registry.store import Registry
 
     if where is None:
-        yield NoRegistry()
+        yield None
         return
     owner = f"fleet:{worker_name()}"
     with Patience()(Registry, location(where or None)) as registry:

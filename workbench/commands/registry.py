@@ -75,7 +75,7 @@ def show(
                 with results("registry", out) as folder:
                     for kind, document in found.documents(version).items():
                         if document is not None:
-                            folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
+                            folder.write(f"{kind}.json", json.dumps(document, indent=2) + "\n")
     number_accepted = None if accepted is None else accepted.number
     shown = {"machine": state, "decisions": decisions, "logs": outcomes,
              "accepted": number_accepted}  # fmt: skip

@@ -24,18 +24,22 @@ def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
     if not url.strip():
         raise BadLogs("LOGS is empty; give a folder, a file or an fsspec URL of Parquet logs")
     system, root = file_system(url)
+    listing = system.glob if "*" in root or "?" in root else system.find
     try:
-        found = _listed(system, root)
+        found: Mapping[str, Mapping[str, Any]] = listing(root, detail=True)
     except Exception as error:  # every file system has errors of its own
         raise BadLogs(
             f"{shown(url)}: cannot be listed ({said(error, url)}); check the address"
         ) from error
     base = PurePosixPath(_base(root, found))
+    own = leave_out.absolute() if leave_out is not None and _is_local(system) else None
     logs = []
     for path, info in found.items():
+        if info.get("type") == "directory":  # a pattern finds them too
+            continue
         name = PurePosixPath(path).relative_to(base) if base.parts else PurePosixPath(path)
         hidden = any(part.startswith((".", "_")) for part in name.parts)
-        if name.suffix.lower() != SUFFIX or hidden or _inside(system, path, leave_out):
+        if name.suffix.lower() != SUFFIX or hidden or (own and Path(path).is_relative_to(own)):
             continue
         first = name.parts[0].removeprefix("machine=") if len(name.parts) > 1 else name.stem
         logs.append(LogFile(first, str(name), path, int(info.get("size") or 0), _time(info)))
@@ -102,14 +106,6 @@ def said(error: BaseException, address: str = "") -> str:
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 
-def _listed(system: Any, root: str) -> Mapping[str, Mapping[str, Any]]:
-    if "*" in root or "?" in root:
-        found: Mapping[str, Mapping[str, Any]] = system.glob(root, detail=True)
-        return {path: info for path, info in found.items() if info.get("type") != "directory"}
-    listed: Mapping[str, Mapping[str, Any]] = system.find(root, detail=True)
-    return listed
-
-
 def _base(root: str, found: Mapping[str, Any]) -> str:
     """The folder below which names are taken."""
     parts = PurePosixPath(root).parts
@@ -125,12 +121,6 @@ def _base(root: str, found: Mapping[str, Any]) -> str:
 def _is_local(system: Any) -> bool:
     protocol = system.protocol
     return "file" in ([protocol] if isinstance(protocol, str) else protocol)
-
-
-def _inside(system: Any, path: str, folder: Path | None) -> bool:
-    if folder is None or not _is_local(system):
-        return False
-    return Path(path).is_relative_to(folder.absolute())
 
 
 def _time(info: Mapping[str, Any]) -> int:

@@ -26,18 +26,6 @@ LEASE = timedelta(minutes=2)
 LONGEST_ALONE = timedelta(minutes=2)  # for which the cluster may be without any worker
 
 
-class NoRegistry:
-    """A recorder that records nothing: Parquet alone."""
-
-    def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
-        """The log as a worker takes it, without an active model."""
-        return Item(url, log, card, seed)
-
-    def record(self, result: Result) -> bool:
-        """True: there is nothing to record."""
-        return True
-
-
 @dataclass(frozen=True)
 class InRegistry:
     """A recorder into the registry; raises RegistryAway once its patience has ended.
@@ -100,7 +88,6 @@ class InRegistry:
         return any(one.sha256 == log.sha256 for one, _ in waiting)
 
 
-Recorder = NoRegistry | InRegistry
 FLEET_POLL = 1.0  # s between looks at the cluster
 CARDS_CHECKED = 20  # logs whose card is searched before a run begins
 
@@ -128,12 +115,13 @@ class Report:
 class FleetRun:
     """A run over the logs of a fleet.
 
-    url of the logs; card: text of the one for all, None: one a machine beside its logs.
+    recorder: None for Parquet alone; url of the logs; card: text of the one for all, None: one a
+    machine beside its logs.
     """
 
     cluster: Cluster
     store: ResultStore
-    recorder: Recorder
+    recorder: InRegistry | None
     url: str
     clock: Clock
     card: str | None = None
@@ -177,7 +165,7 @@ class FleetRun:
 
     def _record(self, result: Result) -> bool:
         """The result into the registry and then into Parquet; False: left to a later run."""
-        if not self.recorder.record(result):
+        if self.recorder is not None and not self.recorder.record(result):
             return False
         self.store.add(result, now=self.clock())
         return True
@@ -222,6 +210,8 @@ class FleetRun:
             return Result(log, "waits", str(error))
         if card is None:
             return Result(log, "waits", f"{log.name}: no card.toml beside or above it")
+        if self.recorder is None:
+            return self.cluster.submit(self.work, Item(self.url, log, card, self.seed))
         item = self.recorder.item(self.url, log, card, self.seed)
         return self.cluster.submit(self.work, item)
 
@@ -239,9 +229,3 @@ class FleetRun:
                 f"the cluster has had no worker for {time.total_seconds():.0f} s; results so far"
                 " are kept, start workers and run again"
             )
-
-
-def per_core(report: Report) -> float | None:
-    """Processor seconds of one log; None where nothing was done."""
-    done = sum(report.verdicts.values())
-    return report.busy / done if done else None

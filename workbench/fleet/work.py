@@ -36,15 +36,9 @@ def work(item: Item) -> Result:
             found = _result(item, path, card)
     except BadLogs as error:
         found = Result(item.log, "set_aside", str(error))
-    return replace(
-        found, seconds=time.process_time() - begin, memory=peak_memory(), versions=versions()
-    )
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far [bytes]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * KIB
+    seconds, peak = time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    memory = peak if sys.platform == "darwin" else peak * KIB
+    return replace(found, seconds=seconds, memory=memory, versions=versions())
 
 
 def _result(item: Item, path: Path, card: Path) -> Result:

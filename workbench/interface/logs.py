@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.errors import BadCard
+from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
 from workbench.cards.card import Card, load_card
 from workbench.course import running, working
@@ -38,13 +38,13 @@ from workbench.report.view import View
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.axis_test import axis_test as test_of_axis
 from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, write_stream
+from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import Predicted, predict_sources, prediction_frame
 from workbench.steps.present import present_of_card
 from workbench.steps.response import (
     Curve,
     Responded,
     curve_of,
-    identified_or_not,
     respond,
     response_frame,
 )  # fmt: skip
@@ -206,7 +206,12 @@ def responded(
     taken off; budget [s]: of the identification, where no model is known."""
     if known is None and left_in is None:
         with running("identifying", IDENTIFY_STAGES, budget) as course:
-            known, left_in = identified_or_not(of, seed, course.report, course.keep_going)
+            try:
+                known = identify_sources(
+                    of, seed=seed, on_progress=course.report, keep_going=course.keep_going
+                ).model
+            except NotIdentifiable as error:
+                left_in = f"not identifiable from the logs ({error})"
     with working("averaging spectra"):
         made = respond(
             of.runs, of.rig, of.card.name, known, lowest, left_in=left_in, read=of.remarks

@@ -247,8 +247,10 @@ def experiment(
     """
     known = model_of(model)
     asked = wanted or Wanted()
-    if rivals is not None:
-        asked = replace(asked, rivals=_rivals(rivals, known))
+    if isinstance(rivals, TraceResult):
+        asked = replace(asked, rivals=rivals_of(rivals.document, known, known.library))
+    elif rivals is not None:
+        asked = replace(asked, rivals=read_rivals(Path(rivals), known, known.library))
     made = None if design is None else _design(design)
     with running("experiment", EXPERIMENT_STAGES, budget) as course:
         found = plan_experiment(known, asked, made, course.report, course.keep_going)
@@ -261,10 +263,3 @@ def _design(given: DesignLike) -> Design:
     if not isinstance(found, Design):
         raise BadModel(f"{type(given).__name__} found, a design needed: its path, or a design's")
     return found
-
-
-def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:
-    """Keys of the effects that a trace leaves open."""
-    if isinstance(given, TraceResult):
-        return rivals_of(given.document, model, model.library)
-    return read_rivals(Path(given), model, model.library)

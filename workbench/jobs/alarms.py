@@ -120,8 +120,9 @@ class Delivery:
 def alarm_document(alarm: Alarm) -> dict[str, str | int | None]:
     """What a webhook is sent."""
     sent = {key: one for key, one in vars(alarm).items() if key not in ("log_id", "turn")}
-    readable = {key: _readable(sent[key]) for key in ("machine", "log", "reason")}
-    return {**sent, **readable, "at": alarm.at.isoformat()}
+    for key in ("machine", "log", "reason"):  # a file name's odd bytes have no form in UTF-8
+        sent[key] = sent[key].encode("utf-8", "backslashreplace").decode("utf-8")
+    return {**sent, "at": alarm.at.isoformat()}
 
 
 def key(alarm: Alarm) -> str:
@@ -237,8 +238,3 @@ def _cause(error: Exception) -> str:
             return f"{type(error).__name__}: {found.strerror}"
         found = found.__cause__ or found.__context__
     return type(error).__name__
-
-
-def _readable(text: str) -> str:
-    """The text with what has no form in UTF-8, such as a file name's odd bytes, spelled out."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,11 +1,11 @@
 """What the registry has of a machine for its axis test: its last logs, and its active model."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from identification.model.estimates import Estimate
-from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
 from workbench.documents.reading import Stored
 from workbench.jobs.drift_by_chart import Reading, drift_by_chart
@@ -25,7 +25,7 @@ from workbench.steps.axis_test import Earlier
 
 LAST_LOGS_READ = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see
-TAKEN_OUT_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
+BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
@@ -59,29 +59,23 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
         )
     model = read_model(Stored("model.json", registry.document(state.in_force, "model")))
     estimates = None
-    further = [key.replace("_", " ") for key in model.effects if not _taken_out(key)]
+    kinds = {key: re.sub(r"_\d+$", "", key) for key in model.effects}  # also of a second one
+    further = [key.replace("_", " ") for key, kind in kinds.items() if kind not in BY_EQUATION]
     if further:
         remarks.append(
             f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
         found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
-        estimates = unidentified(model, found.reason) | by_quantity(found.parameters)
+        nine = {name: one for name, one in model.friction.items() if name in MEANING_OF}
+        unidentified = {n: Estimate(None, e.unit, reason=found.reason) for n, e in nine.items()}
+        estimates = unidentified | by_quantity(found.parameters)
     width = model.effects.get("backlash", {}).get("width")
     if width is not None and width.value is not None and "backlash" not in (estimates or {}):
         active_width = Estimate(width.value, width.unit, width.sd, width.low, width.high)
         estimates = {**(estimates or {}), "backlash": active_width}
         remarks.append(f"backlash is that of the active version {state.in_force.number}")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
-
-
-def unidentified(model: Model, why: str) -> dict[str, Estimate]:
-    """The nine as a log has them that the fit of the active model does not identify."""
-    return {
-        name: Estimate(None, one.unit, reason=why)
-        for name, one in model.friction.items()
-        if name in MEANING_OF
-    }
 
 
 def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
@@ -91,9 +85,3 @@ def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
         name: Estimate(value, unit, None, low, high)
         for name, (unit, value, low, high) in found.items()
     }
-
-
-def _taken_out(key: str) -> bool:
-    """Whether the equation of motion holds an effect, the first or a further one of its kind."""
-    name, _, number = key.rpartition("_")
-    return key in TAKEN_OUT_BY_EQUATION or (name in TAKEN_OUT_BY_EQUATION and number.isdigit())

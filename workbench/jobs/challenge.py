@@ -93,23 +93,27 @@ def challenge(
     if not any(log.duration >= LEAST_HELD_OUT for log in held_out):
         raise BadModel(f"no held-out log of at least {LEAST_HELD_OUT:g} s; give a longer one")
     # One drive for both: the command where each model may be driven by it on each log.
-    ways = {default_drive(one.model, log) for one in (champion, challenger) for log in held_out}
+    both = {"champion": champion, "challenger": challenger}
+    ways = {default_drive(one.model, log) for one in both.values() for log in held_out}
     drive: Drive = "command" if ways == {"command"} else "force"
-    errors = {
-        "champion": held_out_errors(champion.model, held_out, drive),
-        "challenger": held_out_errors(challenger.model, held_out, drive),
+    errors = {name: held_out_errors(one.model, held_out, drive) for name, one in both.items()}
+    designs = [one.design for one in both.values() if one.design is not None]
+    seed = int(rng.integers(2**32))  # both designs see the same noise
+    loop = {
+        name: tracking(challenger.model, one.design, designs, np.random.default_rng(seed))
+        if one.design is not None
+        else None
+        for name, one in both.items()
     }
-    loop = _loops(champion, challenger, rng)
-    old, new = loop["champion"], loop["challenger"]
-    rotary = challenger.model.rotary
-    lost = _lost_held_out(errors["champion"], errors["challenger"], terms, rotary)
+    rotary, old = challenger.model.rotary, loop["champion"]
+    pairs = _compared(errors["champion"], errors["challenger"], rotary)
+    lost = _lost_held_out(pairs, terms)
     if lost:
         return Contest(False, False, lost, errors, loop)
-    held = _held_out_words(errors["champion"], errors["challenger"], rotary)
-    lost = _lost_loop(old, new, terms, rotary)
+    won, said = _tracked(old, loop["challenger"], terms, rotary)
     champion_passes = old is not None and old.rms is not None and not old.missed
-    said = f"{held}; {lost}" if lost else _won(held, loop, rotary)
-    return Contest(not lost, bool(lost) and champion_passes, said, errors, loop)
+    said = f"{_held_out_words(pairs)}; simulation: {said}"
+    return Contest(won, not won and champion_passes, said, errors, loop)
 
 
 def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
@@ -123,55 +127,11 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
     return HeldOut(pooled(positions), pooled(forces))
 
 
-def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms, rotary: bool) -> str:
-    """Why the challenger does not win on held-out logs; empty where it does."""
-    better = False
-    for name, before, after, said in _compared(old, new, rotary):
-        if not after <= before * (1.0 + terms.worse):
-            return f"held out, {name}: {said}, worse than the active one"
-        better = better or after <= before * (1.0 - terms.held_out)
-    if better:
-        return ""
-    return (
-        f"{_held_out_words(old, new, rotary)}; one of them has to fall by"
-        f" {100 * terms.held_out:g} % at least"
-    )
+# Of what both have an error of: its name, that of the active model, the new one, in words.
+Pairs = list[tuple[str, float, float, str]]
 
 
-def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms, rotary: bool) -> str:
-    """Why the challenger does not win in simulation; empty where it does."""
-    if new is None:
-        return "simulation: no design"
-    if new.missed or new.rms is None:
-        return f"simulation: {'; '.join(new.missed)}"
-    if old is None or old.missed or old.rms is None:
-        return ""
-    if new.rms <= old.rms * (1.0 - terms.loop):
-        return ""
-    return (
-        f"simulation: {_tracking_words(new.rms, rotary)} against {length(old.rms, rotary)} of the"
-        f" active design on the same machine, at least {100 * terms.loop:g} % less needed"
-    )
-
-
-def _won(held_out: str, loop: dict[str, Tracking | None], rotary: bool) -> str:
-    new, old = loop["challenger"], loop["champion"]
-    if new is None or new.rms is None:
-        return held_out
-    text = f"{held_out}; simulation: {_tracking_words(new.rms, rotary)}"
-    if old is None:
-        return f"{text}, no design before"
-    if old.missed or old.rms is None:
-        return f"{text}, the active design misses: {'; '.join(old.missed)}"
-    return f"{text} against {length(old.rms, rotary)} of the active design"
-
-
-def _tracking_words(rms: float, rotary: bool) -> str:
-    return f"tracking error {length(rms, rotary)} rms"
-
-
-def _compared(old: HeldOut, new: HeldOut, rotary: bool) -> list[tuple[str, float, float, str]]:
-    """What both have an error of: its name, that of the active model, the new one, in words."""
+def _compared(old: HeldOut, new: HeldOut, rotary: bool) -> Pairs:
     pairs = (
         ("free run", old.position_rms, new.position_rms, length),
         ("force", old.force_rms, new.force_rms, force),
@@ -183,24 +143,40 @@ def _compared(old: HeldOut, new: HeldOut, rotary: bool) -> list[tuple[str, float
     ]
 
 
-def _held_out_words(old: HeldOut, new: HeldOut, rotary: bool) -> str:
+def _lost_held_out(pairs: Pairs, terms: Terms) -> str:
+    """Why the challenger does not win on held-out logs; empty where it does."""
+    for name, before, after, said in pairs:
+        if not after <= before * (1.0 + terms.worse):
+            return f"held out, {name}: {said}, worse than the active one"
+    if any(after <= before * (1.0 - terms.held_out) for _, before, after, _ in pairs):
+        return ""
+    least = f"one of them has to fall by {100 * terms.held_out:g} % at least"
+    return f"{_held_out_words(pairs)}; {least}"
+
+
+def _held_out_words(pairs: Pairs) -> str:
     """The errors of the new model against those of the active one."""
-    found = ", ".join(f"{name} {said}" for name, _, _, said in _compared(old, new, rotary))
+    found = ", ".join(f"{name} {said}" for name, _, _, said in pairs)
     return f"held out: {found or 'nothing to compare'}"
 
 
-def _loops(
-    champion: Contender, challenger: Contender, rng: np.random.Generator
-) -> dict[str, Tracking | None]:
-    """Both designs on the challenger's plant, along one reference, with the same noise."""
-    designs = [one.design for one in (champion, challenger) if one.design is not None]
-    seed = int(rng.integers(2**32))
-    out: dict[str, Tracking | None] = {"champion": None, "challenger": None}
-    for name, made in (("champion", champion.design), ("challenger", challenger.design)):
-        if made is not None:
-            noise = np.random.default_rng(seed)
-            out[name] = tracking(challenger.model, made, designs, noise)
-    return out
+def _tracked(
+    old: Tracking | None, new: Tracking | None, terms: Terms, rotary: bool
+) -> tuple[bool, str]:
+    """Whether the challenger wins in simulation, and what came out there."""
+    if new is None:
+        return False, "no design"
+    if new.missed or new.rms is None:
+        return False, "; ".join(new.missed)
+    text = f"tracking error {length(new.rms, rotary)} rms"
+    if old is None:
+        return True, f"{text}, no design before"
+    if old.missed or old.rms is None:
+        return True, f"{text}, the active design misses: {'; '.join(old.missed)}"
+    text = f"{text} against {length(old.rms, rotary)} of the active design"
+    if new.rms <= old.rms * (1.0 - terms.loop):
+        return True, text
+    return False, f"{text} on the same machine, at least {100 * terms.loop:g} % less needed"
 
 
 def tracking(

@@ -16,6 +16,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 Clock = Callable[[], datetime]
 SHARE = 3.0  # renewals in one lease
+LONGEST_PAUSE = 5.0  # s between two tries
 
 
 @dataclass(frozen=True)
@@ -23,14 +24,13 @@ class Patience:
     """Tries again for `seconds` what fails because the database is away; then raises it."""
 
     seconds: float = 60.0
-    longest_wait: float = 5.0
 
     def __call__(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """What the call gives; raises RegistryAway once patience has ended."""
         again = Retrying(
             retry=retry_if_exception_type(RegistryAway),
             stop=stop_after_delay(self.seconds),
-            wait=wait_random_exponential(multiplier=0.1, max=self.longest_wait),
+            wait=wait_random_exponential(multiplier=0.1, max=LONGEST_PAUSE),
             reraise=True,
         )
         return again(call, *args, **kwargs)

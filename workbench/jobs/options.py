@@ -11,7 +11,7 @@ from typing import Literal
 import click
 
 from workbench import options
-from workbench.signature import argument, option
+from workbench.signature import argument, asked
 
 
 def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -28,39 +28,36 @@ class JobOptions:
 
     root: Path = argument()
     where: str | None = options.REGISTRY_OPTION
-    first: bool = option("Give a machine without a model its first from its first log.")
-    settle: float = option(
-        "Take a file that has not changed for this long.",
-        type=options.SECONDS,
-        default=10.0,
-        metavar="S",
+    first: bool = asked(False, "Give a machine without a model its first from its first log.")
+    settle: float = asked(
+        10.0, "Take a file that has not changed for this long.", type=options.SECONDS, metavar="S"
     )
-    marker: str | None = option(
+    marker: str | None = asked(
+        None,
         "Take a file once one named <file>SUFFIX lies beside it, as .done; for writers that pause"
         " for longer than --settle.",
         metavar="SUFFIX", callback=_suffix,
     )  # fmt: skip
-    order: Literal["time-or-name", "time"] = option(
+    order: Literal["time-or-name", "time"] = asked(
+        "time-or-name",
         "What makes a log older than another, so that its model does not become active: the"
         " file's time, or also the numbers in its name.",
-        default="time-or-name",
     )
-    lease: float = option(
-        "Take a silent worker's machine over after this long.",
-        type=options.SECONDS_ABOVE_0, default=120.0, metavar="S",
+    lease: float = asked(
+        120.0, "Take a silent worker's machine over after this long.",
+        type=options.SECONDS_ABOVE_0, metavar="S",
     )  # fmt: skip
-    patience: float = option(
-        "Wait this long for a database that is away.",
-        type=options.SECONDS,
-        default=60.0,
-        metavar="S",
+    patience: float = asked(
+        60.0, "Wait this long for a database that is away.", type=options.SECONDS, metavar="S"
     )
-    margin: float = option(
-        "Relative fall of a held-out error that wins.",
-        type=options.Finite(0, 1, max_open=True), default=0.1,
+    margin: float = asked(
+        0.1, "Relative fall of a held-out error that wins.",
+        type=options.Finite(0, 1, max_open=True),
     )  # fmt: skip
-    webhook: str | None = option("Send alarms there, as JSON by POST.", metavar="URL")
-    metrics: Path | None = option("Write Prometheus metrics there after each pass.", metavar="FILE")
+    webhook: str | None = asked(None, "Send alarms there, as JSON by POST.", metavar="URL")
+    metrics: Path | None = asked(
+        None, "Write Prometheus metrics there after each pass.", metavar="FILE"
+    )
     seed: int = options.SEED_OPTION
     effects: tuple[Path, ...] = options.EFFECTS_OPTION
 

@@ -15,13 +15,14 @@ from typing import Any
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import SHARE, Clock, Patience, renewed
-from workbench.jobs.options import is_gone
+from workbench.jobs.options import JobOptions, is_gone
 from workbench.jobs.scan import BadRoot, MachineFolder, Scan, machine_folders, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Claim, Judgement, LogOutcome, Order, SeenLog, Version
+from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
 
+MOST_ATTEMPTS = 20  # times that a log is begun without a result, after which it is excluded
 OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
@@ -46,26 +47,6 @@ class Task:
 # What a worker makes of a log; nothing is written. Raises BadLog where the file cannot be tested:
 # it is excluded. BadCard and BadModel say that the machine is to be looked after: its logs wait.
 Judge = Callable[[Task], Judgement]
-
-
-@dataclass(frozen=True)
-class PassSettings:
-    """How a pass works.
-
-    lease: time after which a silent worker counts as dead; settle: how long a file must not have
-    changed; attempts: after how many starts without a result a log is excluded; first: whether a
-    machine without a model gets its first from its log. owner: name of the worker. order: how
-    an older log is known from a newer one; marker: ending of the files beside finished logs.
-    """
-
-    owner: str
-    lease: timedelta = timedelta(minutes=2)
-    settle: timedelta = timedelta(seconds=10)
-    attempts: int = 20
-    first: bool = False
-    order: Order = "time-or-name"
-    marker: str | None = None
-    patience: Patience = field(default_factory=Patience)
 
 
 @dataclass
@@ -93,27 +74,37 @@ Report = Callable[..., None]  # event, then what belongs to it by name
 
 @dataclass(frozen=True)
 class Pass:
-    """One worker's way through the machines of a folder.
+    """One worker's way through the machines of a folder; owner: its name.
 
     clock: the one that all workers share, for claims and records; files: the one by which the ages
-    of files are known, by default the same.
+    of files are known, by default the same. attempts: at most, of a log without a result.
     """
 
     registry: Registry
     judge: Judge
-    settings: PassSettings
+    options: JobOptions
+    owner: str
     clock: Clock
     report: Report
     stop: Callable[[], bool] = lambda: False
     files: Clock | None = None
+    attempts: int = MOST_ATTEMPTS
 
     @property
     def queue(self) -> Queue:
         return Queue(self.registry.database)
 
-    def run(self, root: Path) -> PassReport:
+    @property
+    def patience(self) -> Patience:
+        return Patience(self.options.patience)
+
+    @property
+    def lease(self) -> timedelta:
+        return timedelta(seconds=self.options.lease)
+
+    def run(self) -> PassReport:
         """What the pass did; raises BadRoot, and RegistryAway once its patience has ended."""
-        folders = machine_folders(root)
+        folders = machine_folders(self.options.root)
         done = PassReport(len(folders))
         for folder in folders:
             if self.stop():
@@ -134,14 +125,12 @@ class Pass:
         return done
 
     def _machine(self, folder: MachineFolder, done: PassReport) -> None:
-        name, settings, retry = folder.name, self.settings, self.settings.patience
+        name, given, retry = folder.name, self.options, self.patience
         if folder.card.parent.name != name:
             raise BadRoot("the folder's name is not UTF-8; rename the folder")
         known = retry(self.queue.known, name)
-        found = scan(
-            folder, known, settle=settings.settle, now=(self.files or self.clock)(),
-            marker=settings.marker,
-        )  # fmt: skip
+        settle, now = timedelta(seconds=given.settle), (self.files or self.clock)()
+        found = scan(folder, known, settle=settle, now=now, marker=given.marker)
         done.growing += found.growing
         done.no_logs += tuple(f"{name}/{file}" for file in found.no_logs)
         for file in found.later:
@@ -153,12 +142,12 @@ class Pass:
             self.report("logs_found", machine=name, count=new)
         if not any(self._ready(log, found) for log, _ in retry(self.queue.waiting, name)):
             return
-        if retry(self.registry.active_version, name) is None and not settings.first:
+        if retry(self.registry.active_version, name) is None and not given.first:
             self.report("no_model_in_force", machine=name)
             done.without_model += (name,)
             return
         claim = retry(
-            self.queue.claim, name, owner=settings.owner, lease=settings.lease, now=self.clock(),
+            self.queue.claim, name, owner=self.owner, lease=self.lease, now=self.clock(),
             gone=is_gone,
         )  # fmt: skip
         if claim is None:
@@ -167,11 +156,15 @@ class Pass:
             return
 
         def renew() -> None:
-            self.queue.renew(claim, lease=settings.lease, now=self.clock())
+            self.queue.renew(claim, lease=self.lease, now=self.clock())
 
         try:
-            with renewed(renew, settings.lease.total_seconds() / SHARE):
-                self._logs(folder, found, claim, done)
+            with renewed(renew, given.lease / SHARE):
+                for log, begun in retry(self.queue.waiting, name):  # again, now that it is ours
+                    if self.stop():
+                        break
+                    if self._ready(log, found):
+                        done.outcomes += self._log(folder, found, claim, log, begun)
         except LostClaim as error:
             self.report("claim_lost", machine=name, reason=str(error))
             done.busy += (name,)
@@ -188,23 +181,15 @@ class Pass:
         """Whether a waiting log can be tested now: it is there, or something else in its place."""
         return log.sha256 in found.complete or _replaced(log, found)
 
-    def _logs(self, folder: MachineFolder, found: Scan, claim: Claim, done: PassReport) -> None:
-        """Test the machine's logs; what is waiting is asked again, now that it is ours."""
-        for log, begun in self.settings.patience(self.queue.waiting, folder.name):
-            if self.stop():
-                break
-            if self._ready(log, found):
-                done.outcomes += self._log(folder, found, claim, log, begun)
-
     def _log(
         self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
     ) -> tuple[LogOutcome, ...]:
         """The log's result; none where its file has changed in the meantime."""
-        retry, settings = self.settings.patience, self.settings
+        retry = self.patience
         if _replaced(log, found):
             said = "changed before it was tested; its present content counts"
             judgement = Judgement("set_aside", f"{log.file}: {said}")
-        elif begun >= settings.attempts:
+        elif begun >= self.attempts:
             said = f"begun {begun} times, and no worker has come to its end"
             judgement = Judgement("set_aside", f"{log.file}: {said}")
         else:
@@ -216,7 +201,7 @@ class Pass:
                 return ()
         outcome = retry(
             self.queue.finish, claim, log, judgement,
-            by=settings.owner, now=self.clock(), order=settings.order,
+            by=self.owner, now=self.clock(), order=self.options.order,
         )  # fmt: skip
         self.report(
             "log_judged", machine=folder.name, file=log.file, sha256=log.sha256,
@@ -246,11 +231,11 @@ class Pass:
             return Judgement("set_aside", f"{file}: fault of ours: {type(error).__name__}: {error}")
 
     def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
-        retry, registry, queue = self.settings.patience, self.registry, self.queue
+        retry, registry, queue = self.patience, self.registry, self.queue
         version = retry(registry.active_version, folder.name)
         documents = {} if version is None else retry(registry.documents, version)
         # What was found of the machine as it is now says nothing of a log from before.
-        newer = retry(queue.newer_behind, folder.name, log, self.settings.order)
+        newer = retry(queue.newer_behind, folder.name, log, self.options.order)
         after = None if version is None or newer else retry(queue.last_evidence, version)
         model, design = documents.get("model"), documents.get("design")
         return Task(folder.name, folder.card, path, log, version, model, design, after)

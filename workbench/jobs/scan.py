@@ -6,7 +6,7 @@ where the writer leaves a marker beside each finished file ("run1.csv.done"), wh
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -82,7 +82,9 @@ def scan(
     complete: dict[str, tuple[Path, SeenLog]] = {}
     growing, later, no_logs = 0, [], []
     names = {name for name, _, _ in known}
-    for path in _files(folder.logs):
+    for path in sorted(folder.logs.iterdir()) if folder.logs.is_dir() else []:
+        if not (_plain(path.name) and path.suffix.lower() in SUFFIXES and path.is_file()):
+            continue
         try:
             before = path.stat()
         except FileNotFoundError:
@@ -143,14 +145,6 @@ def open_for_writing(path: Path) -> bool:
         # cannot be opened, which is refused when it is read.
         return False
     return False
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    if not folder.is_dir():
-        return
-    for path in sorted(folder.iterdir()):
-        if _plain(path.name) and path.suffix.lower() in SUFFIXES and path.is_file():
-            yield path
 
 
 def _plain(name: str) -> bool:

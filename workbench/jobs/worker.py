@@ -4,7 +4,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
 
 from workbench.cards.own_effects import library
 from workbench.jobs.alarms import Delivery, Webhook, send_alarms
@@ -14,7 +13,7 @@ from workbench.jobs.judge import Chain
 from workbench.jobs.lease import Patience, shared_clock
 from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.options import JobOptions, clock, worker_name
-from workbench.jobs.passes import Pass, PassReport, PassSettings, Report
+from workbench.jobs.passes import Pass, PassReport, Report
 from workbench.jobs.scan import machine_folders
 from workbench.registry.database import location
 from workbench.registry.outbox import Outbox
@@ -37,20 +36,11 @@ class Worker:
         """One pass, and what became of the alarms, None without a webhook; raises BadRoot,
         RegistryAway, and OSError where metrics cannot be written."""
         given, database = self.options, self.registry.database
-        settings = PassSettings(
-            owner=self.owner,
-            lease=timedelta(seconds=given.lease),
-            settle=timedelta(seconds=given.settle),
-            first=given.first,
-            order=given.order,
-            marker=given.marker,
-            patience=Patience(given.patience),
-        )
         terms = Terms(held_out=given.margin)
         judge = Chain(terms=terms, seed=given.seed, library=library(given.effects))
-        shared = settings.patience(shared_clock, database, clock)
-        work = Pass(self.registry, judge, settings, shared, self.report, self.stop, clock)
-        done = work.run(given.root)
+        shared = Patience(given.patience)(shared_clock, database, clock)
+        work = Pass(self.registry, judge, given, self.owner, shared, self.report, self.stop, clock)
+        done = work.run()
         alarms = None
         if self.webhook is not None:
             alarms = send_alarms(Outbox(database), self.webhook, clock=shared,

@@ -25,7 +25,7 @@ from workbench.page.card_form import (
 from workbench.page.dropped import ENDINGS, file_name
 from workbench.page.visitors import changing, reading
 from workbench.page.work import shown_tasks
-from workbench.registry.bench import Upload
+from workbench.registry.tables import UploadRow
 
 LONGEST_SHOWN = 200  # characters of a file's name as it was given
 
@@ -51,8 +51,8 @@ def drop(asked: Asked) -> Response:
         shutil.rmtree(files.folder, ignore_errors=True)
         raise
     shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in given.filename)
-    by = asked.visitor.name
-    asked.bench.add(Upload(files.upload, shown[:LONGEST_SHOWN], size, digest, by, clock()))
+    asked.bench.add(UploadRow(id=files.upload, file=shown[:LONGEST_SHOWN], size=size, sha256=digest,
+                              made_by=asked.visitor.name, at=clock()))  # fmt: skip
     return asked.go(f"/drop/{files.upload}")
 
 
@@ -172,7 +172,7 @@ def _store_card(asked: Asked, form: CardForm) -> str:
     return ""
 
 
-def _upload(asked: Asked) -> Upload:
+def _upload(asked: Asked) -> UploadRow:
     return asked.bench.upload(asked["upload"])
 
 

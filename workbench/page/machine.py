@@ -135,7 +135,7 @@ def rollback(asked: Asked) -> Response:
 
 def changes(asked: Asked) -> Response:
     """The last changes that somebody made through the page, or of its tokens."""
-    found = Access(asked.database).audited(last=LAST_CHANGES)
+    found = Access(asked.database).audited(LAST_CHANGES)
     return asked.show("changes", title="Changes", changes=found)
 
 

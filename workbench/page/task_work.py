@@ -82,7 +82,7 @@ def done(work: Work, course: Course) -> str:
         view.write(folder)
         charts = [one.html for begin in PICTURES[work.kind] for one in view.drawn
                   if one.title.startswith(begin)]  # fmt: skip
-        folder.write_text(CHARTS_FILE, "".join(charts[:MOST_PICTURES]))
+        folder.write(CHARTS_FILE, "".join(charts[:MOST_PICTURES]))
         rows = [row[: len(MODEL_HEAD)] for row in parameter_rows(model)]
         of_model = {"head": MODEL_HEAD, "parameters": rows, "design": line, "card": model.card}
         folder.write_json(RESULT_FILE, {"summary": view.sentence, **result, **of_model})

@@ -19,7 +19,7 @@ from workbench.page.asked import Asked
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE, refuse_machine, store_files
 from workbench.page.pages import part
 from workbench.page.visitors import changing, reading
-from workbench.registry.bench import WorkItem
+from workbench.registry.tables import TaskRow
 from workbench.registry.values import Candidate, TaskKind
 
 GIVEN_OUT = ("model.json", "trace.json", "design.json", "validation.json")
@@ -31,7 +31,7 @@ _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 class Shown:
     """A task as the page shows it; result: what came of it, where it is done."""
 
-    task: WorkItem
+    task: TaskRow
     result: dict[str, Any] | None = None
     files: Sequence[str] = ()
 
@@ -122,7 +122,7 @@ def shown_tasks(asked: Asked, upload: str) -> list[Shown]:
     return [_shown(asked, one) for one in reversed(asked.bench.tasks(upload))]
 
 
-def _shown(asked: Asked, one: WorkItem) -> Shown:
+def _shown(asked: Asked, one: TaskRow) -> Shown:
     folder = asked.drop_of(one.upload).results(one.id)
     place = folder / RESULT_FILE
     if one.state != "done" or not place.exists():

@@ -21,9 +21,10 @@ from workbench.jobs.passes import Report
 from workbench.page.dropped import LOG_FOLDER, Drop, without_path
 from workbench.page.settings import PageSettings
 from workbench.page.task_work import Work, course_of, done
-from workbench.registry.bench import Bench, EndState, WorkClaim
+from workbench.registry.bench import Bench, EndState
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.store import Registry
+from workbench.registry.tables import TaskRow
 
 TASK_LEASE = timedelta(seconds=30)
 QUEUE_POLL = 0.5  # s between two looks at the queue, and at whether the task is still ours
@@ -75,29 +76,28 @@ def run_worker(settings: PageSettings, report: Report, *, once: bool = False) ->
                 time.sleep(QUEUE_POLL)
 
 
-def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report) -> None:
+def _one(bench: Bench, task: TaskRow, settings: PageSettings, report: Report) -> None:
     """Do one task; its end is written, unless it is no longer ours."""
-    task = claim.task
     report("task_begun", task=task.id, kind=task.kind, upload=task.upload)
     try:
-        state, said = _made(bench, claim, settings, report)
-        Patience()(bench.finish, claim, state, said, now=clock())
+        state, said = _made(bench, task, settings, report)
+        Patience()(bench.finish, task, state, said, now=clock())
         report("task_over", task=task.id, state=state, said=said)
     except (NotOurs, LostClaim):
         report("task_lost", task=task.id)
     except BaseException:  # asked to end: another begins it anew
-        bench.give_back(claim)
+        bench.give_back(task)
         raise
 
 
 def _made(
-    bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report
+    bench: Bench, task: TaskRow, settings: PageSettings, report: Report
 ) -> tuple[EndState, str]:
     """What came of the task: its last state, and a line."""
-    task, files = claim.task, Drop(settings.machines, claim.task.upload)
+    files = Drop(settings.machines, task.upload)
     try:
         work = Work(task.kind, files.log, files.card, files.results(task.id))
-        with _beating(bench, claim) as state:
+        with _beating(bench, task) as state:
             return "done", done(work, course_of(task.kind, state.advance, state.describe))
     except UserError as error:
         return "failed", without_path(str(error), [files.folder / LOG_FOLDER / "log", files.card])
@@ -109,12 +109,12 @@ def _made(
 
 
 @contextmanager
-def _beating(bench: Bench, claim: WorkClaim) -> Iterator[_Progress]:
+def _beating(bench: Bench, task: TaskRow) -> Iterator[_Progress]:
     """Within the block the task's progress is written, and NotOurs raised once it is not ours."""
     state = _Progress()
 
     def beat() -> None:
-        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=clock())
+        bench.progress(task, state.stage, state.share, lease=TASK_LEASE, now=clock())
 
     def stop(over: threading.Event) -> None:
         os.kill(os.getpid(), signal.SIGUSR1)

@@ -76,11 +76,9 @@ class Access:
         own = (AccessTokenRow.sha256 == hashed(secret), AccessTokenEndRow.at.is_(None))
         return next(iter(self._found(_TOKENS.where(*own))), None)
 
-    def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[AuditRow]:
-        """The last changes, of one subject or all; the newest first."""
+    def audited(self, last: int) -> Sequence[AuditRow]:
+        """The last changes, the newest first."""
         query = select(AuditRow).order_by(AuditRow.id.desc()).limit(last)
-        if subject is not None:
-            query = query.where(AuditRow.subject == subject)
         return [row for (row,) in self.database.rows(query)]
 
     def _found(self, query: Select[*tuple[Any, ...]]) -> tuple[AccessToken, ...]:

@@ -97,7 +97,8 @@ class Database:
     @contextmanager
     def writing(self) -> Iterator[Session]:
         """A session whose changes are all kept when the block ends, or none."""
-        with _guarded(self.where), sessionmaker(self._engine).begin() as session:
+        made = sessionmaker(self._engine, expire_on_commit=False)
+        with _guarded(self.where), made.begin() as session:
             yield session
 
     def close(self) -> None:

@@ -63,14 +63,11 @@ def as_read(lines: Sequence[Line], names: tuple[str, str]) -> tuple[tuple[Line, 
         lacking = [name for name, side in zip(names, ("before", "after"), strict=True)
                    if all(getattr(line, side) is None for line in own)]  # fmt: skip
         said += [f"{name} has no {part}" for name in lacking]
-        out += [] if lacking else map(_shown, own)
+        for line in [] if lacking else own:
+            unit, factor = shown_unit(line.unit)
+            before, after = (_times(one, factor) for one in (line.before, line.after))
+            out.append(replace(line, unit=unit, before=before, after=after))
     return tuple(out), "; ".join(said)
-
-
-def _shown(line: Line) -> Line:
-    unit, factor = shown_unit(line.unit)
-    before, after = (_times(one, factor) for one in (line.before, line.after))
-    return replace(line, unit=unit, before=before, after=after)
 
 
 def _times(found: Number | str | None, factor: float) -> Number | str | None:

@@ -102,7 +102,10 @@ def _run(connection: Connection, where: str, found: str | None) -> None:
         command.upgrade(settings, "head")
         return
     Base.metadata.create_all(connection)
-    keep_pointer(connection)
+    postgres = connection.dialect.name == "postgresql"
+    # The pointer first: the other triggers call one of these functions on PostgreSQL.
+    for statement in POSTGRES_FUNCTIONS if postgres else SQLITE_POINTER:
+        connection.execute(text(statement))
     keep_append_only(connection, (*APPEND_ONLY, *PAGE_APPEND_ONLY))
     command.stamp(settings, "head")
 
@@ -134,16 +137,6 @@ SQLITE_POINTER = (
     "CREATE TRIGGER in_force_replace BEFORE INSERT ON in_force"
     f" WHEN EXISTS (SELECT 1 FROM in_force AS o WHERE o.machine = NEW.machine) {POINTER_MOVES}",
 )
-
-
-def keep_pointer(connection: Connection) -> None:
-    """From now on the pointer to the active version moves by a new decision only.
-
-    Before `keep_append_only`, whose triggers call one of these functions on PostgreSQL.
-    """
-    postgres = connection.dialect.name == "postgresql"
-    for statement in POSTGRES_FUNCTIONS if postgres else SQLITE_POINTER:
-        connection.execute(text(statement))
 
 
 def keep_append_only(connection: Connection, names: Iterable[str]) -> None:

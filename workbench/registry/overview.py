@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from sqlalchemy import ColumnElement, SQLColumnExpression, and_, case, func, select
 from sqlalchemy.orm import Session
 
-from workbench.registry.database import Database, changed, insert_missing
+from workbench.registry.database import Database, changed
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
@@ -96,19 +96,6 @@ def _parameters(evidence: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
         for one in drift.get("moved", ())
         if one.get("before")
     ]
-
-
-def begin_summary(session: Session, machine: str) -> None:
-    """A machine of which nothing is known yet; one that is there stays as it is."""
-    now, trend = (insert_missing(session, table) for table in (MachineNowRow, MachineTrendRow))
-    session.execute(now.values(machine=machine, state="no_log", logs=0))
-    session.execute(trend.values(machine=machine, trend={}))
-
-
-def summary_heard(session: Session, machine: str, logs: int, now: datetime) -> None:
-    """So many new logs of the machine have come."""
-    own = MachineNowRow.machine == machine
-    changed(session, MachineNowRow, own, heard_at=now, logs=MachineNowRow.logs + logs)
 
 
 def summary_tested(

@@ -15,13 +15,14 @@ from sqlalchemy import ColumnElement, and_, delete, func, select
 from sqlalchemy.orm import Session
 
 from workbench.registry import rows
-from workbench.registry.database import Database
+from workbench.registry.database import Database, changed
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.overview import summary_heard, summary_tested
+from workbench.registry.overview import summary_tested
 from workbench.registry.tables import (
     AttemptRow,
     ClaimRow,
     LogRow,
+    MachineNowRow,
     OutcomeRow,
     ReopeningRow,
     VersionRow,
@@ -74,7 +75,8 @@ class Queue:
             every = new.values()
             session.add_all(LogRow(machine=machine, seen_at=now, **vars(log)) for log in every)
             if new:
-                summary_heard(session, machine, len(new), now)
+                own, logs_now = MachineNowRow.machine == machine, MachineNowRow.logs + len(new)
+                changed(session, MachineNowRow, own, heard_at=now, logs=logs_now)
             return len(new)
 
     def claim(

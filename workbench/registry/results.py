@@ -92,16 +92,14 @@ def _judged(
     log: LogRow, done: OutcomeRow | None, number: int | None, sent: datetime | None,
     queued: OutboxRow | None, sound: bool,
 ) -> TestedLog:  # fmt: skip
-    recorded = log.mtime_ns / 1e9
+    own = (log.file, log.sha256, log.mtime_ns / 1e9)
     if done is None:
-        return TestedLog(log.file, log.sha256, recorded, None, "", None, None, (), "", False)
-    drift = done.evidence.get("drift") or {}
+        return TestedLog(*own, None, "", None, None, (), "", False)
     delivered: Delivered = "sent" if sent else ""
     if queued is not None:
         delivered = "waiting" if queued.given_up_at is None else "given up"
-    parameters = tuple(drift.get("parameters") or ())
-    return TestedLog(log.file, log.sha256, recorded, done.verdict, done.reason, number, done.at,
-                     parameters, delivered, sound)  # fmt: skip
+    parameters = tuple((done.evidence.get("drift") or {}).get("parameters") or ())
+    return TestedLog(*own, done.verdict, done.reason, number, done.at, parameters, delivered, sound)
 
 
 LAST_ON_PAGE = 30

@@ -12,12 +12,14 @@ from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.database import insert_missing
 from workbench.registry.errors import BadRegistry
-from workbench.registry.overview import begin_summary, summary_moved
+from workbench.registry.overview import summary_moved
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
     LogRow,
+    MachineNowRow,
     MachineRow,
+    MachineTrendRow,
     OutcomeRow,
     RecordRow,
     ReopeningRow,
@@ -43,7 +45,9 @@ def lock_machine(session: Session, name: str, now: datetime) -> None:
         return
     session.execute(insert_missing(session, MachineRow).values(name=name, added_at=now))
     session.scalar(query)
-    begin_summary(session, name)
+    known, trend = (insert_missing(session, table) for table in (MachineNowRow, MachineTrendRow))
+    session.execute(known.values(machine=name, state="no_log", logs=0))
+    session.execute(trend.values(machine=name, trend={}))
 
 
 def need_machine(session: Session, name: str, *, lock: bool = False) -> None:
@@ -152,14 +156,11 @@ def judged_now() -> ColumnElement[bool]:
 
 def numbered(session: Session, machine: str, number: int) -> VersionRow:
     """The machine's version of that number; raises BadRegistry with those there are."""
-    found = session.scalar(
-        select(VersionRow).where(VersionRow.machine == machine, VersionRow.number == number)
-    )
+    own = VersionRow.machine == machine
+    found = session.scalar(select(VersionRow).where(own, VersionRow.number == number))
     if found is None:
         need_machine(session, machine)
-        last = session.scalar(
-            select(func.max(VersionRow.number)).where(VersionRow.machine == machine)
-        )
+        last = session.scalar(select(func.max(VersionRow.number)).where(own))
         have = f"it has 1 to {last}" if last else "it has none; 'workbench registry add' one"
         raise BadRegistry(f"{machine}: no version {number}; {have}")
     return found

@@ -2,8 +2,9 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from datetime import datetime
-from typing import Any, Self, get_args
+from typing import Any, get_args
 
 from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
@@ -25,7 +26,7 @@ from workbench.registry.values import MOVES, Candidate, Decision, Kind, MachineS
 _NAME = re.compile(r"[^/\\\x00-\x1f\x7f]+")
 
 
-class Registry:
+class Registry(AbstractContextManager["Registry"]):
     """Models, designs and validations of machines, append-only, one active version a machine.
 
     where: a file of SQLite or a PostgreSQL URL. Everything that changes is one transaction. All
@@ -34,9 +35,6 @@ class Registry:
 
     def __init__(self, where: str, *, create: bool = True) -> None:
         self.database = Database(where, create=create)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

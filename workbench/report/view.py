@@ -165,9 +165,9 @@ class View:
     def write(self, folder: OutputFolder, page_name: str = REPORT_FILE) -> None:
         for name, content in self.files.items():
             made = content()
-            folder.write_text(name, made if isinstance(made, str) else dumps(made) + "\n")
+            folder.write(name, made if isinstance(made, str) else dumps(made) + "\n")
         if self.has_page:
-            folder.write_text(page_name, self.page())
+            folder.write(page_name, self.page())
 
     def show(self, folder: Path, then: Step | None = None, **more: object) -> None:
         """Print the result that lies in the folder: as JSON, with `more` in it, or on one screen.

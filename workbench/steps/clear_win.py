@@ -18,7 +18,7 @@ from identification.model.plant import Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
 from workbench.steps.cascade import feed_forward, reference_limits, unseen_lag
-from workbench.steps.closed_loop import DrivenLoop, noise_of, run_plant
+from workbench.steps.closed_loop import DrivenLoop, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.loop_figures import risen_sine, speed_seen
 
@@ -152,8 +152,7 @@ def _compared(
 
 def _run(model: Model, plant: Plant, loop: DrivenLoop, r: Array, seed: int) -> ServoRun | None:
     """The run of a loop on one machine; None where it runs away."""
-    noise = noise_of(model, len(r), np.random.default_rng(seed))
     try:
-        return run_plant(model, plant, loop, r, noise)
+        return run_plant(model, plant, loop, r, np.random.default_rng(seed))
     except UserError:
         return None

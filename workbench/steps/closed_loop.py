@@ -120,13 +120,16 @@ def run_driven(
     nothing for it to drive, or the other way round.
     """
     plant = replace(machine.simulated, effects=in_the_loop(machine))
-    return run_plant(machine, plant, loop, r, noise_of(machine, len(r), rng))
+    return run_plant(machine, plant, loop, r, rng)
 
 
 def run_plant(
-    machine: Model, plant: Plant, loop: DrivenLoop, r: Array, noise: LoopNoise | None
+    machine: Model, plant: Plant, loop: DrivenLoop, r: Array, rng: np.random.Generator | None
 ) -> ServoRun:
     """`run_driven` of a plant in place of the machine's own, on the same rig."""
+    noise = None
+    if rng is not None:
+        noise = LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng)
     direct = isinstance(plant.actuator, Actuator) and loop.direct
     if isinstance(plant.actuator, Actuator):
         if loop.force is None and not direct:
@@ -165,13 +168,6 @@ def limit_on(machine: Model, loop: DrivenLoop) -> float | None:
     """
     own = None if machine.simulated.actuator is None else machine.rig.control_limit
     return min((one for one in (loop.limit, own) if one is not None), default=None)
-
-
-def noise_of(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise | None:
-    """The noise of a machine's sensors, (n,) each; None without a generator."""
-    if rng is None:
-        return None
-    return LoopNoise.draw(n, machine.fit.noise_y, machine.fit.noise_F, rng)
 
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:

@@ -5,7 +5,7 @@ whether a parameter can be identified is asked of the same thresholds, with the 
 measured motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import longest_run, runs_of, table_of, with_force
 from workbench.steps.first_card.remarks import are_exchanged
 from workbench.steps.hardly_identifiable import hardly_identifiable
-from workbench.steps.identifiable_by_log import RunsIdentifiability, Ways, identifiability_of_runs
+from workbench.steps.identifiable_by_log import RunsIdentifiability, identifiability_of_runs
 
 DOCTOR_SCHEMA = "doctor/1"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
@@ -77,7 +77,7 @@ class Delay:
     alike: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CheckedLog:
     """A log as far as it is known without identifiability: the first and quick part of a check.
 
@@ -100,28 +100,24 @@ class CheckedLog:
         return max(self.runs, key=len) if self.runs else None
 
 
-@dataclass(frozen=True, eq=False)
-class Examined(CheckedLog):
-    """What a log shows before any fit.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Examined(CheckedLog, RunsIdentifiability):
+    """What a log shows before any fit, and what it identifies.
 
-    identifiability: what each parameter of the model can be known by, by name; add: runs that
-    would identify the rest; effects: by how many deviations of the noise each would show at a size
-    that matters, None where that was not asked; refused: why `identify` would not take the log,
-    empty where it would.
-    exchanged: whether position and reference look like each other's columns; other_units: whether
-    a unit of the card is that of no machine, or not its header's.
-    log and motion: the first run, for the picture; None where the log is refused before.
+    refused: why `identify` would not take the log, empty where it would. exchanged: whether
+    position and reference look like each other's columns; other_units: whether a unit of the card
+    is that of no machine, or not its header's. motion: None where the log is refused before.
     """
 
     sensors: tuple[SensorState, ...]
     delays: tuple[Delay, ...]
     exchanged: bool
     other_units: bool
-    ways: Ways | None
-    identifiability: tuple[Identifiable, ...]
-    add: tuple[str, ...]
-    motion: Motion | None = field(repr=False)
-    effects: Mapping[str, float] | None
+
+    @property
+    def add(self) -> tuple[str, ...]:
+        """Runs that would identify the rest."""
+        return tuple(dict.fromkeys(one.add for one in self.identifiability if one.add))
 
     @property
     def main(self) -> tuple[Identifiable, ...]:
@@ -199,22 +195,18 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     delays = _delays(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else _exchanged(delays, sensors, log.h)
     remarks = [*([exchanged] if exchanged else []), *units, *remarks]
-    of_log = {
+    known = {
+        **vars(seen),
         **vars(found),
         "refused": found.refused or seen.reason,
         "remarks": tuple(dict.fromkeys([*remarks, *seen.remarks])),
     }
     return Examined(
-        **of_log,
+        **known,
         sensors=sensors,
         delays=delays,
         exchanged=bool(exchanged),
         other_units=bool(units),
-        ways=seen.ways,
-        identifiability=seen.identifiability,
-        add=tuple(dict.fromkeys(one.add for one in seen.identifiability if one.add)),
-        motion=seen.motion,
-        effects=seen.effects,
     )
 
 

@@ -208,14 +208,12 @@ def drift_of(
         state = state if again and state is not None else found.state
         tests.append(Tested(source, found, again))
     assert state is not None
-    seen = (*(stream.seen if stream else ()), *(_seen(one) for one in tests if not one.again))
+    new = ((one.source, one.test) for one in tests if not one.again)
+    seen = (*(stream.seen if stream else ()),
+            *(Seen(source.file, source.sha256, test.verdict, _ratio(test.single), _ratio(test.mean))
+              for source, test in new))  # fmt: skip
     after = Stream(state, seen)
     return Drifted(model, key, settings, tuple(tests), after, tuple(remarks), sources.bad)
-
-
-def _seen(one: Tested) -> Seen:
-    source, test = one.source, one.test
-    return Seen(source.file, source.sha256, test.verdict, _ratio(test.single), _ratio(test.mean))
 
 
 def _ratio(found: Statistic | None) -> float | None:

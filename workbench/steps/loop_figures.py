@@ -11,7 +11,7 @@ from design.margins import margins
 from design.rst import closed_loop_poles
 from design.tune import worst_modulus
 from identification.arrays import Array
-from identification.errors import BadSpecification
+from identification.errors import BadModel, BadSpecification
 from identification.model.plant import Motor
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length
@@ -24,7 +24,14 @@ from workbench.documents.design import (
 )
 from workbench.documents.model import Model
 from workbench.steps.asked import Limits as Limits
-from workbench.steps.closed_loop import DrivenLoop, driven_loop, limit_on, present_loop, run_driven
+from workbench.steps.closed_loop import (
+    DrivenLoop,
+    driven_loop,
+    limit_on,
+    present_loop,
+    run_driven,
+    scheduled_loop,
+)
 from workbench.steps.linear_loop import plants_of
 from workbench.steps.loop_motion import JUDGED_SHARE, LoopMotion, loop_motion
 
@@ -87,17 +94,24 @@ def tried_loop(
     return _figures(machine, loop, runs, limits, arx), runs
 
 
-def present_figures(
-    machine: Model, model: Model, found: Design, limits: Limits, rng: np.random.Generator | None
-) -> tuple[LoopFigures, Traces] | None:
-    """The controller that the model's machine has now, on a machine, along the design's motion.
-
-    None where the card named none. Raises BadModel where it cannot be simulated.
-    """
-    now = model.controller
-    if now is None:
-        return None
-    return tried_loop(machine, model, found, present_loop(model, now), limits, rng)
+def tried_loops(
+    machine: Model, model: Model, found: Design, limits: Limits, rng: np.random.Generator | None,
+    refused: list[str] | None = None,
+) -> dict[str, tuple[LoopFigures, Traces]]:  # fmt: skip
+    """What every loop of a design comes to on a machine, and that of the controller that the
+    model's machine has now; refused: takes why the latter cannot be simulated."""
+    out = {}
+    if model.controller is not None:
+        try:
+            loop = present_loop(model, model.controller)
+            out[PRESENT] = tried_loop(machine, model, found, loop, limits, rng)
+        except BadModel as error:
+            if refused is not None:
+                refused.append(str(error))
+    arx = found.plant.source == "arx"
+    for name, loop in loops_of(model, found).items():
+        out[name] = tried_loop(machine, model, found, loop, limits, rng, arx=arx)
+    return out
 
 
 def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, Array]:
@@ -182,14 +196,16 @@ def tested_of(found: Design) -> Structure:
 
 
 def loops_of(model: Model, found: Design) -> dict[str, DrivenLoop]:
-    """The loops of a design's controllers by name, alone and then with the compensator beside."""
+    """The loops of a design's controllers by name, alone, then with the compensator beside, then
+    with their schedule."""
     alone = {n: driven_loop(model, found, one) for n, one in found.controllers.items()}
     both = {
         name + COMPENSATED: driven_loop(model, found, one, found.compensator.value)
         for name, one in found.controllers.items()
         if takes_compensator(found, name)
     }
-    return alone | both
+    each = found.schedule.controllers if found.schedule else ()
+    return alone | both | {name + SCHEDULED: scheduled_loop(model, found, name) for name in each}
 
 
 def takes_compensator(found: Design, name: str) -> bool:

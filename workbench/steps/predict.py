@@ -1,7 +1,7 @@
 """Model + log -> prediction: force by the inverse model, force and position by simulation; and the
 force that a model lacks."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -351,11 +351,17 @@ def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
 
 def refuse_missing(log: Log, effects: Iterable[Acting]) -> None:
     """Raises BadLog where an effect would act by signals of which the log has none."""
+    for key, missing in lacking_signals(effects, log.signals):
+        raise BadLog(
+            f"{log.name}: effect {key!r} of the model acts by {missing}, which the log has not;"
+            " name its column in the card"
+        )
+
+
+def lacking_signals(effects: Iterable[Acting], there: Container[str]) -> Iterator[tuple[str, str]]:
+    """Keys of the effects that cannot act by the signals that there are, and what they lack."""
     for one in effects:
         wanted = one.effect.signals
-        missing = [key for key in wanted if key not in log]
+        missing = [key for key in wanted if key not in there]
         if missing and (set(missing) & set(one.effect.needs) or len(missing) == len(wanted)):
-            raise BadLog(
-                f"{log.name}: effect {one.key!r} of the model acts by {', '.join(missing)}, which"
-                " the log has not; name its column in the card"
-            )
+            yield one.key, ", ".join(missing)

@@ -21,13 +21,11 @@ from identification.frequency.swinging_load import swinging_load
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.size import Size
-from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
 from workbench.documents.plausible import refuse_other_machine
 from workbench.documents.reading import as_number
-from workbench.logs.sources import Source, Sources, fingerprints
-from workbench.steps.identify_sources import identify_sources
+from workbench.logs.sources import Source, fingerprints
 from workbench.steps.linear_force import (
     freed,
     of_load,
@@ -131,18 +129,6 @@ def respond(
         left_in=left_in,
         remarks=(*read, *_remarks(logs, card, found, taken, found.f[shut])),
     )
-
-
-def identified_or_not(
-    sources: Sources, seed: int, on_progress: Progress = quiet,
-    keep_going: KeepGoing = without_end,
-) -> tuple[Model | None, str | None]:  # fmt: skip
-    """The model that the logs themselves give, or None and why they give none."""
-    try:
-        found = identify_sources(sources, seed=seed, on_progress=on_progress, keep_going=keep_going)
-    except NotIdentifiable as error:
-        return None, f"not identifiable from the logs ({error})"
-    return found.model, None
 
 
 def _measured(

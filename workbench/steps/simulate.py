@@ -31,6 +31,7 @@ from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop
+from workbench.steps.predict import lacking_signals
 from workbench.steps.present import present, rst_of
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
@@ -53,7 +54,11 @@ def record(
     """
     rng = np.random.default_rng(recipe.seed if seed is None else seed)
     chambers = _chambers(name, recipe, rig)
-    _refuse_unsimulated(name, recipe, chambers)
+    for key, missing in lacking_signals(recipe.plant.effects, chambers):
+        raise BadCard(
+            f"{name}: effect {key!r} acts by {missing}, which this recipe does not simulate;"
+            ' pressures need a rig of kind = "electro-pneumatic", other signals a log of a machine'
+        )
     try:
         if recipe.by_card:
             run = _by_card(recipe, controller, rig, rng, chambers)
@@ -155,19 +160,6 @@ def _chambers(name: str, recipe: Recipe, rig: Rig | None) -> Chambers:
     return pressures(rig.area_p, rig.area_n, mean, supply)
 
 
-def _refuse_unsimulated(name: str, recipe: Recipe, chambers: Chambers) -> None:
-    """Raises BadCard where an effect would act by signals of which none is simulated."""
-    for one in recipe.plant.effects:
-        wanted = one.effect.signals
-        missing = [key for key in wanted if key not in chambers]
-        if missing and (set(missing) & set(one.effect.needs) or len(missing) == len(wanted)):
-            raise BadCard(
-                f"{name}: effect {one.key!r} acts by {', '.join(missing)}, which this recipe does"
-                ' not simulate; pressures need a rig of kind = "electro-pneumatic", other signals'
-                " a log of a machine"
-            )
-
-
 def _logged_pressures(
     name: str, recipe: Recipe, chambers: Chambers, F: Array, rng: np.random.Generator
 ) -> dict[str, Array]:
@@ -219,12 +211,14 @@ def truth(
     """
     motion, command = (rig.motion, rig.command_unit) if rig else ("linear", "V")
     friction, actuator = friction_units(motion), actuator_units(motion, command)
-    drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else None
+    drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else {}
     known = {
         "schema": "truth/1",
         "card": name,
-        "friction": {n: _exact(getattr(recipe.plant.friction, n), friction[n]) for n in NAMES},
-        "actuator": {n: _exact(v, actuator[n]) for n, v in drive.items()} if drive else None,
+        "friction": {
+            n: as_number(Estimate(getattr(recipe.plant.friction, n), friction[n])) for n in NAMES
+        },
+        "actuator": {n: as_number(Estimate(v, actuator[n])) for n, v in drive.items()} or None,
         "effects": {
             one.key: {n: as_number(e) for n, e in exact(one, motion, command).items()}
             for one in recipe.plant.effects
@@ -241,10 +235,6 @@ def truth(
     if controller and rig and recipe.by_card:
         known["controller"] = written(controller, around_of(rig))
     return known
-
-
-def _exact(value: float, unit: str) -> dict[str, Any]:
-    return as_number(Estimate(value, unit))
 
 
 def _position(recipe: Recipe) -> RST:

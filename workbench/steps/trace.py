@@ -99,9 +99,12 @@ def trace_sources(
             " judged, since it nowhere slides long enough; test on a log of motion like that of the"
             " training logs"
         )
+    split = train.card.split.get("test", ())
+    kept = dict.fromkeys(source.file for source in train.runs if source.file in split)
     remarks = (
         *surrounding_lines(found.surroundings, train.rig),
-        *train.remarks, *(test.remarks if test else ()), *_held_out(train),
+        *train.remarks, *(test.remarks if test else ()),
+        *(f"{name}: trained on, though the card's [split] keeps it for tests" for name in kept),
     )  # fmt: skip
     model = traced_model(found, train, library)
     bad = (*train.bad, *(test.bad if test else ()))
@@ -109,13 +112,6 @@ def trace_sources(
     model = replace(model, bad_samples=train.bad, controller=now)
     remarks = (*remarks, *unequal_friction(model.friction, model.effects), *model_remarks(model))
     return Traced(found, model, train.runs, seen, remarks, bad)
-
-
-def _held_out(train: Sources) -> list[str]:
-    """A line for each training log that the card's split holds out."""
-    held_out = train.card.split.get("test", ())
-    names = dict.fromkeys(source.file for source in train.runs if source.file in held_out)
-    return [f"{name}: trained on, though the card's [split] keeps it for tests" for name in names]
 
 
 def traced_model(found: Trace, sources: Sources, library: Library) -> Model:

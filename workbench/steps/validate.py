@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from identification.errors import BadModel
 from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
-from workbench.steps.closed_loop import effects_left_out, scheduled_loop
+from workbench.steps.closed_loop import effects_left_out
 from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (
     ALMOST,
@@ -24,10 +23,8 @@ from workbench.steps.loop_figures import (
     Limits,
     LoopFigures,
     Traces,
-    loops_of,
-    present_figures,
     tested_of,
-    tried_loop,
+    tried_loops,
 )
 from workbench.steps.recommend import called, cycle_words, reasons
 
@@ -75,21 +72,10 @@ def validate(
     traces: dict[tuple[str, str], Traces] = {}
     unseen: list[str] = []
     for place, machine in plants.items():
-        try:
-            now = present_figures(machine, model, found, limits, rng)
-        except BadModel as error:
-            unseen.append(f"the present controller is not shown on the {place}: {error}")
-            continue
-        if now is not None:
-            figures.setdefault(PRESENT, {})[place], traces[PRESENT, place] = now
-    arx, loops = found.plant.source == "arx", loops_of(model, found)
-    for each in found.schedule.controllers if found.schedule else ():
-        loops[each + SCHEDULED] = scheduled_loop(model, found, each)
-    for name, loop in loops.items():
-        figures[name] = {}
-        for place, machine in plants.items():
-            tried = tried_loop(machine, model, found, loop, limits, rng, arx=arx)
-            figures[name][place], traces[name, place] = tried
+        refused = list[str]()
+        for name, tried in tried_loops(machine, model, found, limits, rng, refused).items():
+            figures.setdefault(name, {})[place], traces[name, place] = tried
+        unseen += [f"the present controller is not shown on the {place}: {why}" for why in refused]
     figures = calm_or_missed(figures, shown(model.rotary))
     alone = tested_of(found)
     with_it = found.recommendation is not None and found.recommendation.compensator

@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import pyarrow.parquet as pq
 import pytest
@@ -27,8 +28,6 @@ from workbench.fleet.run import (
     LEASE,
     FleetRun,
     InRegistry,
-    NoRegistry,
-    Recorder,
     Report,
 )
 from workbench.fleet.store import RESULTS_FOLDER, ResultStore
@@ -60,12 +59,11 @@ def run(
     folder: Path,
     work: Work = answer,
     logs: list[LogFile] = LOGS,
-    recorder: Recorder | None = None,
+    recorder: InRegistry | None = None,
     card: str = "card",
 ) -> Report:
     with ResultStore(folder) as store:
-        keep = recorder or NoRegistry()
-        return FleetRun(cluster, store, keep, "/nowhere", clock, card, work=work)(logs)
+        return FleetRun(cluster, store, recorder, "/nowhere", clock, card, work=work)(logs)
 
 
 def verdicts(folder: Path) -> dict[str, str]:
@@ -134,7 +132,7 @@ def test_a_worker_killed_from_outside(cluster: Cluster, tmp_path: Path) -> None:
 
     with ResultStore(tmp_path) as store:
         found = FleetRun(
-            cluster, store, NoRegistry(), "/nowhere", clock, "card", work=slow, advance=advance
+            cluster, store, None, "/nowhere", clock, "card", work=slow, advance=advance
         )
         done = found([*LOGS, *(log_of(f"n{number}") for number in range(6))])
     assert killed
@@ -181,22 +179,23 @@ def test_a_machine_in_anothers_hands_is_left(
     assert len(verdicts(tmp_path)) == 3
 
 
-class Away(NoRegistry):
-    """A recorder whose database goes away after some results."""
+class Away(InRegistry):
+    """A recorder whose database goes away after two results."""
 
-    def __init__(self, results: int) -> None:
-        self.left = results
+    recorded: ClassVar[list[Result]] = []
 
     def record(self, result: Result) -> bool:
-        self.left -= 1
-        if self.left < 0:
+        if len(self.recorded) == 2:
             raise RegistryAway("away")
+        self.recorded.append(result)
         return True
 
 
-def test_a_database_that_goes_away_loses_nothing(cluster: Cluster, tmp_path: Path) -> None:
+def test_a_database_that_goes_away_loses_nothing(
+    cluster: Cluster, registry: Registry, tmp_path: Path
+) -> None:
     with pytest.raises(RegistryAway):
-        run(cluster, tmp_path, recorder=Away(2))
+        run(cluster, tmp_path, recorder=Away(registry, "tester", clock))
     assert len(verdicts(tmp_path)) == 2
     again = run(cluster, tmp_path)
     # The third result was noted as the database went away, so it is not made again.
@@ -213,7 +212,7 @@ def test_a_result_against_a_version_that_is_gone_is_left(registry: Registry) -> 
 
 def test_logs_without_any_card_are_refused(cluster: Cluster, tmp_path: Path) -> None:
     with ResultStore(tmp_path / "out") as store:
-        found = FleetRun(cluster, store, NoRegistry(), str(tmp_path), clock, work=answer)
+        found = FleetRun(cluster, store, None, str(tmp_path), clock, work=answer)
         with pytest.raises(BadLogs, match=r"no card.toml .* --card"):
             found(LOGS)
 

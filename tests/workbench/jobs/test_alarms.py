@@ -14,7 +14,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from tests.workbench.jobs.listener import Listener
 from tests.workbench.jobs.machines import in_force, machine
-from tests.workbench.jobs.worker import clock, ignore, judge, settings
+from tests.workbench.jobs.worker import ignore, judge, short_pass
 from workbench.jobs.alarms import (
     GIVEN_UP_AFTER,
     IN_A_ROW,
@@ -26,7 +26,7 @@ from workbench.jobs.alarms import (
     send_alarms,
 )
 from workbench.jobs.metrics import MachineFigures, write_metrics
-from workbench.jobs.passes import Pass, Report
+from workbench.jobs.passes import Report
 from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox
 from workbench.registry.store import Registry
 from workbench.registry.values import ALARMING, Alarm
@@ -39,7 +39,7 @@ def judged(registry: Registry, tmp_path: Path) -> Registry:
     """A registry with a quiet log, a drifted one and a bad one."""
     in_force(registry, "a")
     machine(tmp_path / "m", "a", {"1.csv": "quiet", "2.csv": "drift", "3.csv": "bad"})
-    Pass(registry, judge, settings("w"), clock, ignore).run(tmp_path / "m")
+    short_pass(registry, judge, tmp_path / "m", "w").run()
     return registry
 
 
@@ -50,7 +50,7 @@ def fleet(registry: Registry, tmp_path: Path) -> Registry:
     in_force(registry, *names)
     for name in names:
         machine(tmp_path / "m", name, {"1.csv": f"bad {name}"})
-    Pass(registry, judge, settings("w"), clock, ignore).run(tmp_path / "m")
+    short_pass(registry, judge, tmp_path / "m", "w").run()
     return registry
 
 
@@ -237,7 +237,7 @@ def test_any_machine_goes_from_its_folder_to_the_webhook(
     for name in names:
         machine(tmp_path / "m", name, {f"{name[:40]}\udcff.csv": f"bad {name}"})
     for count in (3, 0):
-        done = Pass(registry, judge, settings("w"), clock, ignore).run(tmp_path / "m")
+        done = short_pass(registry, judge, tmp_path / "m", "w").run()
         assert (len(done.outcomes), done.failed) == (count, {})
     assert send(registry, webhook(listener)) == Delivery(3)
     assert {taken["machine"] for taken in listener.taken} == set(names)

@@ -115,7 +115,7 @@ def test_killed_at_random_points(where: str, tmp_path: Path) -> None:
         for worker in running:
             worker.kill()
             worker.join()
-    time.sleep(2 * LEASE.total_seconds())
+    time.sleep(2 * LEASE)
     while one_pass(where, str(root), "last").busy:
         time.sleep(0.1)
     with Registry(where) as registry:

@@ -13,11 +13,11 @@ import pytest
 
 from identification.errors import BadCard, BadLog, NotIdentifiable
 from tests.workbench.jobs.machines import in_force, machine
-from tests.workbench.jobs.worker import clock, ignore, judge, settings
+from tests.workbench.jobs.worker import clock, ignore, judge, short_pass
 from tests.workbench.registry.postgres import Server
-from workbench.jobs.lease import Patience, shared_clock
+from workbench.jobs.lease import shared_clock
 from workbench.jobs.options import is_gone
-from workbench.jobs.passes import Judge, Pass, PassReport, Task
+from workbench.jobs.passes import Judge, PassReport, Task
 from workbench.jobs.scan import BadRoot, open_for_writing
 from workbench.registry.errors import RegistryAway
 from workbench.registry.queue import OFTEN, Queue
@@ -36,8 +36,8 @@ def root(tmp_path: Path) -> Path:
 def run(registry: Registry, root: Path) -> Run:
     """Runs a pass with a judge and changed settings."""
 
-    def once(judge: Judge = judge, report: Any = ignore, **changes: object) -> PassReport:
-        return Pass(registry, judge, settings("w", **changes), clock, report).run(root)
+    def once(judge: Judge = judge, report: Any = ignore, **changes: Any) -> PassReport:
+        return short_pass(registry, judge, root, "w", report, **changes).run()
 
     return once
 
@@ -96,7 +96,7 @@ def test_a_file_still_being_written_is_left(run: Run, registry: Registry, root: 
     future = datetime.now(UTC).timestamp() + 3600
     os.utime(logs / "late.csv", (future, future))
     told: list[tuple[str, Any]] = []
-    done = run(settle=timedelta(seconds=30), report=lambda e, **d: told.append((e, d.get("file"))))
+    done = run(settle=30.0, report=lambda e, **d: told.append((e, d.get("file"))))
     assert verdicts(done) == {"old.csv": "none"}
     assert done.growing == 2
     assert ("log_from_the_future", "late.csv") in told
@@ -343,7 +343,7 @@ def test_many_workers_at_once_judge_every_log_once(registry: Registry, root: Pat
         with Registry(str(where)) as own:
             total = 0
             while not all(own.machine(n).logs == 6 and own.machine(n).waiting == 0 for n in names):
-                done = Pass(own, judge, settings(f"w{who}"), clock, ignore).run(root)
+                done = short_pass(own, judge, root, f"w{who}").run()
                 total += len(done.outcomes)
             return total
 
@@ -365,10 +365,10 @@ def test_a_database_away_in_the_middle(postgres: Server, tmp_path: Path) -> None
             postgres.stop()
             return judge(task)
 
-        quick = settings("w", patience=Patience(0.3, 0.1))
+        quick = short_pass(registry, outage, root, "w", patience=0.3)
         try:
             with pytest.raises(RegistryAway, match="nothing is lost"):
-                Pass(registry, outage, quick, clock, ignore).run(root)
+                quick.run()
         finally:
             postgres.start()
         assert registry.machine("a").waiting == 1
@@ -378,8 +378,8 @@ def test_a_database_away_in_the_middle(postgres: Server, tmp_path: Path) -> None
             postgres.start()
             return judge(task)
 
-        patient = settings("x", patience=Patience(20.0, 0.1))
-        while not (done := Pass(registry, short_outage, patient, clock, ignore).run(root)).outcomes:
+        patient = short_pass(registry, short_outage, root, "x", patience=20.0)
+        while not (done := patient.run()).outcomes:
             assert done.busy == ("a",)  # until the lease of the first has ended
         assert [o.verdict for o in done.outcomes] == ["promoted"]
         assert len(registry.versions("a")) == 2

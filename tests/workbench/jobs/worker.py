@@ -1,27 +1,27 @@
 """A worker with a fast judge, for tests that kill it: run as `worker.work` in its own process."""
 
 import time
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from identification.errors import BadLog
-from workbench.jobs.lease import Patience
-from workbench.jobs.passes import Pass, PassReport, PassSettings, Task
+from workbench.jobs.options import JobOptions
+from workbench.jobs.passes import Judge, Pass, PassReport, Report, Task
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Judgement
 
-LEASE = timedelta(seconds=0.4)
+LEASE = 0.4  # s
 
 
-def settings(owner: str, **changes: object) -> PassSettings:
-    """Settings for short tests; a log is never given up."""
-    given = {
-        "lease": LEASE,
-        "settle": timedelta(0),
-        "attempts": 10_000,
-        "patience": Patience(5.0, 0.1),
-    }
-    return PassSettings(owner, **{**given, **changes})  # type: ignore[arg-type]
+def short_pass(
+    registry: Registry, judge: Judge, root: Path, owner: str, report: Report | None = None,
+    attempts: int = 10_000, **changes: Any,
+) -> Pass:  # fmt: skip
+    """A pass with the times of short tests; a log is never given up."""
+    given = {"lease": LEASE, "settle": 0.0, "patience": 5.0, **changes}
+    wanted = JobOptions(root, None, seed=0, effects=(), **given)
+    return Pass(registry, judge, wanted, owner, clock, report or ignore, attempts=attempts)
 
 
 def clock() -> datetime:
@@ -53,7 +53,7 @@ def ignore(event: str, **details: object) -> None:
 def one_pass(where: str, root: str, owner: str) -> PassReport:
     """One pass in this process."""
     with Registry(where) as registry:
-        return Pass(registry, judge, settings(owner), clock, ignore).run(Path(root))
+        return short_pass(registry, judge, Path(root), owner).run()
 
 
 def work(where: str, root: str, owner: str) -> None:

@@ -18,8 +18,9 @@ from tests.workbench.page.served import serving
 from tests.workbench.registry.postgres import Server
 from workbench.registry import bench as bench_module
 from workbench.registry.access import Access
-from workbench.registry.bench import Bench, Upload
+from workbench.registry.bench import Bench
 from workbench.registry.store import Registry
+from workbench.registry.tables import UploadRow
 
 pytestmark = pytest.mark.slow
 
@@ -28,8 +29,11 @@ TASKS, WORKERS, KILLS = 12, 2, 5
 ROWS = "t,y\n" + "".join(f"{k * 1e-3:.3f},{k % 7}\n" for k in range(300))
 
 
-def upload(number: int) -> Upload:
-    return Upload(f"{number:016x}", "a.csv", 3, "f" * 64, "anna", datetime.now(UTC))
+def upload(number: int) -> UploadRow:
+    now = datetime.now(UTC)
+    return UploadRow(
+        id=f"{number:016x}", file="a.csv", size=3, sha256="f" * 64, made_by="anna", at=now
+    )
 
 
 def started(where: str, root: Path, **options: bool) -> Any:

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from tests.chain import CARD
-from tests.workbench.jobs.worker import ignore, settings
+from tests.workbench.jobs.worker import short_pass
 from tests.workbench.page.browser import CHROMIUM, DRIVER, NARROW, NO_BROWSER, Person
 from tests.workbench.page.served import serving
 from tests.workbench.page.test_fleet import evidence, told
-from workbench.jobs.passes import Pass, Task
+from workbench.jobs.passes import Task
 from workbench.registry.access import Access
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Judgement
@@ -146,8 +146,7 @@ def _drift_arrives(plant: Plant) -> None:
         for path in logs.iterdir():
             path.with_name(f"run{number}.csv").write_text(f"{number}", encoding="utf-8")
             break
-        work = Pass(plant.registry, judge, settings("w"), lambda: datetime.now(UTC), ignore)
-        assert work.run(plant.root).failed == {}
+        assert short_pass(plant.registry, judge, plant.root, "w").run().failed == {}
     person = plant.person
     person.go("/")
     person.reads("drift")

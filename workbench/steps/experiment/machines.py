@@ -28,7 +28,6 @@ from workbench.steps.closed_loop import (
     DrivenLoop,
     chambers,
     driven_loop,
-    noise_of,
     present_loop,
     run_plant,
 )
@@ -54,7 +53,7 @@ class Bench:
 
     def run(self, plant: Plant, r: Array, rng: np.random.Generator | None = None) -> LoopRun:
         """The loop on a plant along r [m], (n,) every loop.h; with the sensors' noise by rng."""
-        return run_plant(self.model, plant, self.loop, r, noise_of(self.model, len(r), rng))
+        return run_plant(self.model, plant, self.loop, r, rng)
 
     def log(
         self, run: LoopRun, name: str = "experiment", rng: np.random.Generator | None = None

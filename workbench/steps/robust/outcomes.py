@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.drawn_loops import DrawnPlants, loop_margins
-from design.loop import LoopRun
 from identification.arrays import Array
 from identification.errors import BadSpecification, UserError
 from identification.estimation.windowed_run.parameters import plant_with, values_of
@@ -21,7 +20,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Motor, Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import DrivenLoop, limit_on, noise_of, run_plant
+from workbench.steps.closed_loop import DrivenLoop, limit_on, run_plant
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.linear_loop import sampled
 from workbench.steps.loop_figures import Limits
@@ -226,12 +225,9 @@ def _on_one(
     rng: np.random.Generator,
 ) -> tuple[float, ...]:  # fmt: skip
     """The measures of `outcomes` on one plant, margins left out."""
-
-    def run(r: Array) -> LoopRun:
-        return run_plant(model, plant, loop, r, noise_of(model, len(r), rng))
-
+    along = (motion.steps, motion.smooth, motion.slow)
     try:
-        steps, smooth, slow = run(motion.steps), run(motion.smooth), run(motion.slow)
+        steps, smooth, slow = (run_plant(model, plant, loop, r, rng) for r in along)
     except UserError:  # cannot be followed: it runs away
         return (np.inf,) * 8
     found = loop_motion(steps, smooth, model.fit.noise_y, limit)

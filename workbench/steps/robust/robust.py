@@ -231,28 +231,22 @@ def robust_document(found: Robust) -> dict[str, Any]:
         "drift": dict(asked.drift or {}),
         "tried": found.tried,
         "slow_speed": found.speed,
-        "loops": {name: _promise_document(one) for name, one in found.promises.items()},
+        "loops": {
+            name: {
+                "controller": one.controller,
+                "compensator": one.compensator,
+                "every_limit": one.every,
+                "measures": {key: _measure(spread) for key, spread in one.measures.items()},
+            }
+            for name, one in found.promises.items()
+        },
         "missed": list(found.missed),
         "remarks": list(found.remarks),
         "versions": dict(versions()),
     }
 
 
-def _promise_document(one: Promise) -> dict[str, Any]:
-    return {
-        "controller": one.controller,
-        "compensator": one.compensator,
-        "every_limit": one.every,
-        "measures": {
-            name: {
-                "low": _finite(m.low), "median": _finite(m.median), "high": _finite(m.high),
-                "limit": m.limit, "kept": m.share,
-            }
-            for name, m in one.measures.items()
-        },
-    }  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    """A number as JSON has it: null where a loop runs away, or no delay makes it unstable."""
-    return value if np.isfinite(value) else None
+def _measure(one: Spread) -> dict[str, float | None]:
+    """Infinite, so null in JSON, where a loop runs away, or no delay makes it unstable."""
+    return {"low": one.low, "median": one.median, "high": one.high, "limit": one.limit,
+            "kept": one.share}  # fmt: skip

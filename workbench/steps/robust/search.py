@@ -75,12 +75,15 @@ def searched(
     seeds = rng.spawn(len(machines.plants))
 
     def ranked(tried: Sequence[Candidate], on: DrawnMachines, stage: str) -> list[Candidate]:
-        """The best first: by the shares of machines that keep each limit, then by the motion."""
+        """The best first: by what the shares of machines that keep each limit are short of the
+        probability, then by the motion."""
         ranks = []
         for i, one in enumerate(tried):
             report(stage, i / len(tried))
             found = outcomes(on, one.loop(model), motion, seeds)
-            ranks.append((_short(found, limits, probability), _cost(found, model)))
+            kept = [float(np.mean(one)) for one in found.within(limits).values()]
+            short = sum(max(probability - share, 0.0) for share in kept)
+            ranks.append((short, _cost(found, model)))
         order = sorted(range(len(tried)), key=lambda i: ranks[i])
         return [tried[i] for i in order]
 
@@ -149,12 +152,6 @@ def compensators(model: Model, controller: Controller) -> Iterator[CompensatorVa
     if excess > 0.0 and model.fit.noise_y > 0.0 and integrates(np.ones(1), controller.rst):
         for many in EXCESS_TRIED:
             yield excess_compensator(model, h, many)
-
-
-def _short(found: Outcomes, limits: dict[str, float], probability: float) -> float:
-    """By how much the shares of machines that keep each limit fall short of the probability."""
-    within = found.within(limits)
-    return float(sum(max(probability - float(np.mean(k)), 0.0) for k in within.values()))
 
 
 def _cost(found: Outcomes, model: Model) -> float:
