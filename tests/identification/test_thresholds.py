@@ -51,6 +51,7 @@ from identification.estimation.surroundings import (
     apart,
     explains,
     explains_most,
+    is_likelier,
     larger_than_friction,
     stands_out,
 )
