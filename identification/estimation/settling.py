@@ -65,7 +65,7 @@ WALLS = 1.2
 OF_A_STEP, OF_NOISE = 12.0**-0.5, 2.0
 
 NO_REST_WHY = (
-    "{}: no rest that ends is seen in it, and the force changes between its samples; log starts"
+    "{}: no rest that ends is seen in it, and the force may change between its samples; log starts"
     " from rest, at the rate of the drive's loop"
 )
 STOP_TURNS_ON_LESS = "a stop turns on less than the noise there"
