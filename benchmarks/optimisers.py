@@ -1,13 +1,11 @@
-"""Our two minimisers beside scipy's, on the costs that they minimise in a fit.
+"""Our local minimiser beside scipy's, on the costs that it minimises in a fit.
 
     python benchmarks/optimisers.py [--first 300] [--seeds 8]
 
-Local: the residual of runs in windows (`estimation/windowed_run/run_errors.judge`) from a plant
-that is 1 to 5 % off, by our Gauss-Newton with differences for slopes and by scipy's least_squares
-("trf" with the same differences, "lm"); all take the same function of the same unknowns. Global:
-the cost of many plants at once (`windowed_run/plant_search`) over the search's box, by our
-differential evolution and by scipy's, both vectorised with as many members and generations at most.
-Reached: cost a value, 1 where noise alone is left; time: of ours in the same run.
+The residual of runs in windows (`estimation/windowed_run/run_errors.judge`) from a plant that is 1
+to 5 % off, by our Gauss-Newton with differences for slopes and by scipy's least_squares ("trf" with
+the same differences, "lm"); all take the same function of the same unknowns. Reached: cost a value,
+1 where noise alone is left; time: of ours in the same run.
 """
 
 import argparse
@@ -16,30 +14,25 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.optimize import differential_evolution, least_squares
+from scipy.optimize import least_squares
 
 from benchmarks.blind_machines import machine, simulated
 from identification.arrays import Array
 from identification.estimation.gauss_newton import WIDE_STEP, gauss_newton
-from identification.estimation.global_search import evolve
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.regressed_plant import first_plant
 from identification.estimation.windowed_run.parameters import (
     names_of,
     plant_with,
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.plant_search import Box, PlantCost
 from identification.estimation.windowed_run.run_errors import judge, soft
-from identification.log import Log
 from identification.model.plant import Plant
 
-MACHINES, SEARCHED = ("table2", "motor", "force"), ("table2", "force")
+MACHINES = ("table2", "motor", "force")
 SECONDS, WINDOW = 30.0, 2.0
 OFF = (0.01, 0.05)  # relative, of every parameter
 STEPS = 12
-MEMBERS, GENERATIONS = 64, 150
 SCIPY: Any = least_squares  # its stubs know no single step for all
 Local = Callable[[Callable[[Array], Array], Array], Array]
 
@@ -88,34 +81,6 @@ def local(seed: int, name: str) -> dict[str, tuple[float, float]]:
     return out
 
 
-def wide(seed: int, name: str) -> dict[str, tuple[float, float]]:
-    """Cost a value reached and seconds of each search over the box."""
-    one = machine(name, seed)
-    log: Log = simulated(one, (), seed, "train", SECONDS).log
-    recorded = recorded_logs([log], one.rig)
-    plant, box = first_plant(recorded), Box.about(recorded.logs)
-    cost_of, count = PlantCost.of(plant, recorded.logs, recorded.drive), len(log)
-
-    def cost(z: Array) -> Array:
-        return cost_of(box.nine(z))
-
-    first = box.around(plant.friction.array, MEMBERS, np.random.default_rng(seed))
-    search: Any = differential_evolution
-    out = {}
-    begin = time.perf_counter()
-    found = evolve(cost, first, GENERATIONS, np.random.default_rng(seed))
-    out["ours"] = float(found.costs[0]) / count, time.perf_counter() - begin
-    for strategy in ("best1bin", "currenttobest1bin"):
-        begin = time.perf_counter()
-        theirs = search(
-            lambda z: cost(np.ascontiguousarray(z.T)), [(0.0, 1.0)] * len(box.low), init=first,
-            strategy=strategy, maxiter=GENERATIONS, vectorized=True, updating="deferred",
-            polish=False, rng=np.random.default_rng(seed), tol=1e-4,
-        )  # fmt: skip
-        out[f"scipy {strategy}"] = float(theirs.fun) / count, time.perf_counter() - begin
-    return out
-
-
 def report(what: str, rows: list[dict[str, tuple[float, float]]]) -> None:
     """Median and worst cost reached, and time over ours."""
     print(f"{what:16s}{'reached, median':>18s}{'worst':>12s}{'time':>8s}")
@@ -133,8 +98,6 @@ def main() -> None:
     seeds = range(asked.first, asked.first + asked.seeds)
     for name in MACHINES:
         report(f"local, {name}", [local(seed, name) for seed in seeds])
-    for name in SEARCHED:
-        report(f"global, {name}", [wide(seed, name) for seed in seeds])
 
 
 if __name__ == "__main__":

@@ -35,7 +35,11 @@ from identification.estimation.regression.force_terms import (
     ways_of,
 )
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import settled_rows, usual_fastest
+from identification.estimation.regression.motion_rows import (
+    settled_rows,
+    usual_fastest,
+    without_reversals,
+)
 from identification.estimation.regression.weighted_rows import (
     Rows,
     stacked,
@@ -147,7 +151,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    made = settled_rows(recorded.logs)
+    made = without_reversals(settled_rows(recorded.logs))
     rows = [one.rows for one in made]
     up, down = ways_of(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:

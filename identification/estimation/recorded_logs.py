@@ -71,9 +71,11 @@ class RecordedLogs:
         return self.by_motor or any(one.held for one in self.logs)
 
     @property
-    def by_noisy_command(self) -> bool:
-        """Whether a motor drives them whose command, and so its force, has noise of its own."""
-        return self.by_motor and any(one.walks(self.drive) for one in self.logs)
+    def may_change_between(self) -> bool:
+        """Whether a motor drives them whose force changes between their samples, or may do so for
+        all that they show."""
+        seen = self.share == 0.0 and could_show(Size(self.share, self.share_sd))
+        return self.by_motor and not seen
 
     @property
     def by_command(self) -> bool:

@@ -65,7 +65,7 @@ WALLS = 1.2
 OF_A_STEP, OF_NOISE = 12.0**-0.5, 2.0
 
 NO_REST_WHY = (
-    "{}: no rest that ends is seen in it, and the force changes between its samples; log starts"
+    "{}: no rest that ends is seen in it, and the force may change between its samples; log starts"
     " from rest, at the rate of the drive's loop"
 )
 STOP_TURNS_ON_LESS = "a stop turns on less than the noise there"
@@ -172,26 +172,35 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     covariance[unknown, unknown] = (
         _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
     )
-    covariance = covariance + np.diag(between_samples_sd(near.names, values, recorded) ** 2)
     if recorded.held and is_adequate(near.misfit):
         covariance = _with_stick_ranges(covariance, near, recorded)
+    covariance = covariance + np.diag(between_samples_sd(near.names, values, recorded) ** 2)
     if not np.all(np.isfinite(covariance)):
         covariance = np.diag(np.abs(values) ** 2)
     return np.asarray(covariance)
 
 
 def _with_stick_ranges(covariance: Array, near: Refit, recorded: RecordedLogs) -> Array:
-    """The covariance with the deviations of stick limits that a held force allows (d, d)."""
+    """The covariance with the deviations of stick limits that a held force allows (d, d): where a
+    band is identified the run within it tells of its limit beside the steps."""
     independent = len(set(counts(recorded.logs, recorded.drive).tolist()))
     ranges = stick_ranges(near.plant, recorded.logs, recorded.drive, RUN_WINDOW, independent)
-    rise = usual_limits(recorded.logs, near.plant)[1]
-    by_force = float(np.hypot(OF_A_STEP * rise, OF_NOISE * recorded.noise[1]))
+    step = OF_A_STEP * usual_limits(recorded.logs, near.plant)[1]
+    noisy = not recorded.by_motor or recorded.may_change_between
+    noise = OF_NOISE * recorded.noise[1] if noisy else 0.0
+    own, values = np.sqrt(np.diag(covariance)), values_of(near.plant, near.names)
+    known = {
+        name
+        for name, value, sd in zip(near.names, values.tolist(), own.tolist(), strict=True)
+        if reported_estimate(value, "", sd).value is not None
+    }
     factor = np.ones(len(near.names))
     for i, name in enumerate(near.names):
         if name in ranges:
             low, high = ranges[name]
-            sd = float(np.hypot(0.5 * (high - low) / NORMAL_95, by_force))
-            factor[i] = sd / np.sqrt(covariance[i, i])
+            by_range = 0.5 * (high - low) / NORMAL_95
+            by_step = 0.0 if name.replace("F_s", "dv_") in known else step
+            factor[i] = float(np.linalg.norm([by_range, by_step, noise])) / own[i]
     return covariance * np.outer(factor, factor)
 
 
@@ -249,16 +258,17 @@ def structure_estimates(
 def _of_both(
     found: Mapping[str, Estimate], plant: Plant, recorded: RecordedLogs, *, followed: bool = False
 ) -> dict[str, Estimate]:
-    """The stick limits of a motor, each midway between the run's and the force at its breakaways:
-    where the force changes between samples the one errs to below and the other to above, and the
-    interval holds both; those of a measured force that is held likewise, where most breakaways by
+    """The stick limits of a motor whose force changes between its samples, each midway between the
+    run's and the force at its breakaways: the one errs to below and the other to above, and the
+    interval holds both; those under a force that is held likewise, where most breakaways by
     themselves say another. followed: the logs are to the noise, so that where the run shows no
     limit the Coulomb level stands in for it. Ours."""
-    measured = recorded.held and not recorded.by_motor
-    if not (measured or recorded.by_noisy_command):
+    if not recorded.held:
         return {}
-    risen, out = risen_to(recorded.logs, plant), dict[str, Estimate]()
-    if measured:
+    changes, out = recorded.may_change_between, dict[str, Estimate]()
+    if changes:
+        risen = risen_to(recorded.logs, plant)
+    else:
         usual = usual_limits(recorded.logs, plant)[0]
         risen = {name: size for name, size in usual.items() if _differ(found[name], size)}
     for name, level, way in (("F_sp", "F_cp", 1.0), ("F_sn", "F_cn", -1.0)):
@@ -266,7 +276,7 @@ def _of_both(
         if one is None:
             continue
         if name not in risen:
-            if one.value is not None and not measured:
+            if one.value is not None and changes:
                 out[name] = one.withheld(NO_REST_WHY.format(recorded.name), one.value)
             continue
         run = one if one.low is not None or not followed else coulomb

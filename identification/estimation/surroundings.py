@@ -48,6 +48,7 @@ from identification.thresholds import (
     HALF,
     MATERIAL,
     OF_ACCOUNT,
+    PENALTY,
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
@@ -143,7 +144,7 @@ def _looked_far(
         found = lagged_rows(moved, lags, turns, held, known)
         if found is None:
             break
-        used = GRAVITY if turns and _has_gravity(found) else PLAIN
+        used = _beside_friction(found) if turns else PLAIN
         first = first or (found, used)
         if int(np.argmin(found.left(found.every, used)[0])) < len(lags) - 1:
             return found, used
@@ -232,15 +233,24 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     return solve_rows(rows).theta, spread_of_left_out(without_each_block(rows))
 
 
-def _has_gravity(found: LaggedRows) -> bool:
-    """Whether the force depends on the sine of the angle, significantly, for much of what is left
-    without, and a spring, on the angle itself, would not leave clearly less: in a narrow motion
-    both do."""
+def _beside_friction(found: LaggedRows) -> Sequence[int]:
+    """The columns with those of gravity, where the force depends on the sine of the angle,
+    significantly, for much of what is left without, or with that of a spring, on the angle itself,
+    where this is clearly the likelier: in a narrow motion both are as likely."""
     plain, spring, weight = (found.least(used) for used in (PLAIN, SPRING, GRAVITY))
-    if not explains(plain, weight) or explains(weight, spring):
-        return False
+    if explains(plain, spring) and is_likelier(spring, weight, found.rows / OVERLAP):
+        return SPRING
+    if not explains(plain, weight):
+        return PLAIN
     theta, sd = _with_spread(found, GRAVITY, 0.0)
-    return any(stands_out(float(theta[i]), float(sd[i])) for i in (-2, -1))
+    significant = any(stands_out(float(theta[i]), float(sd[i])) for i in (-2, -1))
+    return GRAVITY if significant else PLAIN
+
+
+def is_likelier(left: float, other: float, independent: float) -> bool:
+    """Whether what leaves this of a square of so many independent errors is clearly likelier than
+    what leaves another. Source: Schwarz, Ann. Stat. 6 (1978) 461."""
+    return other > left * float(np.exp(PENALTY / independent))
 
 
 def explains(without: float, left: float) -> bool:

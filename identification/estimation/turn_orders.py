@@ -42,7 +42,7 @@ from identification.signals.weak_form import WeakWindows, sliding_windows
 from identification.thresholds import BEYOND_CHANCE, CHANCE_LEVEL, HALF, MATERIAL
 
 HIGHEST = 100  # order that the windows are made short enough for
-PLAIN_COLUMNS = 7  # columns beside those of the orders
+PLAIN_COLUMNS = 8  # columns beside those of the orders
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
 OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or a stop
@@ -50,9 +50,9 @@ OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
-    """Rows of the equation of all logs, with gravity's columns beside inertia's and friction's;
-    windows and angles [rad] of each log, and which of their rows count; highest order that they
-    show."""
+    """Rows of the equation of all logs, with a spring's and gravity's columns beside inertia's and
+    friction's; windows and angles [rad] of each log, and which of their rows count; highest order
+    that they show."""
 
     rows: Rows
     angles: tuple[tuple[WeakWindows, Array], ...]
@@ -216,8 +216,8 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
         up = np.asarray(one.signals["d"][w.middle] > 0)
         own = replace(one, sliding=w, up=up, speed=np.abs(w.first @ y))
         plain = mechanical(own, NOTHING_KNOWN)
-        gravity = (w.mean @ np.sin(y), w.mean @ np.cos(y))
-        parts.append(replace(plain, X=np.column_stack([plain.X, *gravity])))
+        of_angle = (w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y))
+        parts.append(replace(plain, X=np.column_stack([plain.X, *of_angle])))
         angles.append((w, y))
     longest = max(w.length * one.log.h for one, w in made)
     highest = int(min(2.0 * HIGHEST, 2.0 * np.pi / (speed * longest)))

@@ -51,6 +51,7 @@ from identification.estimation.surroundings import (
     apart,
     explains,
     explains_most,
+    is_likelier,
     larger_than_friction,
     stands_out,
 )
@@ -255,6 +256,8 @@ def test_penalty() -> None:
     rival that gains hardly less explains as much."""
     assert merit(candidate("spring", 16.0)) < 0.0 < merit(candidate("spring", 25.0))
     assert rivals(200.0, 208.0) == 1 and rivals(200.0, 212.5) == 0
+    # A spring, in the place of gravity, has to be so much likelier.
+    assert is_likelier(1.0, 1.0125, 1000.0) and not is_likelier(1.0, 1.008, 1000.0)
     # A mode has three, and sixteen neighbouring points count as one.
     assert explains_more(100.0 + 600.0, 100.0, 1000)
     assert not explains_more(100.0 + 380.0, 100.0, 1000)

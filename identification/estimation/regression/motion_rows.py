@@ -9,7 +9,7 @@ columns hold how long the body went each way.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
+from identification.thresholds import ADEQUATE, HALF
 
 OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 HALF_WIDTHS = (5, 8, 16, 32, 64)  # samples, half of a window
@@ -96,6 +97,24 @@ def settled_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[Mo
             return made
         theta = solve_rows(rows).theta[: len(FIVE)]
     return rows_and_windows(logs, theta, gravity=gravity)
+
+
+def without_reversals(made: Sequence[MotionRows]) -> list[MotionRows]:
+    """The rows but for windows that hold reversals, where others are most and leave clearly less:
+    the body comes through rest there, held by more than the friction of sliding that the equation
+    has. Ours."""
+    one_way = [np.minimum(one.rows.X[:, 1], -one.rows.X[:, 2]) <= 0.0 for one in made]
+    every, kept = stacked([one.rows for one in made]), np.concatenate(one_way)
+    if np.count_nonzero(kept) <= max(HALF * len(kept), FEWEST_IN_MOTION) or np.all(kept):
+        return list(made)
+    theta = solve_rows(every.at(kept)).theta
+    square = ((every.b - every.X @ theta) / every.sd) ** 2
+    if np.mean(square[~kept]) <= ADEQUATE * np.mean(square[kept]):
+        return list(made)
+    return [
+        replace(one, rows=one.rows.at(keep), windows=one.windows.at(np.flatnonzero(keep)))
+        for one, keep in zip(made, one_way, strict=True)
+    ]
 
 
 def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = False) -> MotionRows:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.global_search import evolve
+from identification.estimation.global_search import evolved
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.likely_square import LikelyLog
@@ -111,5 +111,5 @@ def searched_plant(
         return cost_of(box.nine(z))
 
     first = box.around(plant.friction.array, POPULATION, rng)
-    found = evolve(cost, first, GENERATIONS, rng, lambda share: report("searching", share))
-    return replace(plant, friction=Karnopp.from_array(box.nine(found.members[:1])[0]))
+    best = evolved(cost, first, GENERATIONS, rng, lambda share: report("searching", share))
+    return replace(plant, friction=Karnopp.from_array(box.nine(best[np.newaxis])[0]))

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.global_search import evolve
+from identification.estimation.global_search import evolved
 from identification.estimation.regression.breakaway import LIMITS_PER_COULOMB, usual_limits
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
@@ -163,11 +163,10 @@ def _searched_side(
     first = rng.uniform(size=(SIDE_CROWD, 2))
     first[0] = np.clip((here - low) / (high - low), 0.0, 1.0)
     with ThreadPoolExecutor(2) as pool:
-        found = evolve(
+        best = evolved(
             lambda every: np.array(list(pool.map(lambda z: loss(errors_of(at(z))), every))),
             first, SIDE_GENERATIONS, rng,
         )  # fmt: skip
-    best: Array = found.members[0]
     return at(best)
 
 

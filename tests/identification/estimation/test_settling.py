@@ -16,7 +16,7 @@ from identification.model.size import Size
 from tests.identification.motor_logs import K_A, made
 
 PLANT = Plant(Karnopp(1.0, 8.0, 8.0, 1.0, 1.0, 1e-3, -1e-3, 10.0, -10.0))
-NOISY: Any = SimpleNamespace(by_noisy_command=True, held=True, by_motor=True, logs=(), name="log")
+NOISY: Any = SimpleNamespace(may_change_between=True, held=True, by_motor=True, logs=(), name="log")
 COULOMB = {"F_cp": Estimate(8.0, "N", 0.1, 7.8, 8.2), "F_cn": Estimate(8.0, "N", 0.1, 7.8, 8.2)}
 
 
@@ -64,7 +64,7 @@ def test_a_limit_of_a_held_measured_force_holds_what_most_breakaways_say(
 ) -> None:
     """Only where that is another one: the run knows more."""
     measured: Any = SimpleNamespace(
-        by_noisy_command=False, held=True, by_motor=False, logs=(), name="log"
+        may_change_between=False, held=True, by_motor=False, logs=(), name="log"
     )
     run = {"F_sp": Estimate(10.0, "N", 0.1, 9.8, 10.2)}
     monkeypatch.setattr(settling, "risen_to", lambda logs, plant: {})
@@ -111,8 +111,18 @@ def test_a_held_force_says_of_a_limit_no_more_than_its_steps_and_noise_allow(
     monkeypatch.setattr(settling, "usual_limits", lambda *_: ({}, 0.12**0.5))
     monkeypatch.setattr(settling, "counts", lambda *_: np.arange(5))
     near: Any = SimpleNamespace(names=("m", "F_sp", "F_sn"), plant=PLANT)
-    recorded: Any = SimpleNamespace(logs=(), drive="force", noise=(1.0, noise))
+    recorded: Any = SimpleNamespace(
+        logs=(), drive="force", noise=(1.0, noise), by_motor=False, may_change_between=False
+    )
     covariance = np.array([[1.0, 0.5, 0.0], [0.5, 4.0, 0.0], [0.0, 0.0, 9.0]])
     found = settling._with_stick_ranges(covariance, near, recorded)
     assert np.sqrt(np.diag(found)) == pytest.approx([1.0, sd, sd])
     assert found[0, 1] / np.sqrt(found[1, 1]) == pytest.approx(0.25)
+    # Within an identified band a run shows its limit between two steps too; a motor's exact command
+    # has no noise.
+    near.names = ("dv_p", "F_sp", "F_sn")
+    monkeypatch.setattr(settling, "stick_ranges", lambda *_: {"F_sp": (9.9, 10.1)})
+    sharp = np.diag([1e-10, 4.0, 9.0])
+    recorded.by_motor = True
+    found = settling._with_stick_ranges(sharp, near, recorded)
+    assert np.sqrt(np.diag(found)) == pytest.approx([1e-5, 0.1 / 1.96, 3.0])

@@ -14,10 +14,14 @@ from identification.estimation.regression.motion_rows import (
     HALF_WIDTHS,
     rows_and_windows,
     rows_of_width,
+    settled_rows,
+    without_reversals,
 )
 from identification.estimation.regression.weighted_rows import solve_rows
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
+from tests.chain import short_recipe
+from workbench.steps.simulate import record
 
 H = 1e-3
 NONE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
@@ -77,6 +81,26 @@ def test_windows_widen_with_noise_and_narrow_with_quick_motion() -> None:
     assert length(quick) <= length(quiet)
     found = by_least_squares(noisy)
     assert found[[0, 1, 2]] == pytest.approx([1.0, 4.0, 3.0], rel=0.05)
+
+
+def test_reversals_of_friction_of_sliding_alone_stay() -> None:
+    truth = 1.0, 4.0, 3.0, 8.0, 6.0
+    for hz in (1.0, 8.0):  # few of the windows hold reversals, and nearly all
+        rows = rows_and_windows([moved(swinging(truth, hz=hz, noise_F=0.01))], NONE)
+        assert without_reversals(rows)[0] is rows[0]
+
+
+@pytest.mark.parametrize("seed", [401, 404])
+def test_reversals_in_which_a_body_sticks_are_left_out(seed: int) -> None:
+    """Table 1's rig sticks at 1.7 times its Coulomb friction."""
+    _, recipe = short_recipe(12.0)
+    (one,) = recorded_logs([record("made", recipe, seed)], Rig("force"), "force").logs
+    rows = settled_rows([one])
+    (kept,) = without_reversals(rows)
+    assert len(kept.windows.middle) == len(kept.rows.b) < len(rows[0].rows.b)
+    found, bent = (solve_rows(part.rows).theta for part in (kept, rows[0]))
+    assert np.all(np.abs(found[[1, 2]] / (12.0, 15.0) - 1.0) < 0.01)
+    assert np.max(np.abs(bent[[1, 2]] / (12.0, 15.0) - 1.0)) > 0.01
 
 
 def test_rows_within_the_band_of_a_plant_are_known() -> None:
