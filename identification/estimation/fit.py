@@ -40,6 +40,7 @@ from identification.estimation.settling import settled
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import (
     FittedStructure,
+    by_exact_force,
     plain_structure,
     searched,
 )
@@ -146,7 +147,7 @@ def _fit(
     report = on_progress or quiet
     report("refining", 0.0)
     recorded = recorded_logs(logs, rig, drive, halt)
-    begin, settle = rng.spawn(2)
+    begin, settle, other = rng.spawn(3)
     if prior is not None and prior.effects:
         fit = likeliest(_with_effects(prior, recorded, report), recorded)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
@@ -156,7 +157,7 @@ def _fit(
         if near.misfit <= COMPLETE:
             fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
             return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
-    found = plain_structure(recorded, begin)
+    recorded, found = by_exact_force(recorded, plain_structure(recorded, begin), other)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
     fit = finished(found, recorded, settle, report, by=drive, quick=quick)

@@ -47,8 +47,8 @@ class RecordedLogs:
     drive: what drives their runs; imposed: the motion is prescribed by a rig; halt: whether
     whatever is made of them is to go on; share: of the step of the command to the next sample, by
     which its mean between them is another than the logged one: it is in these logs, and `given`
-    puts it into others; share_sd: its deviation. remarks: what became of logs whose clock is faster
-    than their motion.
+    puts it into others; share_sd: its deviation; exact: a motor's force has no noise. remarks: what
+    became of logs whose clock is faster than their motion.
     """
 
     logs: tuple[MotionLog, ...]
@@ -58,6 +58,7 @@ class RecordedLogs:
     halt: Halt = field(default_factory=Halt)
     share: float = 0.0
     share_sd: float = 0.0
+    exact: bool = False
     remarks: tuple[str, ...] = ()
 
     @property
@@ -73,9 +74,9 @@ class RecordedLogs:
     @property
     def may_change_between(self) -> bool:
         """Whether a motor drives them whose force changes between their samples, or may do so for
-        all that they show."""
-        seen = self.share == 0.0 and could_show(Size(self.share, self.share_sd))
-        return self.by_motor and not seen
+        all that they show; one that is held exactly does not."""
+        seen = self.exact or could_show(Size(self.share, self.share_sd))
+        return self.by_motor and not (self.share == 0.0 and seen)
 
     @property
     def by_command(self) -> bool:
@@ -128,9 +129,13 @@ class RecordedLogs:
         one = motion_log(
             log, held=self.by_motor, by_command=self.by_command,
             rotary=self.rig.motion == "rotary", imposed=self.imposed,
-            between=unseen(log, self.share) if self.by_motor or log.held else 0.0,
+            between=None if self.exact else self._unseen(log),
         )  # fmt: skip
         return replace(one, halt=self.halt)
+
+    def _unseen(self, log: Log) -> float:
+        """Noise of a held force [N] that the loop adds between the samples of a log."""
+        return unseen(log, self.share) if self.by_motor or log.held else 0.0
 
     def given(self, log: Log) -> MotionLog:
         """A log as it was read, with its motion."""

@@ -11,7 +11,12 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
-from identification.estimation.structure_fit import FittedStructure, band, plain_structure
+from identification.estimation.structure_fit import (
+    FittedStructure,
+    band,
+    by_exact_force,
+    plain_structure,
+)
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
@@ -42,7 +47,8 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     Halted, it is the best so far.
     """
     recorded, halt = rows.recorded, rows.recorded.halt
-    model = plain_structure(recorded, rng)
+    recorded, model = by_exact_force(recorded, plain_structure(recorded, rng), rng.spawn(1)[0])
+    rows = replace(rows, recorded=recorded)
     # Imposed, and the inertia not only hidden by what is missing.
     imposed = model.imposed and inertia_has_no_part(rows.logs)
     if rows.refused is not None and not imposed:

@@ -40,15 +40,16 @@ class LogNoise:
 
     y [m]: of the position at rest; jitter [s]: of the instants of its samples; v [m/s]: of the
     smoothed velocity; F [N]: of the force; between [N]: the part of F that no log shows, of a loop
-    faster than the log; walk [N]: by which a sample more may take the force away from what the
-    command makes of it (0: the command is exact, or there is none).
+    faster than the log, None of a force that is known to be exact; walk [N]: by which a sample more
+    may take the force away from what the command makes of it (0: the command is exact, or there is
+    none).
     """
 
     y: float
     jitter: float
     v: float
     F: float
-    between: float = 0.0
+    between: float | None = 0.0
     walk: float = 0.0
 
     @property

@@ -53,13 +53,14 @@ OFF_ITS_ROW = 8  # samples, to either side, by which a motor's force may act off
 
 def motion_log(
     log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False,
-    between: float = 0.0,
+    between: float | None = 0.0,
 ) -> MotionLog:  # fmt: skip
     """A log with its motion and windows.
 
     held: the force is a zero-order hold, as the log itself may say; imposed: by a rig; the motion
     is then smoothed until most of it has a significant direction. between [N]: noise of the force
-    beside what the log shows of it. Source of the windows: weak form, Messenger, Bortz (2021).
+    beside what the log shows of it, None of a held force that has none. Source of the windows: weak
+    form, Messenger, Bortz (2021).
     """
     h, held = log.h, held or log.held
     motion = differentiate(log["y"], h)
@@ -117,7 +118,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
     return replace(part, noise=own, reference=one.reference)
 
 
-def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNoise:
+def _of_sensors(log: Log, motion: Motion, held: bool, between: float | None) -> LogNoise:
     """The noise of a log as its signals by themselves show it."""
     quiet = local_noise(log["y"])
     # A position that stands for a fifth of its log to the last digit hides its noise there.
@@ -125,9 +126,11 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float) -> LogNois
     unsteady = position_noise(log["y"], motion.v)
     y = y if unsteady is None else unsteady.at_rest
     y = max(y, EXACT_SHARE * float(np.ptp(log["y"])))
-    if held:
+    if held and between is None:
+        F = 0.0
+    elif held:
         unlogged = 0.0 if log.lost is None else noise_of_lost_rows(log["F"], log.lost)
-        F = float(np.sqrt(_beside_control(log) ** 2 + between**2 + unlogged**2))
+        F = float(np.linalg.norm([_beside_control(log), between or 0.0, unlogged]))
     else:
         F = max(local_noise(log["F"]), rounding_of_force(log))
     return LogNoise(y, 0.0 if unsteady is None else unsteady.jitter, motion.v_noise, F, between)
