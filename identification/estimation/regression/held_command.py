@@ -28,7 +28,6 @@ from identification.thresholds import BEYOND_CHANCE, MATERIAL
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
 UNSEEN = Size(0.0, LARGEST_SHARE / 3.0**0.5)  # any share up to that one, where no rows show it
 FAR_FASTER = 50.0  # periods a sample, as which any more count
-STRETCH_OF_LOOP = 25  # samples
 
 
 def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0) -> Size:
@@ -131,17 +130,14 @@ def with_period(log: Log, period: float | None, held: bool) -> Log:
 def unseen(log: Log, share: float) -> float:
     """Noise of a motor's force [N] that its loop adds between the samples of a log of means.
 
-    A white part of every period's force is in the mean of R of them, of which the log has had one.
-    Ours.
+    A white part of every period's force is in the mean of R of them, of which the log has had one;
+    what a stop or start adds counts with it, since no parabola through the samples knows it. Ours.
     """
     if share == 0.0:
         return 0.0
     kernel = _mean_until_next(share)
     means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), kernel)
-    third = np.diff(np.asarray(log["F"]), 3)
-    count = len(third) // STRETCH_OF_LOOP
-    power = np.mean(third[: count * STRETCH_OF_LOOP].reshape(count, STRETCH_OF_LOOP) ** 2, axis=1)
-    white = float(np.median(power)) / float(means @ means)
+    white = float(np.mean(np.diff(np.asarray(log["F"]), 3) ** 2)) / float(means @ means)
     R = min(1.0 / max(1.0 - 2.0 * share, 1e-9), FAR_FASTER)
     of_samples = kernel - np.array([0.0, 0.0, 1.0 / R, 0.0])
     return float(np.sqrt(white * ((R - 1.0) / R**2 + of_samples @ of_samples)))
