@@ -84,13 +84,15 @@ def test_the_logs_have_the_mean_force_until_the_next_sample(R: int) -> None:
     assert log["F"][0] != again.log["F"][0]
 
 
+@pytest.mark.parametrize("chatter", [0.0, 0.5])
 @pytest.mark.parametrize("R", [2, 4, 16])
-def test_what_the_loop_adds_between_the_samples_is_noise(R: int) -> None:
+def test_what_the_loop_adds_between_the_samples_is_noise(R: int, chatter: float) -> None:
+    """The jumps of the force where friction turns with it: of them no parabola knows."""
     share = (R - 1) / (2 * R)
-    log, mean = driven(R, chatter=0.5)
+    log, mean = driven(R, chatter)
     means = between_samples(log, share, held=True)
-    true = float(np.std((means["F"] - mean)[smooth(log)]))
-    assert unseen(means, share) == pytest.approx(true, rel=0.15)
+    true = float(np.std(means["F"] - mean))
+    assert true < unseen(means, share) < 1.6 * true
     assert unseen(log, 0.0) == 0.0
 
 
