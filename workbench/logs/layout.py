@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from identification.thresholds import HALF
-from workbench.cards.headers import words_of, written_unit
+from workbench.cards.headers import words_of
+from workbench.cards.written_units import written_unit
 from workbench.logs.times import is_time
 
 NUMBER = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)

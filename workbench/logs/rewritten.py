@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from identification.signals.check import SHORTEST_LOG
-from workbench.cards.headers import written_unit
+from workbench.cards.written_units import written_unit
 from workbench.logs.layout import is_number
 from workbench.logs.times import is_time
 

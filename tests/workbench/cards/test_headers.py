@@ -2,8 +2,9 @@
 
 import pytest
 
-from workbench.cards.headers import Quantity, read_header, written_unit
+from workbench.cards.headers import read_header
 from workbench.cards.units import conversion
+from workbench.cards.written_units import Quantity, written_unit
 
 READ = [
     ("pos [mm]", "mm", "position", ""),

@@ -7,7 +7,8 @@ from itertools import takewhile
 import numpy as np
 
 from identification.arrays import Array
-from workbench.cards.headers import Header, WrittenUnit, meaning, says_purpose, words_of
+from workbench.cards.headers import Header, meaning, says_purpose, words_of
+from workbench.cards.written_units import WrittenUnit
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors

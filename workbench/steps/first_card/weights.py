@@ -10,8 +10,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import ForceLaw
-from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
+from workbench.cards.written_units import Quantity
 from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.pairs import Pairs, Seen
 
