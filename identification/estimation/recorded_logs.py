@@ -164,11 +164,11 @@ def with_clocks(recorded: RecordedLogs, said: Sequence[str]) -> RecordedLogs:
 
 
 def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
-    """A line on each log whose clock jitters so that it shows."""
+    """A line on each log whose clock jitters, or seems to, so that it shows."""
     return tuple(
         MinorRemark(
-            f"{one.log.name}: its clock jitters by {1e6 * one.noise.jitter:.2g} us, so in motion"
-            " the position is unsure by that times its speed"
+            f"{one.log.name}: in motion the position errs by {1e6 * one.noise.jitter:.2g} us times"
+            " its speed, as by a clock that jitters"
         )
         for one in logs
         if one.noise.jitter > 0.0

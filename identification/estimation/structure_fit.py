@@ -39,7 +39,7 @@ from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halted, Progress, quiet
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HALF, HOPELESS, WORSE
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HOPELESS, WORSE
 
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 
@@ -203,10 +203,10 @@ def by_exact_force(
     recorded: RecordedLogs, found: FittedStructure, rng: np.random.Generator
 ) -> tuple[RecordedLogs, FittedStructure]:
     """The logs of a motor with a force without noise, and the plant as these have it, where it
-    leaves far less than the noise that they seem to have, and then no more than the position's:
-    what a controller makes of a noise that no signal shows is no error of the force. Ours."""
+    leaves no more than the position's noise: what a controller makes of a noise that no signal
+    shows is no error of the force. Ours."""
     noisy = recorded.by_motor and any(one.noise.F > 0.0 for one in recorded.logs)
-    if not noisy or found.imposed or found.misfit > HALF or recorded.share:
+    if not noisy or found.imposed or found.misfit > COMPLETE or recorded.share:
         return recorded, found
     exact = replace(recorded, exact=True).of(recorded.plain)
     again = plain_structure(exact, rng)

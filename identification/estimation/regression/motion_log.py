@@ -33,7 +33,7 @@ from identification.signals.weak_form import all_windows, noise_gain, sliding_wi
 from identification.thresholds import CHANCE_LEVEL
 
 WINDOW_SECONDS = 0.06  # of a window
-EXACT_SHARE = 1e-12  # of its range, to which any position is uncertain
+EXACT_SHARE = 1e-9  # of its range, to which any position is uncertain, by its simulation too
 LEAST_SAMPLES = 16  # samples in a window
 LEAST_PART = 200  # samples in a part of a log
 BEFORE_MOTION = 0.5  # s before the body moves, with which a part of a log begins

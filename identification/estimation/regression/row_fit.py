@@ -190,7 +190,8 @@ def rough(base: Mapping[str, RowFit]) -> bool:
 
 
 def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> dict[str, float]:
-    """All parameters: shape, and the linear ones found; two directions as mean and asymmetry."""
+    """All parameters: shape, and the linear ones found; two directions as mean and asymmetry. One
+    that no equation has stays as shape gives it, as of breakaways in a log without any."""
     values = {p.name: p.default for p in effect.params if p.default is not None} | dict(shape)
     if not in_columns(effect):
         return values
@@ -203,6 +204,6 @@ def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> di
             plus, minus = sizes[f"{full}+"], sizes[f"{full}-"]
             values[name] = 0.5 * (plus + minus)
             values["asymmetry"] = 0.5 * (plus - minus) / values[name] if values[name] else 0.0
-        else:
+        elif full in sizes or name not in values:
             values[name] = sizes[full]
     return values
