@@ -90,6 +90,8 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
     recorded = recorded_logs(logs, rig, fit.drive)
     if fit.imposed:
         return _by_force(recorded)
+    if recorded.by_motor and not fit.noise_F:
+        recorded = recorded.with_exact_force()
     plant = Plant(fit.friction, fit.actuator, fit.effects)
     return _over_windows(fit, plant, recorded)
 

@@ -142,6 +142,10 @@ class RecordedLogs:
         (slower,) = needed([log], self.rig)
         return self.record(between_samples(slower, self.share, self.held))
 
+    def with_exact_force(self) -> "RecordedLogs":
+        """The logs of a motor with a force that has no noise."""
+        return replace(self, exact=True).of(self.plain)
+
     def of(self, logs: Sequence[Log]) -> "RecordedLogs":
         """These logs recorded in the same way."""
         return replace(self, logs=tuple(self.record(log) for log in logs))

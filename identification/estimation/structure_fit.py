@@ -208,7 +208,7 @@ def by_exact_force(
     noisy = recorded.by_motor and any(one.noise.F > 0.0 for one in recorded.logs)
     if not noisy or found.imposed or found.misfit > COMPLETE or recorded.share:
         return recorded, found
-    exact = replace(recorded, exact=True).of(recorded.plain)
+    exact = recorded.with_exact_force()
     again = plain_structure(exact, rng)
     return (exact, again) if again.misfit <= COMPLETE else (recorded, found)
 
