@@ -42,7 +42,6 @@ from identification.signals.weak_form import WeakWindows, sliding_windows
 from identification.thresholds import BEYOND_CHANCE, CHANCE_LEVEL, HALF, MATERIAL
 
 HIGHEST = 100  # order that the windows are made short enough for
-PLAIN_COLUMNS = 8  # columns beside those of the orders
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
 OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or a stop
@@ -104,9 +103,9 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     theta = least_squares(columns, b)
     each = left_out(found.rows.block, lambda kept: least_squares(columns[kept], b[kept]))
     sd = spread_of_left_out(each)
+    first = found.rows.X.shape[1]
     sizes = [
-        Size(-float(value), float(s))
-        for value, s in zip(theta[PLAIN_COLUMNS:], sd[PLAIN_COLUMNS:], strict=True)
+        Size(-float(value), float(s)) for value, s in zip(theta[first:], sd[first:], strict=True)
     ]
     made = [Order(n, sizes[2 * i], sizes[2 * i + 1]) for i, n in enumerate(chosen)]
     least = MATERIAL * max(one.size for one in made)
