@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_regis
 
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
-AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
+VOLTS = ("V", "mV")
+PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -32,6 +33,7 @@ FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 ANGLES_WRAP = (2.0 * np.pi, 360.0, 2e3 * np.pi, 3600.0, 36000.0)  # rad, deg, and parts of them
 COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
+BY_THE_SAME_STEPS = 0.95  # correlation of the steps of a column with those of one that is its way
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ def columns_of(log: UnknownLog) -> Columns:
              for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
-    heads = _without_letters(heads)
+    heads = _with_present(_without_letters(heads))
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
@@ -90,6 +92,8 @@ def columns_of(log: UnknownLog) -> Columns:
     back = {one.raw.number: gone_back(one) for one in usable if one is not clock}
     left_out |= {number: said for number, said in back.items() if said and number not in clocks}
     others = [one for one in usable if one is not clock and one.raw.number not in left_out]
+    left_out |= (gone := _ways_gone(others))
+    others = [one for one in others if one.raw.number not in gone]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
     log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
@@ -111,6 +115,19 @@ def _without_letters(heads: Sequence[Header]) -> list[Header]:
     return [replace(one, unit=None) if one.text[:-1] in apart else one for one in heads]
 
 
+def _with_present(heads: Sequence[Header]) -> list[Header]:
+    """The headers, "current" and a controller's "input" being what is present where one of them is
+    what is asked for, another commands, and none else may be asked for."""
+    present = [bool(PRESENT & set(words_of(one.name))) and one.unit is None for one in heads]
+    others = [one for one, is_it in zip(heads, present, strict=True) if not is_it]
+    asked = any(one.purpose == "reference" for one in others)
+    of = {what for one in others if one.purpose != "reference" for what in one.means}
+    if not asked or "command" not in of or {"position", "velocity", "pressure"} & of:
+        return list(heads)
+    return [replace(one, means={}, purpose="measured") if is_it else one
+            for one, is_it in zip(heads, present, strict=True)]  # fmt: skip
+
+
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
     """The columns; where all are in volts, as those of a scope, the unit tells nothing of one, nor
     does an input's number."""
@@ -124,7 +141,7 @@ def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
 
 def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
     """Three currents of about one size, whose sum is 0: those of a motor's phases."""
-    currents = [one for one in columns if one.header.unit and one.header.unit.card in AMPERES]
+    currents = [one for one in columns if one.current]
     for three in combinations(currents, 3):
         sizes = [float(np.std(one.x)) for one in three]
         left = float(np.std(np.sum([one.x for one in three], axis=0)))
@@ -155,6 +172,20 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
                     said = (*said, f"the {told}, of which this is what the longest shows")
                 return [replace(c, values=c.values[at], x=c.values[at]) for c in columns], said
     return list(columns), ()
+
+
+def _ways_gone(columns: Sequence[Column]) -> dict[int, str]:
+    """What is said of columns that only go up, by the steps of another one whichever way that goes,
+    as the way that a wheel has rolled."""
+    steps = {one.raw.number: np.diff(one.values) for one in columns}
+    rising = [one for one in columns if np.all(steps[one.raw.number] >= 0.0)]
+    gone = dict[int, str]()
+    for one, other in product(rising, columns):
+        of = steps[other.raw.number]
+        both = np.column_stack([steps[one.raw.number], np.abs(of)])
+        if np.min(of) < 0.0 < np.max(of) and correlation(both)[0, 1] > BY_THE_SAME_STEPS:
+            gone[one.raw.number] = f"is the way that {other.shown} goes, both ways together"
+    return gone
 
 
 def _longest_piece(t: Array) -> slice | None:
@@ -226,7 +257,8 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     from a sensor's output stands behind it. Of a position before and behind a gear, the one whose
     name begins as that of a force that is kept.
     """
-    order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
+    order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), one.whole,
+                                             -one.raw.number))  # fmt: skip
     if not order:
         return [], {}
     alike = np.abs(correlation(np.column_stack([one.x for one in order])))
@@ -285,7 +317,7 @@ def _said(one: Column) -> float:
     raw = unit is not None and unit.quantity in ("command", "count")
     raw = raw and not one.header.means.get("command")
     known = 0.0 if unit is None or raw else 4.0
-    known -= 3.0 if one.header.purpose == "error" else 0.0
+    known -= {"error": 3.0, "filtered": 1.0}.get(one.header.purpose, 0.0)
     means = (weight for what, weight in one.header.means.items() if what != "other")
     return known + max(means, default=0.0) - (1.0 if raw else 0.0)
 

@@ -273,7 +273,8 @@ def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
 
 def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
     """The unit of a signal by its own size."""
-    if name == "u" and "force" in column.header.means and not column.current:
+    means = column.header.means
+    if name == "u" and means.get("force", -1.0) >= means.get("command", 0.0) and not column.current:
         unit, why = force_unit(motion.motion), "the header speaks of a force that is asked for"
         return UnitGuess(unit, None, False, why, "V")
     if name == "u":

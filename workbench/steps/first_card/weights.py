@@ -95,7 +95,7 @@ def _by_purpose(one: Column, role: str) -> float:
     if purpose == "measured":
         return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
-        return -1.0 if role == "u" else 0.0
+        return -2.0 if role == "u" else 0.0
     if purpose == "filtered":
         return {"r": OF_A_COPY, "y": -1.0}.get(role, 0.0)
     return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
@@ -233,6 +233,8 @@ def ahead_of(seen: Seen, k: int) -> float:
         return -3.0
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
+    if found.samples <= 0.3 and one.header.purpose != "reference":
+        return RULED_OUT  # another sensor of the position
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
