@@ -123,3 +123,28 @@ def test_three_phases_are_known_without_their_unit(joint: dict[str, Array], tmp_
     headers = "t,angle,phase_a_current,phase_b_current,phase_c_current"
     with pytest.raises(BadLog, match="three phase currents"):
         propose(tmp_path, headers, T, joint["y"], *phases)
+
+
+@pytest.mark.parametrize("at_a_time", [2, 5, 20])
+def test_rows_that_a_reader_stamped_several_at_a_time_are_even(
+    joint: dict[str, Array], tmp_path: Path, at_a_time: int
+) -> None:
+    """Lines of a serial port, each with the time at which the computer came to it."""
+    rng = np.random.default_rng(4)
+    read = np.repeat(np.arange(0, len(T), at_a_time), at_a_time)[: len(T)]
+    found_at = 2e-3 * (read + at_a_time) + 1e-4 * rng.random(len(T))[read]
+    stamps = found_at + 1e-4 * (np.arange(len(T)) - read) + 4e-5 * rng.random(len(T))
+    y, r = (np.round(600.0 * joint[of]) for of in "yr")
+    found = propose(tmp_path, "timestamp,target,position,pwm", stamps, r, y, joint["u"])
+    assert roles(found) == {"t": "timestamp", "r": "target", "y": "position", "u": "pwm"}
+    assert f"rows stamped about {at_a_time} at a time, late: taken as even rows" in found.remarks
+    assert any("every 0.002 s, an even clock" in one for one in found.remarks)
+
+
+def test_counts_are_no_millimetres_of_a_target_in_counts(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    y, r = (np.round(6000.0 * joint[of]) for of in ("y", "target"))
+    one = propose(tmp_path, "t,target,position,pwm", T, r, y, joint["u"]).signal("y")
+    assert one is not None and (one.unit, one.sure) == ("count", False)
+    assert "data sheet" in one.why
