@@ -148,3 +148,25 @@ def test_counts_are_no_millimetres_of_a_target_in_counts(
     one = propose(tmp_path, "t,target,position,pwm", T, r, y, joint["u"]).signal("y")
     assert one is not None and (one.unit, one.sure) == ("count", False)
     assert "data sheet" in one.why
+
+
+def test_a_motors_torque_is_one_though_it_twists_the_shaft(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    """What is proportional to the difference of two angles is no error where its unit says so."""
+    load = -0.2 * joint["F"] - 0.5 * np.tanh(joint["v"])
+    twisted = joint["y"] + 0.02 * joint["F"]
+    headers = "t_s,theta_motor_rad,theta_load_rad,T_motor_Nm,T_load_Nm"
+    found = propose(tmp_path, headers, T, twisted, joint["y"], joint["F"], load)
+    one = found.signal("F")
+    assert one is not None and (one.column, one.sure) == ("T_motor_Nm", False)
+
+
+def test_a_torque_in_percent_of_the_rated_one_is_a_command(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    found = propose(tmp_path, "t,angle_deg,Torque[%]", T, 57.3 * joint["y"], 10.0 * joint["F"])
+    one = found.signal("u")
+    assert (
+        found.kind == "motor" and one is not None and (one.column, one.unit) == ("Torque[%]", "%")
+    )

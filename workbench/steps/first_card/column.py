@@ -139,6 +139,12 @@ class Column:
         part = self.values[:MOST_ROWS_READ]
         return np.asarray(part[np.isfinite(part)])
 
+    def beside(self, other: "Column") -> tuple[Array, Array]:
+        """Of the rows looked at those in which both are numbers."""
+        a, b = self.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
+        both = np.isfinite(a) & np.isfinite(b)
+        return a[both], b[both]
+
     @cached_property
     def motion(self) -> Motion | None:
         """The column as if it were a position."""

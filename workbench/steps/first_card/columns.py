@@ -91,9 +91,8 @@ def columns_of(log: UnknownLog) -> Columns:
     left_out |= dict.fromkeys(sorted(clocks), "goes up with the clock, as another one does")
     back = {one.raw.number: gone_back(one) for one in usable if one is not clock}
     left_out |= {number: said for number, said in back.items() if said and number not in clocks}
+    left_out |= _ways_gone([one for one in usable if one is not clock])
     others = [one for one in usable if one is not clock and one.raw.number not in left_out]
-    left_out |= (gone := _ways_gone(others))
-    others = [one for one in others if one.raw.number not in gone]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
     log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
@@ -324,9 +323,7 @@ def _said(one: Column) -> float:
 
 def _same(one: Column, other: Column) -> bool:
     """Whether two columns are one signal but for scale and offset: what is left is rounding."""
-    first, second = one.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
-    both = np.isfinite(first) & np.isfinite(second)
-    a, b = first[both] - first[both].mean(), second[both] - second[both].mean()
+    a, b = (x - x.mean() for x in one.beside(other))
     square, spread = float(a @ a), float(np.std(b))
     if square == 0.0 or spread == 0.0:
         return False

@@ -220,7 +220,7 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     if role == "F":  # beside two pressures, whose force it is like
         alike = abs(float(np.corrcoef(way.force, one.x)[0, 1]))
-        return head + 1.0 if head > 0.0 or alike > WORK_GIVES_SIGN else -3.0
+        return head + 1.0 if alike > WORK_GIVES_SIGN else -3.0
     return head - 1.0
 
 

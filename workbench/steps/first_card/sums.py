@@ -32,13 +32,9 @@ def with_position(
     if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
         return None
     own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
-    kept = [one for one in signals if not one.header.speed and not _asks_for(one, own)]
-    return _summed(columns, kept, own)
-
-
-def _asks_for(one: Column, speed: Column) -> bool:
-    """Whether a column is called what is asked for, and a speed follows it."""
-    return one.header.purpose == "reference" and follows(lead(one.x, speed.x))
+    asks = [one for one in signals  # for a speed, which follows it
+            if one.header.purpose == "reference" and follows(lead(one.x, own.x))]  # fmt: skip
+    return _summed(columns, [x for x in signals if not x.header.speed and x not in asks], own)
 
 
 def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles] | None:

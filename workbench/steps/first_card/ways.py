@@ -200,8 +200,8 @@ def gain_of_reference(seen: Seen, k: int) -> float:
     """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
     if k not in seen.as_reference:
         one = seen.pairs.signals[k]
-        asks = k in seen.controlled or ("command" in one.header.means and _is_set_point(seen, k))
-        head = max(0.0, said(one, "r")) if asks else said(one, "r")
+        asks = "command" in one.header.means and _is_set_point(seen, k)
+        head = max(0.0 if asks else -np.inf, said(one, "r"))
         if together(seen.y, one) < 0.0 and one.header.purpose != "reference":
             head = RULED_OUT  # another axis's position, which goes with this one
         more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
