@@ -170,3 +170,18 @@ def test_a_torque_in_percent_of_the_rated_one_is_a_command(
     assert (
         found.kind == "motor" and one is not None and (one.column, one.unit) == ("Torque[%]", "%")
     )
+
+
+def test_beside_a_left_wheel_r_is_the_right_one(joint: dict[str, Array], tmp_path: Path) -> None:
+    table = (T, joint["y"], np.roll(joint["y"], 3), joint["F"])
+    found = propose(tmp_path, "t,l_wheel_pos_rad,r_wheel_pos_rad,l_wheel_torque_Nm", *table)
+    assert roles(found) == {"t": "t", "y": "l_wheel_pos_rad", "F": "l_wheel_torque_Nm"}
+
+
+def test_a_supply_is_no_chamber(joint: dict[str, Array], tmp_path: Path) -> None:
+    noise = np.random.default_rng(3).standard_normal((3, len(T)))
+    supply, cap, rod = 160.0 + 0.2 * noise[0], 60.0 + 5.0 * joint["F"], 60.0 - 8.0 * joint["F"]
+    headers = "time_s,Position [mm],Supply [bar],Cap End [bar],Rod End [bar]"
+    table = (T, 250.0 + joint["y"], supply, cap + 0.05 * noise[1], rod + 0.05 * noise[2])
+    found = propose(tmp_path, headers, *table)
+    assert {roles(found)["p_p"], roles(found)["p_n"]} == {"Cap End [bar]", "Rod End [bar]"}

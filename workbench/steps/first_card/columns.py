@@ -23,6 +23,7 @@ from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_regis
 
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
+RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
 VOLTS = ("V", "mV")
 PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
@@ -60,6 +61,9 @@ class Columns:
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
     names = without_blocks([one.header for one in log.columns])
+    left = {one.casefold() for one in names if one}
+    names = [RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
+             for x in names]  # fmt: skip
     heads = [read_header(name, one.unit_below)
              for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:

@@ -74,7 +74,7 @@ def said(one: Column, role: str) -> float:
             total = max(total, weight if role != "r" else 0.5 * weight)
         elif role == "u" and quantity == "force" and (asked or share):
             total = max(total, 0.5 * weight)  # a force that is asked for, or a share of the rated
-    if head.means and total == 0.0 and by_unit < BY_UNIT:
+    if head.means and total == 0.0 and (by_unit < BY_UNIT or "other" in head.means):
         total -= 0.5 + max(head.means.values())
     total += by_unit
     total += _by_purpose(one, role)
@@ -181,9 +181,8 @@ def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
         return 0.0
     bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
     rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
-    found = (AN_ERROR, k in pairs.errors), (BEFORE_LIMIT, k in behind)
-    found = *found, (OF_A_VELOCITY, rate > SURELY_VELOCITY)
-    return sum(odds for odds, is_it in found if is_it)
+    error = (AN_ERROR if k in pairs.errors else 0.0) + (BEFORE_LIMIT if k in behind else 0.0)
+    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY else 0.0)
 
 
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
