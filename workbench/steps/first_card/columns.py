@@ -17,7 +17,13 @@ from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
+from workbench.steps.first_card.axes import (
+    SAME_MOTION,
+    axes_of,
+    correlation,
+    is_position,
+    without_blocks,
+)
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_register
 
@@ -25,7 +31,7 @@ MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
 RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
 VOLTS = ("V", "mV")
-PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
+SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -34,7 +40,6 @@ FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 ANGLES_WRAP = (2.0 * np.pi, 360.0, 2e3 * np.pi, 3600.0, 36000.0)  # rad, deg, and parts of them
 COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
-BY_THE_SAME_STEPS = 0.95  # correlation of the steps of a column with those of one that is its way
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,14 +126,13 @@ def _without_letters(heads: Sequence[Header]) -> list[Header]:
 def _with_present(heads: Sequence[Header]) -> list[Header]:
     """The headers, "current" and a controller's "input" being what is present where one of them is
     what is asked for, another commands, and none else may be asked for."""
-    present = [bool(PRESENT & set(words_of(one.name))) and one.unit is None for one in heads]
-    others = [one for one, is_it in zip(heads, present, strict=True) if not is_it]
-    asked = any(one.purpose == "reference" for one in others)
+    others = [one for one in heads if not SAYS_PRESENT & set(words_of(one.name))]
     of = {what for one in others if one.purpose != "reference" for what in one.means}
+    asked = any(one.purpose == "reference" for one in others)
     if not asked or "command" not in of or {"position", "velocity", "pressure"} & of:
         return list(heads)
-    return [replace(one, means={}, purpose="measured") if is_it else one
-            for one, is_it in zip(heads, present, strict=True)]  # fmt: skip
+    return [one if one in others or one.unit else replace(one, means={}, purpose="measured")
+            for one in heads]  # fmt: skip
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
@@ -186,7 +190,7 @@ def _ways_gone(columns: Sequence[Column]) -> dict[int, str]:
     for one, other in product(rising, columns):
         of = steps[other.raw.number]
         both = np.column_stack([steps[one.raw.number], np.abs(of)])
-        if np.min(of) < 0.0 < np.max(of) and correlation(both)[0, 1] > BY_THE_SAME_STEPS:
+        if np.min(of) < 0.0 < np.max(of) and correlation(both)[0, 1] > SAME_MOTION:
             gone[one.raw.number] = f"is the way that {other.shown} goes, both ways together"
     return gone
 

@@ -41,19 +41,14 @@ class Pairs:
         self.bodies = dict[int, Seen]()
 
     @cached_property
-    def gram(self) -> Array:
-        """Products of the signals about their means, (k, k)."""
-        centred = self.x - self.x.mean(axis=0)
-        return np.asarray(centred.T @ centred)
-
-    @cached_property
     def errors(self) -> dict[int, set[tuple[int, int]]]:
         """Signals that are the difference of two others, as a following error is, by their place:
         the places of the two, the first before the second.
 
         Of three such the smallest is the error; what is fed forward goes less with either.
         """
-        gram = self.gram
+        centred = self.x - self.x.mean(axis=0)
+        gram = centred.T @ centred
         square = np.maximum(np.diag(gram), 1e-300)
         out: dict[int, set[tuple[int, int]]] = {}
         for i in range(len(self.signals) - 1):

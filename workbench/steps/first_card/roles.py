@@ -276,15 +276,12 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
-        known = role != "r" or _surely_asks(column, _lead_of(best))
-        out[role] = odds if named and moves and known else min(odds, SURE - 1.0)
+        if role == "r":  # called one, or well before the position
+            found = _lead_of(best)
+            named &= column.header.purpose == "reference" or found.samples > 1.0
+            named &= follows(found) and not found.either
+        out[role] = odds if named and moves else min(odds, SURE - 1.0)
     return out
-
-
-def _surely_asks(r: Column, found: Lead) -> bool:
-    """Whether a position follows what is called its reference, or comes well before it."""
-    called = r.header.purpose == "reference" or found.samples > 1.0
-    return called and follows(found) and not found.either
 
 
 def _lead_of(best: _Choice) -> Lead:
