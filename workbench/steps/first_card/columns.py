@@ -81,30 +81,26 @@ def columns_of(log: UnknownLog) -> Columns:
         read.append(Column(raw, header, values, values, register))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
-    log = replace(log, notes=(*log.notes, *said))
     clock = clock_of(log, usable, [one for one in read if one.raw.number in left_out])
-    even, said_of_it = even_stamps(clock.values)
-    if said_of_it:
-        log = replace(log, notes=(*log.notes, said_of_it))
-        clock = replace(clock, values=even, x=even)
+    even, late = even_stamps(clock.values)
+    clock, notes = replace(clock, values=even, x=even), [*log.notes, *said, late]
     left_out.pop(clock.raw.number, None)
     usable = [one for one in usable if one.raw.number != clock.raw.number] + [clock]
     if (piece := _longest_piece(clock.values)) is not None:
         usable = [replace(one, values=one.values[piece]) for one in usable]
         most = float(np.max(np.diff(clock.values)))
-        leap = f"the clock leaps by {most:.4g}, longer than its runs: this is what one shows"
-        log = replace(log, notes=(*log.notes, leap))
+        notes += [f"the clock leaps by {most:.4g}, longer than its runs: this is what one shows"]
         clock = next(one for one in usable if one.raw.number == clock.raw.number)
     step = float(np.median(np.diff(clock.values)))
-    clocks = {one.raw.number for one in usable if one is not clock and is_second(one, clock)}
-    left_out |= dict.fromkeys(sorted(clocks), "goes up with the clock, as another one does")
-    back = {one.raw.number: gone_back(one) for one in usable if one is not clock}
-    left_out |= {number: said for number, said in back.items() if said and number not in clocks}
-    left_out |= _ways_gone([one for one in usable if one is not clock])
-    others = [one for one in usable if one is not clock and one.raw.number not in left_out]
+    others = [one for one in usable if one is not clock]
+    second = "goes up with the clock, as another one does"
+    left_out |= {one.raw.number: why for one in others
+                 if (why := second if is_second(one, clock) else gone_back(one))}  # fmt: skip
+    left_out |= _ways_gone(others)
+    others = [one for one in others if one.raw.number not in left_out]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
-    log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
+    log = replace(log, notes=tuple(filter(None, [*notes, *(said for _, said in whole)])))
     signals = [
         _on_grid(one, clock.values, x, step, grid)
         for one, (x, _) in zip(others, whole, strict=True)
