@@ -165,15 +165,13 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = rows[longest]
             even, late = even_stamps(one.values[at])
-            if late:
-                clock = replace(one, values=even, x=even)
-                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
-                        for c in columns], (*said, late)  # fmt: skip
-            if (said or len(at) < len(rows)) and ticks(replace(one, values=one.values[at])):
+            clock = replace(one, values=even, x=even)
+            if late or ((said or len(at) < len(rows)) and ticks(clock)):
                 if len(runs) > 1:
                     told = told_of_starts(one.values[rows], runs)
                     said = (*said, f"the {told}, of which this is what the longest shows")
-                return [replace(c, values=c.values[at], x=c.values[at]) for c in columns], said
+                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
+                        for c in columns], (*said, late)  # fmt: skip
     return list(columns), ()
 
 
