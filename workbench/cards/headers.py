@@ -78,16 +78,17 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     " warnung valid betriebsart zustand state"
     " battery batterie akku vbus vbat vdc vcc udc zwischenkreis power leistung energy energie"
     " i2t gain trigger 状態 異常 電力 trust feedforward vorsteuerung humidity frequency frequenz"
-    " load_cycle checksum crc latency",
+    " load_cycle checksum crc latency integrator integral",
 }
 _SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each with its weight
     "time": "t 3 dt 1",
     "position": "y 3 x 3 z 2 q 2 s 1.5 enc 2 alpha 1.5 beta 1.5 psi 1.5",
-    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 rpm 3 erpm 3",
+    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 spd 3 rpm 3 erpm 3",
     "acceleration": "a 1 acc 3 qdd 2 ddq 2",
     "force": "f 3 m 0.5 tau 2 trq 3 tor 2 eff 2",
     "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
-    "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 amp 2 uq 2 vq 2 ua 2 in 1 out 1",
+    "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 cur 2 amp 2 uq 2 vq 2 ua 2 in 1"
+    " out 1",
     "temperature": "t 0.5",
     "count": "n 1 k 1 i 0.5 nr 2 no 2",
     "other": "id 2 isd 2 ud 2 vd 2 kp 2 ki 2 kd 2 ff 1.5",
@@ -293,8 +294,9 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
         return {"acceleration": _TWO_WEIGHTS}
     if any(one == "dot" or (one.endswith("dot") and len(one) < 9) for one in words):
         return {"velocity": _TWO_WEIGHTS}
-    of_it = words[:1] == ["current"] or {"motor"} == {one for one in words if _commands(one)}
-    if of_it and "position" in found:  # the present position, or that of the motor
+    of_it = words[:1] in (["current"], ["cur"])
+    of_it = of_it or {"motor"} == {one for one in words if _commands(one)}
+    if of_it and {"position", "velocity"} & set(found):  # the present one, or that of the motor
         found.pop("command", None)
     return found
 

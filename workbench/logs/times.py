@@ -221,6 +221,7 @@ MOST_STARTS = 50  # of a clock in one file
 _MOST_OF_A_TICK = 1.01  # that a rounded stamp is off
 _MOST_DIGITS = 15
 _OF_ROUNDING = 8.0  # times the step between two numbers, that differences of times are rounded to
+_TOGETHER, _FEWEST_AT_A_TIME = 0.25, 1.5  # period below which rows came together; such rows
 _ROWS_OF_A_MEAN = 50  # over which the jitter of stamps is gone, and a lost row is not
 
 
@@ -290,24 +291,33 @@ def sound_rows(t: Array, others: Sequence[Array]) -> tuple[NDArray[Any], tuple[s
 
 def even_stamps(t: Array) -> tuple[Array, str]:
     """The times (n,) of even rows whose stamps are rounded to whole ticks, or of which some came
-    late, together with the next, and what is said of that; other times as they are.
+    late, together with the next, or all several at a time, as who reads a port finds them in its
+    buffer, and what is said of that; other times as they are.
 
     Rows are even where their stamps follow the count of the rows: but for a tick; or without a
-    step, as a row that was lost would shift all behind it by a period.
+    step, as a row that was lost would shift all behind it by a period, or by those of a buffer.
     """
     step = np.diff(t)
     if len(t) < SHORTEST_LOG or not np.all(step >= 0.0):
         return t, ""
-    same = step == 0.0
-    if not np.any(same):
+    same, line = step == 0.0, _line(t)
+    period = float(line[1] - line[0])
+    together = step < _TOGETHER * period
+    at_a_time = len(t) / (1 + int(np.sum(~together)))
+    uneven = (
+        float(np.ptp(step[together]) if np.any(together) else 0.0) > MOST_FAULTY * period
+    )  # as no sampler is
+    buffered = uneven and _FEWEST_AT_A_TIME < at_a_time < _ROWS_OF_A_MEAN
+    if not buffered and not np.any(same):
         return _without_rounding(t, step)
-    if np.mean(same) >= OF_ACCOUNT:
+    if not buffered and np.mean(same) >= OF_ACCOUNT:
         return t, ""
-    line = _line(t)
     blocks = max(1, len(t) // _ROWS_OF_A_MEAN)
     late = [float(np.mean(one)) for one in np.array_split(t - line, blocks)]
-    if np.ptp(late) > HALF * (line[1] - line[0]):
+    if np.ptp(late) > period * (at_a_time if buffered else HALF):
         return t, ""
+    if buffered:
+        return line, f"rows stamped about {at_a_time:.0f} at a time, late: taken as even rows"
     said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"
     return line, f"{said}: stamped late, taken as even rows"
 

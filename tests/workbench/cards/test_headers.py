@@ -67,6 +67,7 @@ def test_a_header_tells_unit_and_meaning(
     ("text", "drives"),
     [("motor_angle", False), ("motorPosition", False), ("motor", True), ("motor_pos_cmd", True),
      ("motor_current", True), ("valve_position", True), ("Control Effort", True),
+     ("Motor Speed (RPM)", False), ("cur_vel", False), ("fb_cur", True), ("integrator", False),
      ("joint_effort", False)],
 )  # fmt: skip
 def test_where_a_motor_stands_is_no_command(text: str, drives: bool) -> None:

@@ -95,7 +95,7 @@ MOST_ROWS_READ = 10_000
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
 CURRENTS = ("current", "strom", "電流", "电流", "courant", "corrente", " iq ", " i q ", " isq ",
-            " ia ", " i a ", " amp")  # fmt: skip
+            " ia ", " i a ", " amp", " cur ")  # fmt: skip
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 
 
@@ -138,6 +138,12 @@ class Column:
         """The first values that are numbers, as many as are looked at."""
         part = self.values[:MOST_ROWS_READ]
         return np.asarray(part[np.isfinite(part)])
+
+    def beside(self, other: "Column") -> tuple[Array, Array]:
+        """Of the rows looked at those in which both are numbers."""
+        a, b = self.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
+        both = np.isfinite(a) & np.isfinite(b)
+        return a[both], b[both]
 
     @cached_property
     def motion(self) -> Motion | None:

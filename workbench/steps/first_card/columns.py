@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -17,13 +17,21 @@ from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import Header, read_header, words_of
 from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import axes_of, correlation, is_position, without_blocks
+from workbench.steps.first_card.axes import (
+    SAME_MOTION,
+    axes_of,
+    correlation,
+    is_position,
+    without_blocks,
+)
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_register
 
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
-AMPERES, VOLTS = ("A", "mA"), ("V", "mV")
+RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
+VOLTS = ("V", "mV")
+SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -58,11 +66,14 @@ class Columns:
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
     names = without_blocks([one.header for one in log.columns])
+    left = {one.casefold() for one in names if one}
+    names = [RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
+             for x in names]  # fmt: skip
     heads = [read_header(name, one.unit_below)
              for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
-    heads = _without_letters(heads)
+    heads = _with_present(_without_letters(heads))
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
@@ -70,29 +81,26 @@ def columns_of(log: UnknownLog) -> Columns:
         read.append(Column(raw, header, values, values, register))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
-    log = replace(log, notes=(*log.notes, *said))
     clock = clock_of(log, usable, [one for one in read if one.raw.number in left_out])
-    even, said_of_it = even_stamps(clock.values)
-    if said_of_it:
-        log = replace(log, notes=(*log.notes, said_of_it))
-        clock = replace(clock, values=even, x=even)
+    even, late = even_stamps(clock.values)
+    clock, notes = replace(clock, values=even, x=even), [*log.notes, *said, late]
     left_out.pop(clock.raw.number, None)
     usable = [one for one in usable if one.raw.number != clock.raw.number] + [clock]
     if (piece := _longest_piece(clock.values)) is not None:
         usable = [replace(one, values=one.values[piece]) for one in usable]
         most = float(np.max(np.diff(clock.values)))
-        leap = f"the clock leaps by {most:.4g}, longer than its runs: this is what one shows"
-        log = replace(log, notes=(*log.notes, leap))
+        notes += [f"the clock leaps by {most:.4g}, longer than its runs: this is what one shows"]
         clock = next(one for one in usable if one.raw.number == clock.raw.number)
     step = float(np.median(np.diff(clock.values)))
-    clocks = {one.raw.number for one in usable if one is not clock and is_second(one, clock)}
-    left_out |= dict.fromkeys(sorted(clocks), "goes up with the clock, as another one does")
-    back = {one.raw.number: gone_back(one) for one in usable if one is not clock}
-    left_out |= {number: said for number, said in back.items() if said and number not in clocks}
-    others = [one for one in usable if one is not clock and one.raw.number not in left_out]
+    others = [one for one in usable if one is not clock]
+    second = "goes up with the clock, as another one does"
+    left_out |= {one.raw.number: why for one in others
+                 if (why := second if is_second(one, clock) else gone_back(one))}  # fmt: skip
+    left_out |= _ways_gone(others)
+    others = [one for one in others if one.raw.number not in left_out]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     whole = [_unwrapped(clock.values, one) for one in others]
-    log = replace(log, notes=(*log.notes, *filter(None, (said for _, said in whole))))
+    log = replace(log, notes=tuple(filter(None, [*notes, *(said for _, said in whole)])))
     signals = [
         _on_grid(one, clock.values, x, step, grid)
         for one, (x, _) in zip(others, whole, strict=True)
@@ -111,6 +119,18 @@ def _without_letters(heads: Sequence[Header]) -> list[Header]:
     return [replace(one, unit=None) if one.text[:-1] in apart else one for one in heads]
 
 
+def _with_present(heads: Sequence[Header]) -> list[Header]:
+    """The headers, "current" and a controller's "input" being what is present where one of them is
+    what is asked for, another commands, and none else may be asked for."""
+    others = [one for one in heads if not SAYS_PRESENT & set(words_of(one.name))]
+    of = {what for one in others if one.purpose != "reference" for what in one.means}
+    asked = any(one.purpose == "reference" for one in others)
+    if not asked or "command" not in of or {"position", "velocity", "pressure"} & of:
+        return list(heads)
+    return [one if one in others or one.unit else replace(one, means={}, purpose="measured")
+            for one in heads]  # fmt: skip
+
+
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
     """The columns; where all are in volts, as those of a scope, the unit tells nothing of one, nor
     does an input's number."""
@@ -124,7 +144,7 @@ def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
 
 def _phases(columns: Sequence[Column]) -> tuple[Column, ...]:
     """Three currents of about one size, whose sum is 0: those of a motor's phases."""
-    currents = [one for one in columns if one.header.unit and one.header.unit.card in AMPERES]
+    currents = [one for one in columns if one.current]
     for three in combinations(currents, 3):
         sizes = [float(np.std(one.x)) for one in three]
         left = float(np.std(np.sum([one.x for one in three], axis=0)))
@@ -145,16 +165,28 @@ def _at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, 
             longest = max(runs, key=lambda run: run.stop - run.start)
             at = rows[longest]
             even, late = even_stamps(one.values[at])
-            if late:
-                clock = replace(one, values=even, x=even)
-                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
-                        for c in columns], (*said, late)  # fmt: skip
-            if (said or len(at) < len(rows)) and ticks(replace(one, values=one.values[at])):
+            clock = replace(one, values=even, x=even)
+            if late or ((said or len(at) < len(rows)) and ticks(clock)):
                 if len(runs) > 1:
                     told = told_of_starts(one.values[rows], runs)
                     said = (*said, f"the {told}, of which this is what the longest shows")
-                return [replace(c, values=c.values[at], x=c.values[at]) for c in columns], said
+                return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
+                        for c in columns], (*said, late)  # fmt: skip
     return list(columns), ()
+
+
+def _ways_gone(columns: Sequence[Column]) -> dict[int, str]:
+    """What is said of columns that only go up, by the steps of another one whichever way that goes,
+    as the way that a wheel has rolled."""
+    steps = {one.raw.number: np.diff(one.values) for one in columns}
+    rising = [one for one in columns if np.all(steps[one.raw.number] >= 0.0)]
+    gone = dict[int, str]()
+    for one, other in product(rising, columns):
+        of = steps[other.raw.number]
+        both = np.column_stack([steps[one.raw.number], np.abs(of)])
+        if np.min(of) < 0.0 < np.max(of) and correlation(both)[0, 1] > SAME_MOTION:
+            gone[one.raw.number] = f"is the way that {other.shown} goes, both ways together"
+    return gone
 
 
 def _longest_piece(t: Array) -> slice | None:
@@ -226,7 +258,8 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     from a sensor's output stands behind it. Of a position before and behind a gear, the one whose
     name begins as that of a force that is kept.
     """
-    order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
+    order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), one.whole,
+                                             -one.raw.number))  # fmt: skip
     if not order:
         return [], {}
     alike = np.abs(correlation(np.column_stack([one.x for one in order])))
@@ -285,16 +318,14 @@ def _said(one: Column) -> float:
     raw = unit is not None and unit.quantity in ("command", "count")
     raw = raw and not one.header.means.get("command")
     known = 0.0 if unit is None or raw else 4.0
-    known -= 3.0 if one.header.purpose == "error" else 0.0
+    known -= {"error": 3.0, "filtered": 1.0}.get(one.header.purpose, 0.0)
     means = (weight for what, weight in one.header.means.items() if what != "other")
     return known + max(means, default=0.0) - (1.0 if raw else 0.0)
 
 
 def _same(one: Column, other: Column) -> bool:
     """Whether two columns are one signal but for scale and offset: what is left is rounding."""
-    first, second = one.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
-    both = np.isfinite(first) & np.isfinite(second)
-    a, b = first[both] - first[both].mean(), second[both] - second[both].mean()
+    a, b = (x - x.mean() for x in one.beside(other))
     square, spread = float(a @ a), float(np.std(b))
     if square == 0.0 or spread == 0.0:
         return False

@@ -19,8 +19,6 @@ DIFFERENCE, SAME_FACTOR = 0.9995, 0.02  # share of an error that two signals' di
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
 SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
-OF_TWO, OF_ONE = 0.9, 0.5  # share of a controller's output that its error explains, and one of both
-LIKE_GAINS = 2.0  # times the one's gain in it, that the other's is at most
 ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
@@ -43,19 +41,14 @@ class Pairs:
         self.bodies = dict[int, Seen]()
 
     @cached_property
-    def gram(self) -> Array:
-        """Products of the signals about their means, (k, k)."""
-        centred = self.x - self.x.mean(axis=0)
-        return np.asarray(centred.T @ centred)
-
-    @cached_property
     def errors(self) -> dict[int, set[tuple[int, int]]]:
         """Signals that are the difference of two others, as a following error is, by their place:
         the places of the two, the first before the second.
 
         Of three such the smallest is the error; what is fed forward goes less with either.
         """
-        gram = self.gram
+        centred = self.x - self.x.mean(axis=0)
+        gram = centred.T @ centred
         square = np.maximum(np.diag(gram), 1e-300)
         out: dict[int, set[tuple[int, int]]] = {}
         for i in range(len(self.signals) - 1):
@@ -127,7 +120,7 @@ def _clipped(before: Column, behind: Column) -> bool:
 
     Mostly: a feed-forward may be added between the two. They are in one unit.
     """
-    a, b = _both(before, behind)
+    a, b = before.beside(behind)
     low, high = float(b.min()), float(b.max())
     above, below = b == high, b == low
     at = above | below
@@ -147,7 +140,7 @@ def _clipped(before: Column, behind: Column) -> bool:
 
 def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
     """The place of the column that, added to one, makes the other; None where there is none."""
-    a, b = _both(signals[i], signals[j])
+    a, b = signals[i].beside(signals[j])
     width = float(np.ptp(b))
     for k, part in enumerate(signals):
         if k in (i, j) or part.flag or len(part.values) != len(signals[i].values):
@@ -159,13 +152,6 @@ def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
         if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > SAME_SUM * width) > SELDOM:
             return k
     return None
-
-
-def _both(one: Column, other: Column) -> tuple[Array, Array]:
-    """The rows looked at in which both have a number."""
-    a, b = one.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
-    both = np.isfinite(a) & np.isfinite(b)
-    return a[both], b[both]
 
 
 class Seen:
@@ -197,24 +183,6 @@ class Seen:
     def laws(self) -> list[ForceLaw]:
         """What of each column is the force along the position; empty where too little moves."""
         return force_laws(self.motion, self.y.x, self.pairs.x, self.smooth)
-
-    @cached_property
-    def controlled(self) -> set[int]:
-        """Columns called a command, by their place, whose difference from the position another one
-        follows: they command a controller, whose output that is, and not the motor."""
-        gram, at = self.pairs.gram, self.at
-        square, with_y = np.maximum(np.diag(gram), 1e-300), gram[at]
-        det = square[at] * square - with_y**2
-        det = np.where(det > 1e-9 * square[at] * square, det, np.inf)[:, None]
-        own = (square[at] * gram - with_y[:, None] * with_y) / det  # of each, in each other one
-        of_y = (square[:, None] * with_y - with_y[:, None] * gram) / det
-        share = (own * gram + of_y * with_y) / square
-        alone = np.maximum(gram**2 / square[:, None], with_y**2 / square[at]) / square
-        gains = -of_y / np.where(own == 0.0, np.inf, own)
-        like = (gains > 1.0 / LIKE_GAINS) & (gains < LIKE_GAINS)
-        found = np.any(like & (share > OF_TWO) & (alone < OF_ONE), axis=1)
-        called = (one.header.means for one in self.pairs.signals)
-        return {k for k, means in enumerate(called) if found[k] and "command" in means}
 
     def lead(self, k: int) -> Lead:
         """By how much a column is ahead of the position."""

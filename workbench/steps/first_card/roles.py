@@ -220,7 +220,7 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     if role == "F":  # beside two pressures, whose force it is like
         alike = abs(float(np.corrcoef(way.force, one.x)[0, 1]))
-        return head + 1.0 if head > 0.0 or alike > WORK_GIVES_SIGN else -3.0
+        return head + 1.0 if alike > WORK_GIVES_SIGN else -3.0
     return head - 1.0
 
 
@@ -276,9 +276,11 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
-        found = _lead_of(best) if role == "r" else None
-        known = found is None or (follows(found) and not found.either)
-        out[role] = odds if named and moves and known else min(odds, SURE - 1.0)
+        if role == "r":  # called one, or well before the position
+            found = _lead_of(best)
+            named &= column.header.purpose == "reference" or found.samples > 1.0
+            named &= follows(found) and not found.either
+        out[role] = odds if named and moves else min(odds, SURE - 1.0)
     return out
 
 

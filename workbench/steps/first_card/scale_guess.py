@@ -7,6 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import derivative, lead
+from identification.thresholds import TWICE
 from workbench.cards.units import Motion
 from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
@@ -53,8 +54,8 @@ def by_reference(
 
     if (rate := _by_velocity(columns, roles, given, motion)) is not None:
         return guess(sensible(rate, per == "turn"), "by the velocity beside it")
-    if r is not None and not is_output(r):
-        known = given.get("r")
+    known = given.get("r")
+    if r is not None and not is_output(r) and (known or not in_one_unit(y, r)):
         usual = USUAL["y" if motion == "linear" else "y rotary"]
         per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)[0]
         if abs(lead(r.x, y.x).likeness) > WELL_KNOWN:
@@ -93,6 +94,11 @@ def slow_ratio(y: Array, r: Array) -> float:
     a, b = (x[: len(x) // size * size].reshape(-1, size).mean(axis=1) for x in (y, r))
     a, b = a - a.mean(), b - b.mean()
     return float(a @ b / (b @ b))
+
+
+def in_one_unit(y: Column, r: Column) -> bool:
+    """Whether a position and its reference are of about one size, as in one unit."""
+    return 1.0 / TWICE < float(np.std(y.x) / np.std(r.x)) < TWICE
 
 
 def sensible(number: float, of_turn: bool = False) -> float:

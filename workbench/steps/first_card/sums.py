@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.signals.relations import lead
 from identification.thresholds import HALF
 from workbench.logs.times import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
+from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
 from workbench.steps.first_card.weights import said
 
@@ -30,7 +32,9 @@ def with_position(
     if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
         return None
     own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
-    return _summed(columns, [one for one in signals if not one.header.speed], own)
+    asks = [one for one in signals  # for a speed, which follows it
+            if one.header.purpose == "reference" and follows(lead(one.x, own.x))]  # fmt: skip
+    return _summed(columns, [x for x in signals if not x.header.speed and x not in asks], own)
 
 
 def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles] | None:

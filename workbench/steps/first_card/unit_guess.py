@@ -36,6 +36,7 @@ from workbench.steps.first_card.scale_guess import (
     by_reference,
     by_sample_number,
     counts_samples,
+    in_one_unit,
     sensible,
     slope_of,
     slow_ratio,
@@ -260,10 +261,9 @@ def contradicted_clock(columns: Columns, roles: Roles, units: Units) -> float | 
 
 def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
     """The reference's unit from the position's, by their ratio."""
+    if in_one_unit(roles.columns["y"], roles.columns["r"]):
+        return replace(y, why="that of the position, which follows it")
     ratio = float(np.std(roles.columns["y"].x) / np.std(roles.columns["r"].x))
-    if 0.5 < ratio < 2.0:
-        why = "that of the position, which follows it"
-        return replace(y, why=why)
     per = y.gain.partition("/")[2] if y.gain else y.unit
     of_length = USUAL["y"] if per in USUAL["y"] else USUAL["y rotary"]
     wanted = metre(y.unit, y) * ratio
@@ -273,7 +273,8 @@ def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
 
 def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
     """The unit of a signal by its own size."""
-    if name == "u" and "force" in column.header.means and not column.current:
+    means = column.header.means
+    if name == "u" and means.get("force", -1.0) >= means.get("command", 0.0) and not column.current:
         unit, why = force_unit(motion.motion), "the header speaks of a force that is asked for"
         return UnitGuess(unit, None, False, why, "V")
     if name == "u":

@@ -9,6 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, force_laws
+from workbench.cards.headers import words_of
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
 from workbench.steps.first_card.weights import (
@@ -18,6 +19,7 @@ from workbench.steps.first_card.weights import (
     LEAST_WAY,
     MIRRORED,
     RULED_OUT,
+    SAME_UNIT,
     ahead_of,
     among_derivatives,
     driving,
@@ -93,7 +95,7 @@ def ways_of(
     places = [i for i, one in enumerate(pairs.signals) if said(one, "y") >= HEADER_SAYS]
     for k, law in enumerate(laws):
         one = pairs.signals[k]
-        if one is y:
+        if one is y or _are_several(one, y):
             continue
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
@@ -113,11 +115,25 @@ def ways_of(
         yield from _chambers(seen, own)
 
 
+def _are_several(one: Column, other: Column) -> bool:
+    """Whether two columns are the same of several motors, by what a number alone tells apart."""
+    heads = one.header, other.header
+    names = [[word for word in words_of(head.name) if not word.isdigit()] for head in heads]
+    said = {"position", "force", "command"} & set(heads[0].means)
+    return bool(said) and names[0] == names[1] and heads[0].unit == heads[1].unit
+
+
 def _is_set_point(seen: Seen, k: int) -> bool:
-    """Whether a column in counts, as those of a stepper, is where the position goes."""
-    unit = seen.pairs.signals[k].header.unit
-    counts = unit is not None and unit.quantity in ("count", "position")
-    return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
+    """Whether a command is where the position goes: in counts, as those of a stepper, or in the
+    size of the position, which follows it."""
+    one = seen.pairs.signals[k]
+    unit = one.header.unit
+    if unit is not None:
+        counts = unit.quantity in ("count", "position")
+        return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
+    size = float(np.std(seen.y.x))
+    same = abs(float(np.std(one.x)) - size) < SAME_UNIT * size
+    return same and seen.lead(k).likeness > SAME_POSITION
 
 
 def _chambers(seen: Seen, own: float) -> Iterator[Way]:
@@ -184,7 +200,8 @@ def gain_of_reference(seen: Seen, k: int) -> float:
     """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
     if k not in seen.as_reference:
         one = seen.pairs.signals[k]
-        head = max(0.0, said(one, "r")) if k in seen.controlled else said(one, "r")
+        asks = "command" in one.header.means and _is_set_point(seen, k)
+        head = max(0.0 if asks else -np.inf, said(one, "r"))
         if together(seen.y, one) < 0.0 and one.header.purpose != "reference":
             head = RULED_OUT  # another axis's position, which goes with this one
         more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0

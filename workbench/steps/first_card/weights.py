@@ -66,16 +66,17 @@ LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goe
 def said(one: Column, role: str) -> float:
     """Log-odds of a role by the header, and by the few values that a column takes."""
     head = one.header
-    total = 0.0
+    asked, total = head.purpose in ("reference", "demand"), 0.0
+    share = head.unit is not None and head.unit.plain in ("%", "1")
+    by_unit = 0.0 if head.unit is None else _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
     for quantity, weight in head.means.items():
         if role in ROLES_OF[quantity]:
             total = max(total, weight if role != "r" else 0.5 * weight)
-        elif role == "u" and quantity == "force" and head.purpose in ("reference", "demand"):
-            total = max(total, 0.5 * weight)  # a force that is asked for is a command
-    if head.means and total == 0.0:
+        elif role == "u" and quantity == "force" and (asked or share):
+            total = max(total, 0.5 * weight)  # a force that is asked for, or a share of the rated
+    if head.means and total == 0.0 and (by_unit < BY_UNIT or "other" in head.means):
         total -= 0.5 + max(head.means.values())
-    if head.unit is not None:
-        total += _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
+    total += by_unit
     total += _by_purpose(one, role)
     if one.bits is not None:
         total += {"F": -6.0, "u": 1.0}.get(role, 0.0)
@@ -95,7 +96,7 @@ def _by_purpose(one: Column, role: str) -> float:
     if purpose == "measured":
         return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
-        return -1.0 if role == "u" else 0.0
+        return -2.0 if role == "u" else 0.0
     if purpose == "filtered":
         return {"r": OF_A_COPY, "y": -1.0}.get(role, 0.0)
     return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
@@ -172,15 +173,16 @@ def limits(pairs: Pairs) -> dict[int, int]:
 
 
 def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
-    """Log-odds of what drives a body by what it is of other signals: no error, no velocity, and
-    not what stands before a limiter (behind: the place of what comes out, for each)."""
+    """Log-odds of what drives a body, and is not called so, by what it is of other signals: no
+    error, no velocity, and not what stands before a limiter (behind: what comes out, for each)."""
     head = pairs.signals[k].header
-    named = max(head.means.get("force", 0.0), head.means.get("command", 0.0))
-    error = AN_ERROR if k in pairs.errors else 0.0
+    drive = head.unit is not None and head.unit.quantity in ("force", "command")
+    if drive or max(head.means.get("force", 0.0), head.means.get("command", 0.0)) >= BY_UNIT / 2:
+        return 0.0
     bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
     rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
-    error += BEFORE_LIMIT if k in behind and named < BY_UNIT / 2 else 0.0
-    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY and named < BY_UNIT / 2 else 0.0)
+    error = (AN_ERROR if k in pairs.errors else 0.0) + (BEFORE_LIMIT if k in behind else 0.0)
+    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY else 0.0)
 
 
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
@@ -233,6 +235,8 @@ def ahead_of(seen: Seen, k: int) -> float:
         return -3.0
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
+    if found.samples <= 0.3 and one.header.purpose != "reference":
+        return RULED_OUT  # another sensor of the position
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
@@ -242,7 +246,7 @@ def ahead_of(seen: Seen, k: int) -> float:
     rough /= max(y.noise / max(float(np.std(y.x)), 1e-300), 1e-300)
     score += 1.0 if rough < 1.0 else -1.0 if rough < ROUGHER else -2.0
     pair = (min(k, seen.at), max(k, seen.at))
-    if k in seen.controlled or any(pair in of for of in seen.pairs.errors.values()):
+    if any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
     return score + _named_for(seen, k)
 
