@@ -37,7 +37,8 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     rows: of the equation of motion of a motor, else of the actuator's, over all logs; rate: what a
     whole step to the next sample would add to them (r,); slowest [m/s]: of those that count. The
     value is 0 where none shows beside what the rows leave: where an effect is missing it may be
-    confounded with the command's rate, and that is no share. Ours: `README.md`, (13).
+    confounded with the command's rate, and that is no share; the deviation then holds what was
+    found. Ours: `README.md`, (13).
     """
     keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
@@ -53,8 +54,9 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
 
     apart = [share_of(theta) for theta in without_each_block(with_rate)]
     sd = float(spread_of_left_out(np.array(apart)))
-    share = significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
-    return Size(share, min(sd, UNSEEN.sd))
+    best = share_of(found.theta)
+    share = significant_share(best, sd, 1.0 - found.cost / without)
+    return Size(share, min(sd if share else float(np.hypot(sd, best)), UNSEEN.sd))
 
 
 def could_show(found: Size) -> bool:
