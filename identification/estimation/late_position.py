@@ -69,7 +69,10 @@ def what_acts_beside(
     tried: dict[float, _Run] = {}
 
     def left(samples: float) -> float:
-        """Misfit of the plain plant on the logs with that lag taken out."""
+        """Misfit of the plain plant on the logs with that lag taken out, in the units of that
+        without one."""
+        if samples and not tried:
+            left(0.0)
         if samples not in tried:
             late = replace(found, lag=Size(samples * h))
             shifted = [late.taken_out(log) for log in logs]

@@ -14,12 +14,12 @@ RIG = Rig("motor", force_per_command=1.0)
 
 
 def driven(
-    R: int, chatter: float = 0.0, ripple: float = 0.0, slow: float = 0.0
+    R: int, chatter: float = 0.0, ripple: float = 0.0, slow: float = 0.0, noise: float = 3e-7
 ) -> tuple[Log, Array]:
     """A body under a loop of R periods a sample, and its mean force over every sample.
 
     chatter [N]: of the loop, white from period to period; ripple [N]: a force along the stroke;
-    slow [N]: friction that is gone at 50 mm/s.
+    slow [N]: friction that is gone at 50 mm/s; noise [m]: of the position.
     The acceleration is constant over a period, so the motion is exact.
     """
     n, tick = round(SECONDS / H), H / R
@@ -35,7 +35,7 @@ def driven(
     F = M * np.diff(v) / tick + F_C * np.sign(middle) + F_V * middle
     F += ripple * np.sin(400.0 * y[:-1])
     F += slow * np.sign(middle) * np.exp(-np.abs(middle) / 0.01)
-    shown = y[:-1:R] + 3e-7 * np.random.default_rng(1).standard_normal(n)
+    shown = y[:-1:R] + noise * np.random.default_rng(1).standard_normal(n)
     signals = {"t": H * np.arange(n), "y": shown, "u": F[::R], "F": F[::R]}
     return Log("driven", signals), F.reshape(n, R).mean(axis=1)
 
