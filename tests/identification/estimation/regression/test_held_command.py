@@ -52,6 +52,32 @@ def test_the_share_is_that_of_the_loops_periods_in_a_sample(R: int, share: float
     assert recorded.share == pytest.approx(share, abs=0.03)
 
 
+@pytest.mark.parametrize("R", [1, 2, 4])
+def test_a_coarse_position_moves_no_share(R: int) -> None:
+    """The wide windows that it needs have a mean velocity without the bias of a smoothed one, which
+    goes with the force's rate: 0.09 of the step."""
+    recorded = recorded_logs([driven(R, noise=1e-4)[0]], RIG)
+    assert recorded.share == pytest.approx((R - 1) / (2 * R), abs=0.03)
+
+
+def test_a_share_that_is_not_significant_is_as_unsure_as_it_is_large() -> None:
+    recorded = recorded_logs([driven(16, noise=1e-3)[0]], RIG)
+    assert recorded.share == 0.0 and recorded.share_sd > 0.15
+
+
+@pytest.mark.parametrize("later", [0.03, 0.1])
+def test_positions_a_part_of_a_sample_behind_hide_no_force(later: float) -> None:
+    """As semi-implicit steps of a simulation put them: no loop is faster than the log."""
+    log = driven(1, chatter=0.5)[0]
+    y = np.asarray(log["y"])
+    moved = log.with_signals(y=y + later * np.append(np.diff(y), 0.0))
+    recorded = recorded_logs([moved], RIG)
+    assert recorded.share == pytest.approx(later, abs=0.01)
+    assert recorded.logs[0].noise.between == 0.0 and recorded.command_period is None
+    assert not recorded.may_change_between
+    assert any("behind the steps" in said for said in recorded.remarks)
+
+
 def test_slow_motion_that_friction_does_not_explain_hides_no_share() -> None:
     recorded = recorded_logs([driven(4, slow=5.0)[0]], RIG)
     assert recorded.share == pytest.approx(0.375, abs=0.03)
