@@ -72,10 +72,7 @@ def what_acts_beside(
     tried: dict[float, _Run] = {}
 
     def left(samples: float) -> float:
-        """Misfit of the plain plant on the logs with that lag taken out, in the units of that
-        without one."""
-        if samples and not tried:
-            left(0.0)
+        """Misfit of the plain plant on the logs with that lag taken out."""
         if samples not in tried:
             late = replace(found, lag=Size(samples * h))
             shifted = [late.taken_out(log) for log in logs]
@@ -109,24 +106,32 @@ def what_acts_beside(
     if best == begun or not follows(best):
         return found
     # Half a sample of lag and a loop that is far faster than the log are together none.
-    if not apart((best - tried[best].share) - (begun - tried[begun].share)):
+    if not (begun or apart(best - tried[best].share)):
         return found
     return replace(found, lag=Size(best * h, LAG_SD * h))
 
 
 def _best_lag(left: Callable[[float], float], halt: Halt, begun: float) -> float:
     """The lag in samples, by halves from one of the equation (0: none is known), that leaves least;
-    that one where the run is followed with it."""
+    that one, or one beside it, where the run is followed with it."""
     best = begun
     if left(best) <= ADEQUATE:
         return best
+
+    def better_by(step: float) -> float:
+        tried = [best - step, best + step]
+        allowed = [samples for samples in tried if samples > 0.0 and not halt.reached()]
+        return min([best, *allowed], key=left)
+
+    if begun:
+        best = better_by(NEARER[-1])
+        if left(best) <= ADEQUATE:
+            return best
     for samples in () if begun else DOUBLED:
         if not halt.reached():  # a lag near by, but not the right one, may leave more than none
             best = min(best, samples, key=left)
     for step in NEARER:
-        for samples in (best - step, best + step):
-            if samples > 0.0 and not halt.reached():
-                best = min(best, samples, key=left)
+        best = better_by(step)
     return best
 
 

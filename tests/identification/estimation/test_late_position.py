@@ -78,27 +78,6 @@ def test_a_run_that_no_lag_lets_follow_bears_none_out(
     assert not what_acts_beside([late_log(0.0)], Rig("force", motion="rotary")).lag.value
 
 
-def test_runs_with_a_lag_are_judged_in_the_units_of_that_without(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Also where the equation's lag is believed without a run: by its own noise any run follows."""
-    tried = list[bool]()
-
-    def run(*given: object) -> late_position._Run:
-        tried.append(given[3] is None)
-        return late_position._Run(20.0, plant=BODY)
-
-    lag = Surroundings(lag=Size(3.0 * H, 0.1 * H))
-    monkeypatch.setattr(late_position, "surroundings", lambda *_: lag)
-    monkeypatch.setattr(late_position, "lag_explains", lambda *_: (1.0, 0.1))
-    monkeypatch.setattr(late_position, "_run", run)
-    log = late_log(0.0)
-    what_acts_beside(
-        [log.with_signals(u=log["F"])], Rig("motor", motion="rotary", force_per_command=1.0)
-    )
-    assert len(tried) > 1 and tried[0] and not any(tried[1:])
-
-
 def test_a_lag_of_the_equation_is_refined_by_a_run_that_shows_another() -> None:
     """In a loop the position's noise draws it: 4 samples were 6."""
 
