@@ -52,7 +52,7 @@ def model_share(
     rig = model.rig
     late = [a.values["tau"] for a in plant.effects if a.effect.place.delays]
     lag = sum(late) if late or model.lag is None else used(model.lag)
-    if rig.kind == "motor":
+    if model.holds_force:
         period = model.fit.command_period  # for which a command is held
         lag += 0.5 * (records[0].h if period is None else period)
     whole = [runs[0] if len(runs) == 1 else None for runs in read] or [None] * len(records)

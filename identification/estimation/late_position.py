@@ -18,6 +18,7 @@ from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regression.equation_rows import LogNoise
 from identification.estimation.structure_fit import plain_structure
 from identification.estimation.surroundings import (
+    apart,
     explains,
     explains_most,
     lag_explains,
@@ -43,9 +44,11 @@ SEED = 0  # the lags are compared on the same draws
 
 @dataclass(frozen=True)
 class _Run:
-    """What a plant's run leaves of logs with a lag taken out; plant, noise: where without one."""
+    """What a plant's run leaves of logs with a lag taken out; share: of the command's step, by which
+    it is earlier again; plant, noise: where without one."""
 
     misfit: float
+    share: float = 0.0
     plant: Plant | None = None
     noise: tuple[LogNoise, ...] = ()
 
@@ -98,25 +101,37 @@ def what_acts_beside(
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
     if not motor or not (found.lag.value or h >= SLOW_LOG):
         return found
-    best = _best_lag(left, halt, found.lag.value / h)
-    if best == found.lag.value / h or not follows(best):
+    begun = found.lag.value / h
+    best = _best_lag(left, halt, begun)
+    if best == begun or not follows(best):
+        return found
+    # Half a sample of lag and a loop that is far faster than the log are together none.
+    if not (begun or apart(best - tried[best].share)):
         return found
     return replace(found, lag=Size(best * h, LAG_SD * h))
 
 
 def _best_lag(left: Callable[[float], float], halt: Halt, begun: float) -> float:
     """The lag in samples, by halves from one of the equation (0: none is known), that leaves least;
-    that one where the run is followed with it."""
+    that one, or one beside it, where the run is followed with it."""
     best = begun
     if left(best) <= ADEQUATE:
         return best
+
+    def better_by(step: float) -> float:
+        tried = [best - step, best + step]
+        allowed = [samples for samples in tried if samples > 0.0 and not halt.reached()]
+        return min([best, *allowed], key=left)
+
+    if begun:
+        best = better_by(NEARER[-1])
+        if left(best) <= ADEQUATE:
+            return best
     for samples in () if begun else DOUBLED:
         if not halt.reached():  # a lag near by, but not the right one, may leave more than none
             best = min(best, samples, key=left)
     for step in NEARER:
-        for samples in (best - step, best + step):
-            if samples > 0.0 and not halt.reached():
-                best = min(best, samples, key=left)
+        best = better_by(step)
     return best
 
 
@@ -133,9 +148,10 @@ def _run(logs: Sequence[Log], rig: Rig, halt: Halt | None, none: _Run | None) ->
         return _Run(np.inf)
     noise = tuple(one.noise for one in recorded.logs)
     if none is None or none.plant is None:
-        return _Run(model.misfit, model.plant, noise)
+        return _Run(model.misfit, recorded.share, model.plant, noise)
     alike = [  # few runs, not halted, of what is found already
         replace(one, noise=own, halt=Halt())
         for one, own in zip(recorded.logs, none.noise, strict=True)
     ]
-    return _Run(misfit(model.plant, alike, recorded.drive, weighed_by=none.plant))
+    left = misfit(model.plant, alike, recorded.drive, weighed_by=none.plant)
+    return _Run(left, recorded.share)

@@ -19,6 +19,7 @@ from identification.estimation.regression.held_command import (
     UNSEEN,
     between_samples,
     could_show,
+    is_faster_loop,
     period_of,
     rate_column,
     share_between,
@@ -76,7 +77,7 @@ class RecordedLogs:
         """Whether a motor drives them whose force changes between their samples, or may do so for
         all that they show; one that is held exactly does not."""
         seen = self.exact or could_show(Size(self.share, self.share_sd))
-        return self.by_motor and not (self.share == 0.0 and seen)
+        return self.by_motor and (is_faster_loop(self.share) or not seen)
 
     @property
     def by_command(self) -> bool:
@@ -197,17 +198,20 @@ def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
     if share == 0.0:
         return recorded
     means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
-    said = MinorRemark(
+    said = (
         f"the command changes between the samples of {recorded.name}, as of a loop that is faster:"
         f" taken as its mean until the next sample ({share:.2g} of the step to it)"
+        if is_faster_loop(share)
+        else f"the positions of {recorded.name} lie {share:.2g} of a sample behind the steps of its"
+        " command: taken into account"
     )
-    return replace(recorded, share=share, remarks=(*recorded.remarks, said)).of(means)
+    return replace(recorded, share=share, remarks=(*recorded.remarks, MinorRemark(said))).of(means)
 
 
 def plain_share(recorded: RecordedLogs) -> Size:
     """Share of the command's step to the next sample, as a machine without effects shows it; of a
-    motor by windows that hold reversals, where those of sliding one way could show none. Ours:
-    `regression/README.md`, (13)."""
+    motor by windows of sliding one way, or by those that may hold reversals, whose width the logs
+    choose, whichever show it better. Ours: `regression/README.md`, (13)."""
     logs, motor = recorded.logs, recorded.held
     if not (motor or recorded.by_command):
         return NOT_SHOWN
@@ -217,10 +221,11 @@ def plain_share(recorded: RecordedLogs) -> Size:
     if shown:
         rates = [rate_column(one) for one in logs]
         found = share_between(shown.rows, np.concatenate(rates), motor, shown.slowest)
-    if motor and not could_show(found):
+    if motor:
         made = settled_rows(logs)
         rates = [rate_column(one, of.windows) for one, of in zip(logs, made, strict=True)]
-        found = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)
+        other = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)
+        found = min(found, other, key=lambda one: one.sd)
     return found
 
 

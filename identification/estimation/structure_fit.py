@@ -18,6 +18,7 @@ from identification.estimation.regressed_plant import (
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.held_command import is_faster_loop
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.plant_search import searched_plant
@@ -206,7 +207,8 @@ def by_exact_force(
     leaves no more than the position's noise: what a controller makes of a noise that no signal
     shows is no error of the force. Ours."""
     noisy = recorded.by_motor and any(one.noise.F > 0.0 for one in recorded.logs)
-    if not noisy or found.imposed or found.misfit > COMPLETE or recorded.share:
+    changes = is_faster_loop(recorded.share)
+    if not noisy or found.imposed or found.misfit > COMPLETE or changes:
         return recorded, found
     exact = recorded.with_exact_force()
     again = plain_structure(exact, rng)

@@ -107,7 +107,8 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if held and lag.value:
         current = lagged_rows(moved, found.lags, turns, False, known) or found
         other = _lag(current, used, held)
-        sampled = bool(other.value) and current.least(used) < found.least(used)
+        left = current.least(used), found.least(used), found.rows / OVERLAP
+        sampled = bool(other.value) and is_likelier(*left)
         lag, found = (other, current) if sampled else (lag, found)
     h = logs[0].h
     gives = rig.force_per_command if held else None

@@ -324,6 +324,13 @@ class Model:
         return float(f"{min(entry.period or entry.h for entry in self.log):.4g}")
 
     @property
+    def holds_force(self) -> bool:
+        """Whether the applied force is constant from each sample to the next: a motor's, or a
+        measured one that the logs showed to be so."""
+        measured = self.fit.drive == "force" and self.fit.command_period is not None
+        return self.rig.kind == "motor" or measured
+
+    @property
     def by_equation(self) -> bool:
         """Whether the equation of motion was fitted alone, since no free run follows the logs."""
         return all(entry.position_rms is None for entry in self.log)

@@ -219,7 +219,8 @@ def _force_error(logs: Sequence[Log], fit: KarnoppFit, rig: Rig) -> ForceError |
     if fit.left is not None:
         return ForceError(*fit.left)
     try:
-        return force_error(logs[0], fit.friction, Smoothing(held=rig.kind == "motor"))
+        held = rig.kind == "motor" or fit.surroundings.held
+        return force_error(logs[0], fit.friction, Smoothing(held=held))
     except (NotIdentifiable, BadLog):
         return None
 

@@ -105,7 +105,7 @@ def predict(
     log = of_one_instant(with_motor_force(with_applied_force(log, model.rig), plant), model)
     body = of_body(log, plant)
     restarts = None if window is None else _restarts(body, window)
-    how = Smoothing(held=model.rig.kind == "motor")
+    how = Smoothing(held=model.holds_force)
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
     run, refused = _run(model, log, body, chosen, restarts)
@@ -323,7 +323,7 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
 def of_one_instant(log: Log, model: Model) -> Log:
     """The log with its force at the instants of its position, where its columns are apart and no
     effect of the model says so, and held between them as the model's logs showed it."""
-    held = model.fit.drive == "force" and model.fit.command_period is not None
+    held = model.holds_force and model.rig.kind != "motor"
     if "input_delay" in model.effects or (model.lag is None and not held):
         return log
     drive = model.simulated.actuator

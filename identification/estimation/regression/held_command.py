@@ -6,6 +6,7 @@ share of the step to the next, (R - 1) / (2 R) for R periods a sample, less a pa
 command bends. The share is a coefficient in the equation of motion of a motor, whose force the
 command is, and in that of an actuator. What the
 loop adds from period to period (its encoder's counts) no log shows: it is noise of a motor's force.
+A share that no loop makes shifts the instants alone, and hides nothing.
 """
 
 from dataclasses import replace
@@ -23,7 +24,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Log
 from identification.model.size import NOT_SHOWN, Size
 from identification.signals.weak_form import WeakWindows
-from identification.thresholds import BEYOND_CHANCE, MATERIAL
+from identification.thresholds import BEYOND_CHANCE, FAR_LESS, MATERIAL
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
 UNSEEN = Size(0.0, LARGEST_SHARE / 3.0**0.5)  # any share up to that one, where no rows show it
@@ -37,7 +38,8 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     rows: of the equation of motion of a motor, else of the actuator's, over all logs; rate: what a
     whole step to the next sample would add to them (r,); slowest [m/s]: of those that count. The
     value is 0 where none shows beside what the rows leave: where an effect is missing it may be
-    confounded with the command's rate, and that is no share. Ours: `README.md`, (13).
+    confounded with the command's rate, and that is no share; the deviation then holds what was
+    found. Ours: `README.md`, (13).
     """
     keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
@@ -53,13 +55,21 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
 
     apart = [share_of(theta) for theta in without_each_block(with_rate)]
     sd = float(spread_of_left_out(np.array(apart)))
-    share = significant_share(share_of(found.theta), sd, 1.0 - found.cost / without)
-    return Size(share, min(sd, UNSEEN.sd))
+    best = share_of(found.theta)
+    share = significant_share(best, sd, 1.0 - found.cost / without)
+    return Size(share, min(sd if share else float(np.hypot(sd, best)), UNSEEN.sd))
 
 
 def could_show(found: Size) -> bool:
     """Whether rows that leave a share so unsure could show the largest one."""
     return found.sd * BEYOND_CHANCE <= LARGEST_SHARE
+
+
+def is_faster_loop(share: float) -> bool:
+    """Whether a share is that of a loop with further commands between the samples; far less of a
+    step is by how much a drive, or the steps of a simulation, move the instants at which a command
+    acts: then the log has all of it."""
+    return share > FAR_LESS * LARGEST_SHARE
 
 
 def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
@@ -107,7 +117,7 @@ def _mean_until_next(share: float) -> Array:
 
     Of a parabola: the mean of s (s - 1) / 2 over the R periods is -share (1 - share) / 3.
     """
-    bend = share * (1.0 - share) / 6.0
+    bend = share * (1.0 - share) / 6.0 if is_faster_loop(share) else 0.0
     return np.array([-bend, share + bend, 1.0 - share + bend, -bend])
 
 
@@ -117,7 +127,7 @@ def period_of(share: float, h: float) -> float | None:
     None where nothing shows that this is sooner than the next sample. R periods a sample make a
     share of (R - 1) / (2 R).
     """
-    return h * (1.0 - 2.0 * share) if share > 0.0 else None
+    return h * (1.0 - 2.0 * share) if is_faster_loop(share) else None
 
 
 def with_period(log: Log, period: float | None, held: bool) -> Log:
@@ -133,7 +143,7 @@ def unseen(log: Log, share: float) -> float:
     A white part of every period's force is in the mean of R of them, of which the log has had one;
     what a stop or start adds counts with it, since no parabola through the samples knows it. Ours.
     """
-    if share == 0.0:
+    if not is_faster_loop(share):
         return 0.0
     kernel = _mean_until_next(share)
     means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), kernel)

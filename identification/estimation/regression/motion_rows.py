@@ -136,10 +136,13 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
     w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
     over, up, down = w.first @ y, v > 0.0, v < 0.0
-    X = np.column_stack(
-        [w.second @ y, w.mean @ (1.0 * up), -(w.mean @ (1.0 * down)), w.mean @ (v * up),
-         w.mean @ (v * down)]
-    )  # fmt: skip
+    ways = np.column_stack([w.mean @ (1.0 * way) for way in (up, down)])
+    speeds = np.column_stack([w.mean @ (v * way) for way in (up, down)])
+    # The smoothed velocity parts the ways; how far a window moves is its own, which no smoothing
+    # bends: what that leaves out goes with jerk, as a lag of the force does.
+    off = (over - np.sum(speeds, axis=1)) / np.sum(ways, axis=1)
+    speeds += off[:, np.newaxis] * ways
+    X = np.column_stack([w.second @ y, ways * (1.0, -1.0), speeds])
     names: tuple[str, ...] = FIVE
     if gravity:
         X = np.column_stack([X, w.mean @ np.sin(y), w.mean @ np.cos(y)])

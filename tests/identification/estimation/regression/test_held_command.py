@@ -14,12 +14,12 @@ RIG = Rig("motor", force_per_command=1.0)
 
 
 def driven(
-    R: int, chatter: float = 0.0, ripple: float = 0.0, slow: float = 0.0
+    R: int, chatter: float = 0.0, ripple: float = 0.0, slow: float = 0.0, noise: float = 3e-7
 ) -> tuple[Log, Array]:
     """A body under a loop of R periods a sample, and its mean force over every sample.
 
     chatter [N]: of the loop, white from period to period; ripple [N]: a force along the stroke;
-    slow [N]: friction that is gone at 50 mm/s.
+    slow [N]: friction that is gone at 50 mm/s; noise [m]: of the position.
     The acceleration is constant over a period, so the motion is exact.
     """
     n, tick = round(SECONDS / H), H / R
@@ -35,7 +35,7 @@ def driven(
     F = M * np.diff(v) / tick + F_C * np.sign(middle) + F_V * middle
     F += ripple * np.sin(400.0 * y[:-1])
     F += slow * np.sign(middle) * np.exp(-np.abs(middle) / 0.01)
-    shown = y[:-1:R] + 3e-7 * np.random.default_rng(1).standard_normal(n)
+    shown = y[:-1:R] + noise * np.random.default_rng(1).standard_normal(n)
     signals = {"t": H * np.arange(n), "y": shown, "u": F[::R], "F": F[::R]}
     return Log("driven", signals), F.reshape(n, R).mean(axis=1)
 
@@ -50,6 +50,32 @@ def smooth(log: Log) -> BoolArray:
 def test_the_share_is_that_of_the_loops_periods_in_a_sample(R: int, share: float) -> None:
     recorded = recorded_logs([driven(R)[0]], RIG)
     assert recorded.share == pytest.approx(share, abs=0.03)
+
+
+@pytest.mark.parametrize("R", [1, 2, 4])
+def test_a_coarse_position_moves_no_share(R: int) -> None:
+    """The wide windows that it needs have a mean velocity without the bias of a smoothed one, which
+    goes with the force's rate: 0.09 of the step."""
+    recorded = recorded_logs([driven(R, noise=1e-4)[0]], RIG)
+    assert recorded.share == pytest.approx((R - 1) / (2 * R), abs=0.03)
+
+
+def test_a_share_that_is_not_significant_is_as_unsure_as_it_is_large() -> None:
+    recorded = recorded_logs([driven(16, noise=1e-3)[0]], RIG)
+    assert recorded.share == 0.0 and recorded.share_sd > 0.15
+
+
+@pytest.mark.parametrize("later", [0.03, 0.1])
+def test_positions_a_part_of_a_sample_behind_hide_no_force(later: float) -> None:
+    """As semi-implicit steps of a simulation put them: no loop is faster than the log."""
+    log = driven(1, chatter=0.5)[0]
+    y = np.asarray(log["y"])
+    moved = log.with_signals(y=y + later * np.append(np.diff(y), 0.0))
+    recorded = recorded_logs([moved], RIG)
+    assert recorded.share == pytest.approx(later, abs=0.01)
+    assert recorded.logs[0].noise.between == 0.0 and recorded.command_period is None
+    assert not recorded.may_change_between
+    assert any("behind the steps" in said for said in recorded.remarks)
 
 
 def test_slow_motion_that_friction_does_not_explain_hides_no_share() -> None:
