@@ -44,8 +44,8 @@ SEED = 0  # the lags are compared on the same draws
 
 @dataclass(frozen=True)
 class _Run:
-    """What a plant's run leaves of logs with a lag taken out; share: of the command's step, by which
-    it is earlier again; plant, noise: where without one."""
+    """What a plant's run leaves of logs with a lag taken out; share: of the step of the command, by
+    which it is earlier again; plant, noise: where without one."""
 
     misfit: float
     share: float = 0.0
