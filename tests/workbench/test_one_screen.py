@@ -383,7 +383,7 @@ def test_a_registry_of_many_machines_and_versions(
 
 def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.chain import CARD
-    from workbench.documents.design_file import design_document
+    from workbench.documents.result_files import design_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)
@@ -399,7 +399,7 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear
-    from workbench.documents.model_file import model_document
+    from workbench.documents.result_files import model_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)

@@ -167,7 +167,7 @@ def _refuse_beside(given: DesignOptions) -> None:
 
 
 def _robust(given: DesignOptions, model: "Model") -> int:
-    from workbench.documents.design_file import design_document
+    from workbench.documents.result_files import design_document
     from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
 

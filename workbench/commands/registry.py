@@ -132,9 +132,8 @@ def add(
     version.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design_file import read_design
-    from workbench.documents.model_file import read_model
     from workbench.documents.reading import read_document, read_raw
+    from workbench.documents.result_files import read_design, read_model
     from workbench.registry.values import Candidate
 
     remarks = list(read_model(model_file, library(effects)).read)

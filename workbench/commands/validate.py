@@ -30,7 +30,7 @@ def command(
 
     Writes validation.json and report.html.
     """
-    from workbench.documents.design_file import read_design
+    from workbench.documents.result_files import read_design
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model

@@ -18,8 +18,8 @@ import numpy as np
 from identification.errors import BadLog, BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from workbench.cards.against_header import contradicted_units
 from workbench.cards.card_tables import SignalSpec
+from workbench.cards.headers import contradicted_units
 from workbench.documents.model import LogEntry, Model
 
 Slips = tuple[tuple[float, str], ...]

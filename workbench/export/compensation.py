@@ -21,8 +21,7 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.readable import Unit, number, shown_unit, units_of
 from workbench.documents.model import Model
-from workbench.export.exported import identifier
-from workbench.export.filled import filled
+from workbench.export.exported import filled, identifier
 
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]

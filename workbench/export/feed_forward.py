@@ -18,9 +18,9 @@ from workbench.export.compensation import (
     Format,
     friction_costs,
 )
-from workbench.export.filled import rows
-from workbench.export.friction_formats import both_ways
+from workbench.export.exported import rows
 from workbench.export.structured_text import st_syntax
+from workbench.export.table_formats import both_ways
 
 FEED_FORWARD_POINTS = 20  # of the friction curve, each way
 

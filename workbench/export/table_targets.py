@@ -12,8 +12,6 @@ import numpy as np
 from identification.errors import BadModel
 from workbench.cards.readable import number
 from workbench.cards.units import in_unit_of
-from workbench.export.backlash_formats import BACKLASH
-from workbench.export.cogging_formats import COGGING, NO_COGGING_TABLE
 from workbench.export.compensation import (
     Compensation,
     Cost,
@@ -23,7 +21,13 @@ from workbench.export.compensation import (
     TablesAsked,
 )
 from workbench.export.feed_forward import FEED_FORWARD_FILES
-from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE
+from workbench.export.table_formats import (
+    BACKLASH,
+    COGGING,
+    FRICTION,
+    NO_COGGING_TABLE,
+    NO_FRICTION_TABLE,
+)
 from workbench.output import written
 from workbench.screen import Screen, instead, listed, more, screen, tabled
 

@@ -13,8 +13,8 @@ import numpy as np
 from identification.errors import BadModel
 from workbench.course import running, working
 from workbench.documents.design import Design
-from workbench.documents.design_file import read_design
 from workbench.documents.model import Model
+from workbench.documents.result_files import read_design
 from workbench.interface.inputs import PathLike
 from workbench.interface.models import ModelLike, TraceResult, model_of
 from workbench.interface.result import Result

@@ -15,7 +15,7 @@ from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.course import running
 from workbench.documents.model import Model
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.interface.inputs import (
     CardLike,
     Logs,

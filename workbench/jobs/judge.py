@@ -10,10 +10,14 @@ from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
 from workbench.cards.own_effects import library as installed
-from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model
-from workbench.documents.model_file import model_document, read_model
 from workbench.documents.reading import Stored
+from workbench.documents.result_files import (
+    design_document,
+    model_document,
+    read_design,
+    read_model,
+)
 from workbench.jobs.challenge import Contender, Terms, challenge
 from workbench.jobs.drift_by_chart import Drift, DriftJudge, drift_by_chart
 from workbench.jobs.passes import Task

@@ -14,8 +14,8 @@ import numpy as np
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from workbench.cards.own_effects import library
 from workbench.course import Course, moving
-from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
+from workbench.documents.result_files import design_document
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE

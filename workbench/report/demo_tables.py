@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import number, shown_unit
+from workbench.cards.readable import number, shown, shown_unit
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import estimate_cells, not_identified

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table

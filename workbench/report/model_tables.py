@@ -9,8 +9,7 @@ from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import as_shown, in_digits, length, number, times
+from workbench.cards.readable import as_shown, in_digits, length, number, shown, times
 from workbench.documents.model import Model, used
 from workbench.documents.velocity import VelocityModel
 from workbench.output import Row

@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from workbench.cards.readable import length, number, units_of
-from workbench.documents.design_file import design_document
+from workbench.documents.result_files import design_document
 from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust

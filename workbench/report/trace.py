@@ -10,9 +10,8 @@ from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
 from identification.tracing.result import FoundEffect, Trace
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import as_shown, in_digits, number, shown_unit, small, units_of
-from workbench.documents.model_file import model_document
+from workbench.cards.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
+from workbench.documents.result_files import model_document
 from workbench.output import Row
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart

@@ -8,8 +8,7 @@ import numpy as np
 
 from design.loop import LoopRun
 from identification.arrays import Array
-from workbench.cards.parameter_units import Shown, shown
-from workbench.cards.readable import length, number, units_of
+from workbench.cards.readable import Shown, length, number, shown, units_of
 from workbench.ending import step
 from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel

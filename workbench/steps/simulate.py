@@ -23,12 +23,12 @@ from identification.simulation.free_run import FreeRun, free_run
 from workbench.cards.card import Card
 from workbench.cards.controller import CardController
 from workbench.cards.effect_values import exact
-from workbench.cards.parameter_units import friction_units
+from workbench.cards.readable import friction_units
 from workbench.cards.recipe import Recipe
 from workbench.documents.codec import written
 from workbench.documents.drive import Present
-from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
+from workbench.documents.result_files import around_of
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop
 from workbench.steps.predict import lacking_signals

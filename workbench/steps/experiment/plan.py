@@ -24,7 +24,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.progress import KeepGoing, Progress
 from workbench.cards.effect_values import known_effect
-from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import Shown, shown
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.documents.reading import versions
