@@ -32,10 +32,10 @@ from workbench.documents.model import Model
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
 from workbench.report.demo_tables import demo_view
+from workbench.report.doctor import installation_view
 from workbench.report.drift import drift_view
 from workbench.report.experiment import experiment_view
 from workbench.report.first_card import proposal_view
-from workbench.report.installation import installation_view
 from workbench.report.prediction import prediction_view
 from workbench.report.reports import design_view, identified_view
 from workbench.report.response import response_view

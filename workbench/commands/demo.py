@@ -8,7 +8,7 @@ from workbench import options
 from workbench.course import running
 from workbench.output import emit, results
 from workbench.signature import option
-from workbench.steps.stages import TRACE_STAGES
+from workbench.steps.asked import TRACE_STAGES
 
 RECIPE = "demo"
 DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.items()}

@@ -76,7 +76,7 @@ def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
 def _installation(where: str | None) -> int:
     from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
-    from workbench.report.installation import installation_view
+    from workbench.report.doctor import installation_view
     from workbench.steps.installation import check_installation
 
     found = check_installation()

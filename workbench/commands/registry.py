@@ -94,7 +94,7 @@ def diff(
     FIRST: by default the version before SECOND; SECOND: by default the active one.
     """
     from workbench.registry.difference import difference
-    from workbench.registry.errors import BadRegistry
+    from workbench.registry.values import BadRegistry
     from workbench.registry.views import difference_view
 
     with opened(where) as found:
@@ -219,7 +219,7 @@ def opened(where: str | None, *, create: bool = False) -> "Registry":
 
 def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     """The version of that number, by default the active one."""
-    from workbench.registry.errors import BadRegistry
+    from workbench.registry.values import BadRegistry
 
     found.machine(machine)
     version = found.active_version(machine) if number is None else found.version(machine, number)

@@ -35,6 +35,7 @@ from workbench.report.prediction import prediction_view
 from workbench.report.response import response_view
 from workbench.report.templating import render
 from workbench.report.view import View
+from workbench.steps.asked import IDENTIFY_STAGES
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.axis_test import axis_test as test_of_axis
 from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, write_stream
@@ -49,7 +50,6 @@ from workbench.steps.response import (
     response_frame,
 )  # fmt: skip
 from workbench.steps.simulate import as_columns, record, truth
-from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
     import pandas as pd

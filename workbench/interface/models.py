@@ -29,9 +29,9 @@ from workbench.interface.result import Result
 from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
 from workbench.report.view import View
+from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.identify import Options
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import Traced, named_logs, trace_sources
 
 if TYPE_CHECKING:

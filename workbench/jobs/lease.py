@@ -10,7 +10,7 @@ from typing import ParamSpec, TypeVar
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
 
 from workbench.registry.database import Database
-from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.values import LostClaim, RegistryAway
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -17,10 +17,17 @@ from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import SHARE, Clock, Patience, renewed
 from workbench.jobs.options import JobOptions, is_gone
 from workbench.jobs.scan import BadRoot, MachineFolder, Scan, machine_folders, scan, unchanged
-from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
+from workbench.registry.values import (
+    Claim,
+    Judgement,
+    LogOutcome,
+    LostClaim,
+    RegistryAway,
+    SeenLog,
+    Version,
+)
 
 MOST_ATTEMPTS = 20  # times that a log is begun without a result, after which it is excluded
 OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)

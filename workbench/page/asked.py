@@ -17,9 +17,8 @@ from workbench.page.settings import PageSettings
 from workbench.registry.access import note
 from workbench.registry.bench import Bench
 from workbench.registry.database import Database
-from workbench.registry.errors import BadRegistry
 from workbench.registry.store import Registry
-from workbench.registry.values import Role
+from workbench.registry.values import BadRegistry, Role
 
 ANYBODY = ""
 LONGEST_REASON = 500

@@ -30,9 +30,9 @@ from workbench.report.model_tables import (
 from workbench.report.reports import identified_view
 from workbench.report.trace import errors_table, logs_of_trace, traced_view
 from workbench.report.view import View, report_notes
+from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import trace_sources
 from workbench.steps.validate import validate, validation_document
 

@@ -22,9 +22,9 @@ from workbench.page.dropped import LOG_FOLDER, Drop, without_path
 from workbench.page.settings import PageSettings
 from workbench.page.task_work import Work, course_of, done
 from workbench.registry.bench import Bench, EndState
-from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.store import Registry
 from workbench.registry.tables import TaskRow
+from workbench.registry.values import LostClaim, RegistryAway
 
 TASK_LEASE = timedelta(seconds=30)
 QUEUE_POLL = 0.5  # s between two looks at the queue, and at whether the task is still ours
