@@ -30,7 +30,6 @@ from workbench.screen import (
     listed,
     screen,
 )  # fmt: skip
-from workbench.screen import Row as Row
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -6,7 +6,7 @@ from typing import Any
 
 from identification.model.estimates import Estimate
 from workbench.cards.readable import number, shown, shown_unit
-from workbench.output import Row, next_step, written
+from workbench.output import next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import estimate_cells, not_identified
 from workbench.report.trace import errors_table, logs_of_trace
@@ -19,7 +19,7 @@ from workbench.report.validation import (
     validation_table,
 )
 from workbench.report.view import notes
-from workbench.screen import Part, Screen, listed, more, screen, tabled
+from workbench.screen import Part, Row, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
 from workbench.steps.loop_figures import PRESENT, LoopFigures
 from workbench.steps.recommend import called

@@ -10,12 +10,11 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.readable import Shown, length, number, shown, units_of
 from workbench.ending import step
-from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
 from workbench.report.design_tables import of_the_model
 from workbench.report.next_steps import as_code
 from workbench.report.view import Section, View, notes
-from workbench.screen import Part, listed, more, tabled
+from workbench.screen import Part, Row, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
 from workbench.steps.loop_motion import worst_rest
 from workbench.steps.recommend import (
