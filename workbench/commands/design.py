@@ -89,8 +89,8 @@ def command(given: DesignOptions) -> int:
     """
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.models import load_model
+    from workbench.steps.closed_loop import with_card
     from workbench.steps.elastic import with_response
-    from workbench.steps.present import with_card
 
     if is_velocity_model(given.model_file):
         options.refuse_for_velocity(*NOT_FOR_VELOCITY)

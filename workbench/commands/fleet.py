@@ -148,7 +148,7 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
 def _recorder(where: str | None) -> "Iterator[InRegistry | None]":
     """The registry at `where`, "": the default one, None: none."""
     from workbench.fleet.run import InRegistry
-    from workbench.jobs.lease import Patience
+    from workbench.jobs.passes import Patience
     from workbench.registry.database import location
     from workbench.registry.store import Registry
 

@@ -35,7 +35,7 @@ def command(
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate, as_code
-    from workbench.steps.present import with_card
+    from workbench.steps.closed_loop import with_card
 
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")

@@ -16,7 +16,7 @@ from workbench.fleet.finding import card_text
 from workbench.fleet.store import ResultStore
 from workbench.fleet.values import GOOD, BadCluster, BadLogs, Item, LogFile, Result
 from workbench.fleet.work import work as default_work
-from workbench.jobs.lease import Clock, Patience
+from workbench.jobs.passes import Clock, Patience
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import LostClaim, SeenLog

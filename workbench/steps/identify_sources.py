@@ -14,10 +14,10 @@ from workbench.documents.model import Model
 from workbench.documents.plausible import model_remarks
 from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
+from workbench.steps.closed_loop import present_of_card
 from workbench.steps.hardly_identifiable import braked_by_its_voltage
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify
-from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 from workbench.steps.velocity import looks_like_velocity
 

@@ -32,7 +32,7 @@ from workbench.fleet.run import (
 )
 from workbench.fleet.store import RESULTS_FOLDER, ResultStore
 from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
-from workbench.jobs.lease import Patience
+from workbench.jobs.passes import Patience
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import RegistryAway

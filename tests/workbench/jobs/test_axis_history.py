@@ -14,7 +14,7 @@ from tests.chain import TABLES, model_of, short_recipe
 from workbench.cards.effect_values import written_effect
 from workbench.documents.result_files import model_document
 from workbench.jobs.axis_history import by_quantity, earlier_of
-from workbench.jobs.drift_by_chart import Reading
+from workbench.jobs.judge import Reading
 from workbench.logs.sources import Source, Sources
 from workbench.output import strict
 from workbench.registry.queue import Queue
