@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import step
-from workbench.output import emit, progress, results
+from workbench.output import emit, progress, results, step
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import Step, step
 from workbench.jobs.options import clock, worker_name
-from workbench.output import dumps, emit, progress
+from workbench.output import Step, dumps, emit, progress, step
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:

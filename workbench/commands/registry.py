@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import StatusGroup
 from workbench.jobs.options import clock
 from workbench.output import emit, results
 from workbench.signature import argument, option
@@ -31,7 +30,7 @@ BY_OPTION = option("Who decides.  [default: you]", **YOU)
 REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 
 
-@click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
+@click.group(cls=options.StatusGroup, epilog="Example: workbench registry show bench-a --json")
 def command() -> None:
     """Models and designs of machines, append-only, with one active version each.
 

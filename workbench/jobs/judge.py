@@ -1,6 +1,7 @@
 """What a worker makes of a log: drift test, then the chain anew, or the trace, and the contest.
 
-The test's state goes from log to log in the registry, with each log's result."""
+The test's state goes from log to log in the registry, with each log's result.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace

@@ -2,7 +2,8 @@
 
 A pass looks for complete files, notes their fingerprints, and claims one machine after the other;
 the claim is kept alive while a worker is busy. Whatever it dies of, a log either has its result,
-with all that belongs to it, or waits for the next pass."""
+with all that belongs to it, or waits for the next pass.
+"""
 
 import errno
 import threading

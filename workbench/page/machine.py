@@ -19,9 +19,8 @@ from identification.errors import UserError
 from workbench.cards.readable import shown_unit
 from workbench.jobs.options import clock
 from workbench.page import looks
-from workbench.page.asked import Asked, download
+from workbench.page.asked import STATE_WORDS, Asked, download, part
 from workbench.page.looks import EXPORTS
-from workbench.page.pages import STATE_WORDS, part
 from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access

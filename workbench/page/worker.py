@@ -2,7 +2,8 @@
 
 It may be killed at any moment: its lease ends, and another begins the task anew. What it makes of a
 dropped log are a model, its design and validation, and how to see them: the files are those of the
-commands; `result.json` holds what the page shows beside them."""
+commands; `result.json` holds what the page shows beside them.
+"""
 
 import os
 import signal

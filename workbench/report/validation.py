@@ -9,7 +9,7 @@ import numpy as np
 from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.readable import Shown, length, number, shown, units_of
-from workbench.ending import step
+from workbench.output import step
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
 from workbench.report.design_tables import of_the_model
 from workbench.report.next_steps import as_code

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from tests.workbench.page.conftest import NOW, Page
+from workbench.page.asked import spark
 from workbench.page.dropped import ENDINGS, Drop, file_name
 from workbench.page.guard import FORM_BYTES
-from workbench.page.pages import spark
 from workbench.page.visitors import CHANGES, TOKEN_COOKIE, WRONG_TRIES, Limiter, csrf_of
 from workbench.registry.access import Access, hashed
 from workbench.registry.store import Registry
