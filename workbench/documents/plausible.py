@@ -62,9 +62,8 @@ ROTARY: Mapping[str, Size] = {
     "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
 }
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
-_OTHER_UNIT = (
-    200.0  # times another log's clock or travel: a slip of 1000, and motions alike in part
-)
+# Times another log's clock or travel: a slip of 1000, and motions alike in part.
+_OTHER_UNIT = 200.0
 _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
 

@@ -62,26 +62,6 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class TableFile:
-    """A file for a control ("" for any), as text; units: in words; where: it is to go.
-
-    error: largest deviation from the model over the table's range, relative; None where it has no
-    range. costs: what it leaves uncompensated. remarks: what to know, a line each.
-    """
-
-    name: str
-    text: str
-    table: Table
-    control: Control | Literal[""]
-    units: str
-    where: str
-    points: int
-    error: float | None = None
-    costs: tuple[Cost, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Compensation:
     """A model, and what was asked of its tables."""
 
@@ -248,8 +228,12 @@ class Compensation:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file of a control holds: values of its template, and of `TableFile` what hangs on the
-    model; said: remarks that stand beside the file alone."""
+    """What a file of a control holds; units: in words; values: of its template.
+
+    error: largest deviation from the model over the table's range, relative; None where it has no
+    range. costs: what it leaves uncompensated. remarks: what to know, a line each; said: those that
+    stand beside the file alone.
+    """
 
     units: str
     points: int = 1
@@ -258,6 +242,17 @@ class Content:
     costs: tuple[Cost, ...] = ()
     remarks: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableFile(Content):
+    """A file for a control ("" for any), as text; where: it is to go; remarks: all of them."""
+
+    name: str
+    text: str
+    table: Table
+    control: Control | Literal[""]
+    where: str
 
 
 @dataclass(frozen=True)
@@ -275,10 +270,10 @@ class Format:
         made = self.content(what)
         costs = [one.in_words(what.force_unit) for one in made.costs]
         lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}
+        whole = {**vars(made), "remarks": (*made.said, *made.remarks)}
         return TableFile(
-            f"{what.name}_{self.file}", filled(self.file, **{**lead, **made.values}), self.table,
-            self.control, made.units, self.where, made.points, made.error, made.costs,
-            (*made.said, *made.remarks),
+            name=f"{what.name}_{self.file}", text=filled(self.file, **{**lead, **made.values}),
+            table=self.table, control=self.control, where=self.where, **whole,
         )  # fmt: skip
 
 

@@ -22,10 +22,8 @@ from workbench.documents.reading import plain, read_raw
 from workbench.steps.asked import Wanted as Wanted
 
 Criterion = Literal["D", "T"]
-FASTER_THAN_LOGS = (
-    1.5  # times the speed of the logs, that an experiment goes where no limit is given
-)
-STRONGER_THAN_LOGS = 1.2  # the same of the force
+# Times the speed and the force of the logs, that an experiment goes to where no limit is given.
+FASTER_THAN_LOGS, STRONGER_THAN_LOGS = 1.5, 1.2
 SAID_EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
 
 
