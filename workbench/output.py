@@ -118,6 +118,16 @@ class BadOutput(UserError):
     """A place where results cannot be written."""
 
 
+class MissingLibrary(UserError):
+    """A library that an extra brings is not installed."""
+
+    def __init__(self, what: str, library: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs the library {library!r}, which is not installed; run"
+            f" pip install 'servo-workbench[{extra}]'"
+        )
+
+
 class OutputFolder:
     """Results that appear whole when the `with` block ends, or not at all where it raises.
 

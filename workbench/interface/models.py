@@ -17,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-from identification.errors import BadCard, BadModel, UserError
+from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.course import running
@@ -32,7 +32,7 @@ from workbench.interface.inputs import (
     effects_of,
     sources,
 )
-from workbench.output import OutputFolder, dumps
+from workbench.output import MissingLibrary, OutputFolder, dumps
 from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
 from workbench.report.view import View
@@ -90,10 +90,6 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         return self.view.html()
-
-
-class MissingLibrary(UserError):
-    """A library that an extra brings is not installed."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -205,10 +201,7 @@ def _arviz() -> Any:
             warnings.simplefilter("ignore")
             return importlib.import_module("arviz")
     except ModuleNotFoundError:
-        raise MissingLibrary(
-            "to_arviz needs the library 'arviz', which is not installed; run"
-            " pip install 'servo-workbench[arviz]'"
-        ) from None
+        raise MissingLibrary("to_arviz", "arviz", "arviz") from None
 
 
 ModelLike: TypeAlias = IdentifyResult | TraceResult | Model | PathLike
