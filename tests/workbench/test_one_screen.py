@@ -31,7 +31,6 @@ from workbench.documents.design import Recommendation
 from workbench.documents.model import Model
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
-from workbench.report.demo_tables import demo_view
 from workbench.report.doctor import installation_view
 from workbench.report.drift import drift_view
 from workbench.report.experiment import experiment_view
@@ -42,7 +41,7 @@ from workbench.report.response import response_view
 from workbench.report.robust import robust_view
 from workbench.report.trace import traced_view
 from workbench.report.trace_words import words
-from workbench.report.validation import validation_view
+from workbench.report.validation import demo_view, validation_view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.drift import Drifted

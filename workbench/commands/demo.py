@@ -34,11 +34,10 @@ def command(
     """
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path
-    from workbench.report.demo_tables import demo_view
     from workbench.report.next_steps import after_demo
     from workbench.report.reports import design_view
     from workbench.report.trace import traced_view
-    from workbench.report.validation import missed, validation_view
+    from workbench.report.validation import demo_view, missed, validation_view
     from workbench.steps.demo import demonstrate
     from workbench.steps.kernels_ahead import fits_compiled_ahead
 
