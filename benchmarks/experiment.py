@@ -52,10 +52,10 @@ from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
+from workbench.steps.closed_loop import present
 from workbench.steps.experiment.plan import experiment
 from workbench.steps.experiment.planned import Experiment, Wanted
 from workbench.steps.identify import identify
-from workbench.steps.present import present
 
 POOR, WORSE = 6.0, 10.0  # s of the poor log, and times its noise
 KEPT = 1.5

@@ -32,9 +32,8 @@ from benchmarks.experiment import model_of, poor_log
 from identification.errors import UserError
 from identification.model.plant import Actuator, Plant
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import DrivenLoop, driven_loop, present_loop
+from workbench.steps.closed_loop import DrivenLoop, driven_loop, in_loop, present_loop
 from workbench.steps.design import design
-from workbench.steps.drawn import in_loop
 from workbench.steps.loop_figures import PRESENT
 from workbench.steps.robust.outcomes import DrawnMachines, Outcomes, limits_by_name, outcomes
 from workbench.steps.robust.robust import (

@@ -12,7 +12,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from identification.errors import NotIdentifiable, UserError
-from workbench.ending import BAD_INPUT, DONE, FAULT, REFUSAL, Refused, Step, step, write_status
+from workbench.options import BAD_INPUT, DONE, FAULT, REFUSAL, write_status
+from workbench.output import Refused, Step, step
 from workbench.termination import Terminated, raised_on_a_signal
 from workbench.threads import one_thread_by_default
 

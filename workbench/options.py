@@ -1,4 +1,5 @@
-"""Option texts into values; each wrong one is a usage error that names what is needed."""
+"""Option texts into values; each wrong one is a usage error that names what is needed. And a
+command's exit status, which its help gives."""
 
 import cmath
 import math
@@ -10,12 +11,44 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from workbench.ending import StatusCommand
 from workbench.files import shipped_cards
 from workbench.screen import shared_options
 from workbench.signature import argument, by_signature, option
 
+DONE = "done"
+REFUSAL = "done, and the answer is a refusal or an alarm; it ends with the next command"
+BAD_INPUT = "bad input: one line says what was found, where, what is needed, what to do"
+FAULT = "a fault of ours; --debug shows where"
 EVENTS = "Accepted as everywhere; events are JSON."  # --json of commands that report events
+
+
+class StatusCommand(click.Command):
+    """A command whose help ends with its exit status; refusal: what 1 means, "" where it has none.
+
+    done: what 0 means.
+    """
+
+    def __init__(self, *given: Any, refusal: str = "", done: str = DONE, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self.refusal, self.done = refusal, done
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The exit status, then the example."""
+        rows = [("0", self.done), ("1", self.refusal), ("2", BAD_INPUT), ("3", FAULT)]
+        write_status(formatter, [row for row in rows if row[1]])
+        super().format_epilog(ctx, formatter)
+
+
+class StatusGroup(click.Group):
+    """A command of several; each of them gives its exit status."""
+
+    command_class = StatusCommand
+
+
+def write_status(formatter: click.HelpFormatter, rows: list[tuple[str, str]]) -> None:
+    """The section of a help page on the exit status."""
+    with formatter.section("Exit status"):
+        formatter.write_dl(rows)
 
 
 def command(

@@ -1,4 +1,5 @@
-"""What every command writes and shows: folders written whole, strict JSON, a screen, progress."""
+"""What every command writes and shows: folders written whole, strict JSON, a screen, progress, and
+the command to type next."""
 
 import errno
 import itertools
@@ -6,6 +7,7 @@ import json
 import math
 import os
 import secrets
+import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,13 +15,13 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from functools import cache
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import click
 
-from identification.errors import UserError
-from workbench.ending import Step, refused_with
+from identification.errors import NotIdentifiable, UserError
 from workbench.screen import (
     JSON,
     SCREEN_LINES,
@@ -30,12 +32,77 @@ from workbench.screen import (
     listed,
     screen,
 )  # fmt: skip
-from workbench.screen import Row as Row
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+TAKES_EFFECTS = ("trace", "predict", "design", "validate", "experiment", "drift", "response")
 MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
+
+
+class Step(NamedTuple):
+    """A command line to type next, and why."""
+
+    why: str
+    command: str
+
+    def __str__(self) -> str:
+        return f"next ({self.why}): {self.command}"
+
+    def lines(self, width: int, most: int | None = None) -> list[str]:
+        """The step in lines of so many columns, that a shell takes as they stand.
+
+        A word is never broken, so that a long path may stick out. most: lines that are printed; of
+        a longer one, as of 40 logs, the middle is left out.
+        """
+        if len(str(self)) <= width:
+            return [str(self)]
+        out = [f"next ({self.why}):"]
+        for word in map(shlex.quote, shlex.split(self.command)):
+            if len(out) > 1 and len(out[-1]) + len(word) + 3 <= width:
+                out[-1] += f" {word}"
+            else:
+                out.append(f"    {word}")
+        left = 0 if most is None else len(out) - most
+        if most is not None and left > 0:
+            cut = f"    ... ({left + 1} lines of it: --verbose)"
+            return [*_continued(out[: most - 2]), cut, out[-1]]
+        return [out[0], *_continued(out[1:-1]), out[-1]]
+
+
+def _continued(lines: list[str]) -> list[str]:
+    """The lines, each but the first of a step going on in the next one."""
+    return [line if line.startswith("next (") else f"{line} \\" for line in lines]
+
+
+def step(why: str, command: str | None, *words: str | PathLike[str] | None) -> Step:
+    """The step of these words after `workbench`, quoted for a shell; those that are None fall.
+
+    The folders of effects go on to a command that takes them, since a model may need them.
+    """
+    every = ["workbench", *(str(word) for word in (command, *words) if word is not None)]
+    running = click.get_current_context(silent=True)
+    if running is not None and command in TAKES_EFFECTS:
+        given = running.params.get("effects") or ()
+        every += [word for one in given for word in ("--effects", str(one))]
+    return Step(why, shlex.join(every))
+
+
+class Refused(NotIdentifiable):
+    """A refusal that knows what to type next."""
+
+    def __init__(self, reason: str, then: Step) -> None:
+        super().__init__(reason)
+        self.then = then
+
+
+@contextmanager
+def refused_with(then: Callable[[str], Step]) -> Iterator[None]:
+    """Within the block a refusal becomes one that says `then(its reason)` as the next step."""
+    try:
+        yield
+    except NotIdentifiable as error:
+        raise Refused(str(error), then(str(error))) from error
 
 
 class Bar:
@@ -49,6 +116,16 @@ class Bar:
 
 class BadOutput(UserError):
     """A place where results cannot be written."""
+
+
+class MissingLibrary(UserError):
+    """A library that an extra brings is not installed."""
+
+    def __init__(self, what: str, library: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs the library {library!r}, which is not installed; run"
+            f" pip install 'servo-workbench[{extra}]'"
+        )
 
 
 class OutputFolder:

@@ -9,8 +9,8 @@ from studies.paper.measures import Case, Figures
 from studies.paper.settings import PRINTED_SUMS
 from studies.paper.study import Study
 from workbench.documents.reading import versions
-from workbench.output import Row, written
-from workbench.screen import Screen, more, screen, tabled
+from workbench.output import written
+from workbench.screen import Row, Screen, more, screen, tabled
 
 CLAIMS = ("where", "paper", "here", "")
 FIGURES = ("servo", "squared error [m²]", "standstill [mm]", "limit cycle", "energy [V² s]")

@@ -9,7 +9,7 @@ import pytest
 
 from workbench.cli import main
 from workbench.course import Course
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.logs.sources import card_path
 
 FILES = {"trace.json", "model.json", "report.html"}

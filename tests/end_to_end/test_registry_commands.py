@@ -12,8 +12,7 @@ from identification.model.plant import Actuator
 from tests.chain import CARD, TABLES, designed, model_of
 from tests.workbench.jobs.listener import listening
 from workbench.cli import main
-from workbench.documents.design_file import design_document
-from workbench.documents.model_file import model_document
+from workbench.documents.result_files import design_document, model_document
 from workbench.output import dumps
 
 pytestmark = pytest.mark.slow

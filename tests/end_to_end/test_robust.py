@@ -9,8 +9,7 @@ import pytest
 
 from tests.chain import TABLES, designed, model_of
 from workbench.cli import main
-from workbench.documents.design_file import design_document
-from workbench.documents.model_file import model_document
+from workbench.documents.result_files import design_document, model_document
 from workbench.output import dumps
 
 pytestmark = pytest.mark.slow

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.logs.sources import card_path
 
 

@@ -16,7 +16,8 @@ import pytest
 
 from identification.errors import BadLog, NotIdentifiable, UserError
 from workbench import cli, commands
-from workbench.ending import Refused, StatusCommand, step
+from workbench.options import StatusCommand
+from workbench.output import Refused, step
 from workbench.termination import ENDING, Terminated
 
 HEAVY = ("numpy", "scipy", "numba", "pandas", "matplotlib", "pyarrow", "h5py", "rich", "pydantic")

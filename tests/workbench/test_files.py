@@ -13,7 +13,7 @@ from identification.errors import UserError
 from tests.workbench.log_files import WRITERS, card, signals
 from workbench.cards.card import load_card
 from workbench.cards.own_effects import load_effect
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.logs import table, tables, text
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path

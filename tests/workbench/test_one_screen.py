@@ -31,18 +31,17 @@ from workbench.documents.design import Recommendation
 from workbench.documents.model import Model
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
-from workbench.report.demo_tables import demo_view
+from workbench.report.doctor import installation_view
 from workbench.report.drift import drift_view
 from workbench.report.experiment import experiment_view
 from workbench.report.first_card import proposal_view
-from workbench.report.installation import installation_view
 from workbench.report.prediction import prediction_view
 from workbench.report.reports import design_view, identified_view
 from workbench.report.response import response_view
 from workbench.report.robust import robust_view
 from workbench.report.trace import traced_view
 from workbench.report.trace_words import words
-from workbench.report.validation import validation_view
+from workbench.report.validation import demo_view, validation_view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.drift import Drifted
@@ -383,7 +382,7 @@ def test_a_registry_of_many_machines_and_versions(
 
 def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.chain import CARD
-    from workbench.documents.design_file import design_document
+    from workbench.documents.result_files import design_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)
@@ -399,7 +398,7 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear
-    from workbench.documents.model_file import model_document
+    from workbench.documents.result_files import model_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from tests.screens import one_screen
 from workbench import cli
-from workbench.ending import step
-from workbench.output import emit
+from workbench.output import emit, step
 from workbench.screen import Part, Screen, instead, listed, more, screen, shared_options, tabled
 
 WORDS = st.text("abc de", min_size=1, max_size=300)

@@ -16,7 +16,7 @@ from identification.errors import BadCard
 from identification.log import Rig, RigKind
 from identification.model.plant import over, units_of
 from workbench.cards.controller import ControllerSection
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.cards.recipe import RecipeSection
 from workbench.cards.table import CardTable, Positive
 from workbench.cards.units import (

@@ -13,7 +13,7 @@ from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import over
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.cards.table import CardTable, NotNegative, Positive
 from workbench.cards.units import in_unit_of
 

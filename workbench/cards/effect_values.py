@@ -9,7 +9,7 @@ from identification.effects._library import Library, of_key
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import in_unit
+from workbench.cards.readable import in_unit
 from workbench.cards.units import Motion, in_unit_of
 
 _COMMAND = re.compile(r"\bV\b")

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-from workbench.ending import Step, step
-from workbench.output import results
+from workbench.output import Step, results, step
 from workbench.signature import option
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from workbench import options
 from workbench.course import running
 from workbench.output import emit, results
 from workbench.signature import option
-from workbench.steps.stages import TRACE_STAGES
+from workbench.steps.asked import TRACE_STAGES
 
 RECIPE = "demo"
 DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.items()}
@@ -34,11 +34,10 @@ def command(
     """
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path
-    from workbench.report.demo_tables import demo_view
     from workbench.report.next_steps import after_demo
     from workbench.report.reports import design_view
     from workbench.report.trace import traced_view
-    from workbench.report.validation import missed, validation_view
+    from workbench.report.validation import demo_view, missed, validation_view
     from workbench.steps.demo import demonstrate
     from workbench.steps.kernels_ahead import fits_compiled_ahead
 

@@ -89,8 +89,8 @@ def command(given: DesignOptions) -> int:
     """
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.models import load_model
+    from workbench.steps.closed_loop import with_card
     from workbench.steps.elastic import with_response
-    from workbench.steps.present import with_card
 
     if is_velocity_model(given.model_file):
         options.refuse_for_velocity(*NOT_FOR_VELOCITY)
@@ -167,7 +167,7 @@ def _refuse_beside(given: DesignOptions) -> None:
 
 
 def _robust(given: DesignOptions, model: "Model") -> int:
-    from workbench.documents.design_file import design_document
+    from workbench.documents.result_files import design_document
     from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import step
-from workbench.output import emit, progress, results
+from workbench.output import emit, progress, results, step
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
 def _installation(where: str | None) -> int:
     from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
-    from workbench.report.installation import installation_view
+    from workbench.report.doctor import installation_view
     from workbench.steps.installation import check_installation
 
     found = check_installation()

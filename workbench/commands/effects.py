@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-from workbench.ending import StatusGroup, step
-from workbench.output import emit, progress
+from workbench.output import emit, progress, step
 from workbench.signature import argument
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from workbench.screen import Screen
 
 
-@click.group(cls=StatusGroup, epilog="Example: workbench effects list")
+@click.group(cls=options.StatusGroup, epilog="Example: workbench effects list")
 def command() -> None:
     """Show the effects that 'workbench trace' knows, and check files of your own.
 

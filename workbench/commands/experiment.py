@@ -43,7 +43,7 @@ def command(
     """
     from workbench.interface.loops import experiment
     from workbench.interface.models import load_model
-    from workbench.steps.present import with_card
+    from workbench.steps.closed_loop import with_card
 
     model = with_card(load_model(model_file, effects), card)
     with results("experiment", out) as folder:

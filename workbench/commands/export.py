@@ -106,7 +106,7 @@ def command(given: ExportOptions) -> int:
         options.refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
         return _tables(given)
     options.refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
-    from workbench.documents.design_file import read_design
+    from workbench.documents.result_files import read_design
     from workbench.export.exported import exported, validation_line
     from workbench.export.targets import writers
 
@@ -149,8 +149,8 @@ def command(given: ExportOptions) -> int:
 def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
     """Whether the targets are a model's; of those that both have the file decides."""
     from identification.errors import BadModel
-    from workbench.documents.model_file import MODEL_SCHEMA
     from workbench.documents.reading import read_document
+    from workbench.documents.result_files import MODEL_SCHEMA
 
     tables = [target for target in targets if target in TABLES]
     code = [target for target in targets if target not in (*TABLES, *OF_BOTH)]
@@ -165,7 +165,7 @@ def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
 
 
 def _tables(given: ExportOptions) -> int:
-    from workbench.documents.model_file import read_model
+    from workbench.documents.result_files import read_model
     from workbench.export.compensation import Compensation
     from workbench.export.table_targets import tables, tables_asked, tables_document, tables_view
 
@@ -187,7 +187,7 @@ def _view(
     what: "Exported", targets: Mapping[str, None], files: tuple[str, ...], folder: Path
 ) -> "Screen":
     """What was written and what to do with it, for a terminal."""
-    from workbench.export.filled import title_of
+    from workbench.export.exported import title_of
     from workbench.output import written
     from workbench.report.design_tables import of_the_model
     from workbench.screen import listed, screen

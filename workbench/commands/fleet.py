@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import Step, step
 from workbench.jobs.options import clock, worker_name
-from workbench.output import dumps, emit, progress
+from workbench.output import Step, dumps, emit, progress, step
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
@@ -148,7 +147,7 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
 def _recorder(where: str | None) -> "Iterator[InRegistry | None]":
     """The registry at `where`, "": the default one, None: none."""
     from workbench.fleet.run import InRegistry
-    from workbench.jobs.lease import Patience
+    from workbench.jobs.passes import Patience
     from workbench.registry.database import location
     from workbench.registry.store import Registry
 

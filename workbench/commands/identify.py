@@ -8,8 +8,7 @@ from workbench import options
 from workbench.course import running
 from workbench.output import results
 from workbench.signature import option
-from workbench.steps.asked import Options
-from workbench.steps.stages import IDENTIFY_STAGES
+from workbench.steps.asked import IDENTIFY_STAGES, Options
 
 
 @options.command(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench import options
-from workbench.ending import StatusGroup
 from workbench.jobs.options import clock
 from workbench.output import emit, results
 from workbench.signature import argument, option
@@ -31,7 +30,7 @@ BY_OPTION = option("Who decides.  [default: you]", **YOU)
 REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 
 
-@click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
+@click.group(cls=options.StatusGroup, epilog="Example: workbench registry show bench-a --json")
 def command() -> None:
     """Models and designs of machines, append-only, with one active version each.
 
@@ -94,7 +93,7 @@ def diff(
     FIRST: by default the version before SECOND; SECOND: by default the active one.
     """
     from workbench.registry.difference import difference
-    from workbench.registry.errors import BadRegistry
+    from workbench.registry.values import BadRegistry
     from workbench.registry.views import difference_view
 
     with opened(where) as found:
@@ -132,9 +131,8 @@ def add(
     version.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design_file import read_design
-    from workbench.documents.model_file import read_model
     from workbench.documents.reading import read_document, read_raw
+    from workbench.documents.result_files import read_design, read_model
     from workbench.registry.values import Candidate
 
     remarks = list(read_model(model_file, library(effects)).read)
@@ -220,7 +218,7 @@ def opened(where: str | None, *, create: bool = False) -> "Registry":
 
 def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     """The version of that number, by default the active one."""
-    from workbench.registry.errors import BadRegistry
+    from workbench.registry.values import BadRegistry
 
     found.machine(machine)
     version = found.active_version(machine) if number is None else found.version(machine, number)

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench import options
-from workbench.ending import Step, step
 from workbench.jobs.options import JobOptions
-from workbench.output import emit
+from workbench.output import Step, emit, step
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery

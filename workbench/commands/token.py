@@ -6,13 +6,12 @@ import click
 
 from workbench import options
 from workbench.commands.registry import YOU, opened
-from workbench.ending import StatusGroup
 from workbench.jobs.options import clock
 from workbench.output import emit
 from workbench.signature import argument, option
 
 
-@click.group(cls=StatusGroup, epilog="Example: workbench token add anna --role change")
+@click.group(cls=options.StatusGroup, epilog="Example: workbench token add anna --role change")
 def command() -> None:
     """Tokens of the page: whoever has one reads, or changes, under its name.
 

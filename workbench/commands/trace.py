@@ -7,7 +7,7 @@ from workbench import options
 from workbench.course import running
 from workbench.output import results
 from workbench.signature import argument, option
-from workbench.steps.stages import TRACE_STAGES
+from workbench.steps.asked import TRACE_STAGES
 
 if TYPE_CHECKING:
     from workbench.report.view import View

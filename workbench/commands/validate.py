@@ -30,12 +30,12 @@ def command(
 
     Writes validation.json and report.html.
     """
-    from workbench.documents.design_file import read_design
+    from workbench.documents.result_files import read_design
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate, as_code
-    from workbench.steps.present import with_card
+    from workbench.steps.closed_loop import with_card
 
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")

@@ -24,7 +24,7 @@ from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.plant import actuator_units
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import Shown, converted, in_unit, shown
+from workbench.cards.readable import Shown, converted, in_unit, shown
 from workbench.cards.units import Motion
 from workbench.documents.reading import OF_OURS, PLACEHOLDER, UNKNOWN_KEY, as_number
 

@@ -29,7 +29,7 @@ from design.schedule import Over, Schedule
 from design.series_filters import FilterKind, SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import Shown, shown
 from workbench.cards.units import Motion
 from workbench.documents.codec import (
     NOT_WRITTEN,

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from design.drive_law import DriveLaw
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
-from workbench.cards.parameter_units import Shown
+from workbench.cards.readable import Shown
 from workbench.documents.codec import Around, InUnit, Output, Parameter, Through
 from workbench.documents.reading import PLACEHOLDER
 

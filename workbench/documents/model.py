@@ -18,7 +18,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, MATERIAL
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import in_unit
+from workbench.cards.readable import in_unit
 from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through, in_units, no_key
 from workbench.documents.drive import PRESENT_LOOP, Present
 from workbench.documents.reading import PLACEHOLDER, as_number

@@ -18,8 +18,8 @@ import numpy as np
 from identification.errors import BadLog, BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from workbench.cards.against_header import contradicted_units
 from workbench.cards.card_tables import SignalSpec
+from workbench.cards.headers import contradicted_units
 from workbench.documents.model import LogEntry, Model
 
 Slips = tuple[tuple[float, str], ...]
@@ -62,9 +62,8 @@ ROTARY: Mapping[str, Size] = {
     "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
 }
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
-_OTHER_UNIT = (
-    200.0  # times another log's clock or travel: a slip of 1000, and motions alike in part
-)
+# Times another log's clock or travel: a slip of 1000, and motions alike in part.
+_OTHER_UNIT = 200.0
 _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
 

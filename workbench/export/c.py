@@ -9,8 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from design.program import Program, Variable
-from workbench.export.exported import Exported, Precision
-from workbench.export.filled import filled, heading_of, rows
+from workbench.export.exported import Exported, Precision, filled, heading_of, rows
 from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Python's names that are keywords of C, and one of a function of its library.

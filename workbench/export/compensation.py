@@ -21,8 +21,7 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.readable import Unit, number, shown_unit, units_of
 from workbench.documents.model import Model
-from workbench.export.exported import identifier
-from workbench.export.filled import filled
+from workbench.export.exported import filled, identifier
 
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
@@ -60,26 +59,6 @@ class Cost:
     def in_words(self, unit: str) -> str:
         """The cost, its force in this unit."""
         return self.what if self.force is None else f"{self.what} {number(self.force)} {unit}"
-
-
-@dataclass(frozen=True)
-class TableFile:
-    """A file for a control ("" for any), as text; units: in words; where: it is to go.
-
-    error: largest deviation from the model over the table's range, relative; None where it has no
-    range. costs: what it leaves uncompensated. remarks: what to know, a line each.
-    """
-
-    name: str
-    text: str
-    table: Table
-    control: Control | Literal[""]
-    units: str
-    where: str
-    points: int
-    error: float | None = None
-    costs: tuple[Cost, ...] = ()
-    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -249,8 +228,12 @@ class Compensation:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file of a control holds: values of its template, and of `TableFile` what hangs on the
-    model; said: remarks that stand beside the file alone."""
+    """What a file of a control holds; units: in words; values: of its template.
+
+    error: largest deviation from the model over the table's range, relative; None where it has no
+    range. costs: what it leaves uncompensated. remarks: what to know, a line each; said: those that
+    stand beside the file alone.
+    """
 
     units: str
     points: int = 1
@@ -259,6 +242,17 @@ class Content:
     costs: tuple[Cost, ...] = ()
     remarks: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableFile(Content):
+    """A file for a control ("" for any), as text; where: it is to go; remarks: all of them."""
+
+    name: str
+    text: str
+    table: Table
+    control: Control | Literal[""]
+    where: str
 
 
 @dataclass(frozen=True)
@@ -276,10 +270,10 @@ class Format:
         made = self.content(what)
         costs = [one.in_words(what.force_unit) for one in made.costs]
         lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}
+        whole = {**vars(made), "remarks": (*made.said, *made.remarks)}
         return TableFile(
-            f"{what.name}_{self.file}", filled(self.file, **{**lead, **made.values}), self.table,
-            self.control, made.units, self.where, made.points, made.error, made.costs,
-            (*made.said, *made.remarks),
+            name=f"{what.name}_{self.file}", text=filled(self.file, **{**lead, **made.values}),
+            table=self.table, control=self.control, where=self.where, **whole,
         )  # fmt: skip
 
 

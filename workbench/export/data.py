@@ -21,8 +21,7 @@ from design.program import (
 from design.servo import Compensation
 from identification.model.karnopp import NAMES
 from identification.signals.filters import slope_filter
-from workbench.export.exported import Exported
-from workbench.export.filled import lead_of, title_of
+from workbench.export.exported import Exported, lead_of, title_of
 from workbench.output import dumps
 
 PROGRAM_SCHEMA = "program/1"

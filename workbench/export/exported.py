@@ -2,10 +2,12 @@
 `workbench validate` has said of the design."""
 
 import re
-from collections.abc import Iterator, Mapping
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
@@ -30,10 +32,11 @@ from design.program import (
 from design.program_run import SelfTest, self_test
 from design.servo import Compensation
 from identification.errors import BadModel
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.documents.design import Design, Structure
-from workbench.documents.design_file import design_digest
 from workbench.documents.reading import read_document
+from workbench.documents.result_files import design_digest
+from workbench.output import templates
 from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop
 
@@ -237,3 +240,50 @@ def validation_line(found: Design, design_file: Path) -> str:
         where = f"{path.parent.name}/{path.name}"
         return f"its validation did NOT pass ({where}): do not run it on the machine before it does"
     return "no validation of this design lies near it: workbench validate MODEL DESIGN checks it"
+
+
+WIDEST = 96  # characters of a line of numbers
+KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
+
+
+def filled(template: str, *, markup: bool = False, **values: Any) -> str:
+    """The template `<template>.j2` filled in; with `markup`, values are escaped for XML."""
+    found = templates("workbench.export", escaped=markup, keep_trailing_newline=True)
+    return found.get_template(f"{template}.j2").render(**values)
+
+
+def rows(values: Iterable[str]) -> list[str]:
+    """Values with commas between them, in lines."""
+    whole = ", ".join(value.replace(" ", KEPT_BLANK) for value in values)
+    lines = textwrap.wrap(whole, WIDEST, break_long_words=False, break_on_hyphens=False)
+    return [line.replace(KEPT_BLANK, " ") for line in lines]
+
+
+def title_of(what: Exported) -> str:
+    """One line that says what a file is."""
+    kind = {"rst": "RST", "pid": "PID", "p-pi": "P-PI", "present": "present"}[what.controller]
+    beside = " with friction compensator" if what.loop.compensation else ""
+    if isinstance(what.loop.compensation, FeedForward):
+        beside = " with feed-forward of acceleration and friction"
+    return f"{what.design.card}: {kind} controller{beside}"
+
+
+def heading_of(what: Exported) -> dict[str, Any]:
+    """What every file says of a controller."""
+    program = what.program
+    return {"title": title_of(what), "lead": lead_of(what), "name": program.name, "h": program.h}
+
+
+def lead_of(what: Exported) -> Sequence[str]:
+    """What to know of a file, in lines."""
+    program = what.program
+    turns = (
+        f", its position controller at every {program.ratio}th call" if program.ratio > 1 else ""
+    )
+    return (
+        f"Made by servo-workbench {version('servo-workbench')} from a design of this machine.",
+        f"Runs every {program.h:.12g} s{turns}.",
+        "Letters are the paper's: r reference, y position, F_e force on the body, u command;",
+        "R, S, T polynomials in z^-1; v velocity, e_y error; F_c, F_s, dv of Karnopp's friction.",
+        *what.remarks,
+    )

@@ -6,8 +6,7 @@ from datetime import datetime
 from importlib.metadata import version
 
 from design.program import Kind
-from workbench.export.exported import Exported, Precision
-from workbench.export.filled import filled, heading_of, rows
+from workbench.export.exported import Exported, Precision, filled, heading_of, rows
 from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Words of the standard, and operators of its Instruction List, that a name here may meet.

@@ -16,11 +16,10 @@ from workbench.fleet.finding import card_text
 from workbench.fleet.store import ResultStore
 from workbench.fleet.values import GOOD, BadCluster, BadLogs, Item, LogFile, Result
 from workbench.fleet.work import work as default_work
-from workbench.jobs.lease import Clock, Patience
-from workbench.registry.errors import LostClaim
+from workbench.jobs.passes import Clock, Patience
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import SeenLog
+from workbench.registry.values import LostClaim, SeenLog
 
 LEASE = timedelta(minutes=2)
 LONGEST_ALONE = timedelta(minutes=2)  # for which the cluster may be without any worker

@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
-from workbench.documents.model_file import model_document
 from workbench.documents.reading import versions
+from workbench.documents.result_files import model_document
 from workbench.files import CARD_FILE, sha256_of
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result

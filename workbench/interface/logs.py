@@ -25,8 +25,7 @@ from workbench.interface.inputs import (
     read_card,
     sources,
 )  # fmt: skip
-from workbench.interface.models import IdentifyResult, ModelLike, TraceResult, model_of
-from workbench.interface.result import Result
+from workbench.interface.models import IdentifyResult, ModelLike, Result, TraceResult, model_of
 from workbench.logs.sources import Sources, card_path
 from workbench.output import dumps
 from workbench.report.axis_test import axis_view
@@ -35,12 +34,13 @@ from workbench.report.prediction import prediction_view
 from workbench.report.response import response_view
 from workbench.report.templating import render
 from workbench.report.view import View
+from workbench.steps.asked import IDENTIFY_STAGES
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.axis_test import axis_test as test_of_axis
+from workbench.steps.closed_loop import present_of_card
 from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, write_stream
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import Predicted, predict_sources, prediction_frame
-from workbench.steps.present import present_of_card
 from workbench.steps.response import (
     Curve,
     Responded,
@@ -49,7 +49,6 @@ from workbench.steps.response import (
     response_frame,
 )  # fmt: skip
 from workbench.steps.simulate import as_columns, record, truth
-from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
     import pandas as pd

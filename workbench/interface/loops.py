@@ -13,11 +13,10 @@ import numpy as np
 from identification.errors import BadModel
 from workbench.course import running, working
 from workbench.documents.design import Design
-from workbench.documents.design_file import read_design
 from workbench.documents.model import Model
+from workbench.documents.result_files import read_design
 from workbench.interface.inputs import PathLike
-from workbench.interface.models import ModelLike, TraceResult, model_of
-from workbench.interface.result import Result
+from workbench.interface.models import ModelLike, Result, TraceResult, model_of
 from workbench.report.experiment import experiment_view
 from workbench.report.reports import design_view
 from workbench.report.robust import robust_view

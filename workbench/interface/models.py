@@ -1,21 +1,28 @@
-"""`identify` and `trace`, as the commands of these names, and what they find of a machine."""
+"""`identify` and `trace`, as the commands of these names, and what they find of a machine: results
+that show, draw and write themselves.
+
+A result holds the value that the command of its name writes; its JSON is the command's own.
+"""
 
 import importlib
 import math
 import os
 import time
 import warnings
-from collections.abc import Iterable
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-from identification.errors import BadCard, BadModel, UserError
+from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.course import running
 from workbench.documents.model import Model
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.interface.inputs import (
     CardLike,
     Logs,
@@ -25,21 +32,64 @@ from workbench.interface.inputs import (
     effects_of,
     sources,
 )
-from workbench.interface.result import Result
+from workbench.output import MissingLibrary, OutputFolder, dumps
 from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
 from workbench.report.view import View
+from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.identify import Options
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import Traced, named_logs, trace_sources
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 
-class MissingLibrary(UserError):
-    """A library that an extra brings is not installed."""
+@dataclass(frozen=True, repr=False)
+class Result(ABC):
+    """What every result can: show itself as text and HTML, draw, and write the command's files."""
+
+    _command: ClassVar[str]
+
+    @abstractmethod
+    def _made(self) -> View:
+        """How the result is shown."""
+
+    @cached_property
+    def view(self) -> View:
+        """The result as terminal, page, notebook and picture show it."""
+        return self._made()
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """The document that the command writes, as plain values."""
+        return self.view.document
+
+    def to_json(self) -> str:
+        """The document as strict JSON, letter for letter what the command writes."""
+        return dumps(self.document)
+
+    def report(self) -> str:
+        """The report as one HTML page, as the command writes it."""
+        return self.view.page()
+
+    def plot(self) -> "Figure":
+        """The main chart, a figure of matplotlib."""
+        return self.view.figure()
+
+    def save(self, out: PathLike | None = None) -> Path:
+        """The folder that now holds the command's files: `out`, or runs/<time>-<command>."""
+        folder = None if out is None else Path(out)
+        with OutputFolder(self._command, folder, now=datetime.now()) as target:
+            self.view.write(target)
+        return target.final
+
+    def __repr__(self) -> str:
+        return self.view.screen().text(rest="report()").rstrip()
+
+    def _repr_html_(self) -> str:
+        return self.view.html()
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,10 +201,7 @@ def _arviz() -> Any:
             warnings.simplefilter("ignore")
             return importlib.import_module("arviz")
     except ModuleNotFoundError:
-        raise MissingLibrary(
-            "to_arviz needs the library 'arviz', which is not installed; run"
-            " pip install 'servo-workbench[arviz]'"
-        ) from None
+        raise MissingLibrary("to_arviz", "arviz", "arviz") from None
 
 
 ModelLike: TypeAlias = IdentifyResult | TraceResult | Model | PathLike

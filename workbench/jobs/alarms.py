@@ -18,8 +18,7 @@ import httpx
 from tenacity import Retrying, retry_if_exception_type, stop_after_attempt, wait_random_exponential
 
 from identification.errors import UserError
-from workbench.jobs.lease import Clock
-from workbench.jobs.passes import Report
+from workbench.jobs.passes import Clock, Report
 from workbench.registry.outbox import Outbox
 from workbench.registry.values import ALARMING, Alarm
 

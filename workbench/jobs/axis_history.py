@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.model.estimates import Estimate
-from workbench.documents.model_file import read_model
 from workbench.documents.reading import Stored
-from workbench.jobs.drift_by_chart import Reading, drift_by_chart
+from workbench.documents.result_files import read_model
+from workbench.jobs.judge import Reading, drift_by_chart
 from workbench.logs.sources import Sources
 from workbench.registry import results
 from workbench.registry.results import (

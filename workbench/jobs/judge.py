@@ -1,30 +1,151 @@
-"""What a worker makes of a log: drift test, then the chain anew, or the trace, and the contest."""
+"""What a worker makes of a log: drift test, then the chain anew, or the trace, and the contest.
 
-from collections.abc import Mapping, Sequence
+The test's state goes from log to log in the registry, with each log's result.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
+from scipy.stats import norm
 
+from identification.drift.drift_result import Shift
+from identification.drift.mewma import DriftState
 from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
 from workbench.cards.own_effects import library as installed
-from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model
-from workbench.documents.model_file import model_document, read_model
 from workbench.documents.reading import Stored
+from workbench.documents.result_files import (
+    design_document,
+    model_document,
+    read_design,
+    read_model,
+)
 from workbench.jobs.challenge import Contender, Terms, challenge
-from workbench.jobs.drift_by_chart import Drift, DriftJudge, drift_by_chart
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Source, Sources, read_sources
+from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
+from workbench.report.drift import reason_sentence
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
-from workbench.steps.drift import moved_between, no_wear
+from workbench.steps.drift import (
+    Stream,
+    detectable_sizes,
+    drift_of,
+    model_key,
+    moved_between,
+    no_wear,
+)
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate, validation_document
+
+TestedDrift = Literal["none", "drift", "structure", "not_judged"]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter that has changed: its unit, active value and now, p-value of the change."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A parameter by one log, with its 95 % interval, beside its active value.
+
+    change: relative to that, with its standard deviation.
+    """
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    low: float
+    high: float
+    change: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Verdict of a test: which parameters moved, and why.
+
+    p_value: of the smallest kind, over all parameters. unsure: parameters of which some have
+    changed, and nobody can say which; could_have_seen: smallest relative change of each that would
+    have been found, None where none would. state: what the same test wants to be given with the
+    next log; plain JSON. parameters: what the log gave of each, moved or not.
+    """
+
+    verdict: TestedDrift
+    reason: str
+    moved: tuple[Moved, ...] = ()
+    p_value: float | None = None
+    state: Mapping[str, Any] = field(default_factory=dict)
+    unsure: tuple[str, ...] = ()
+    could_have_seen: Mapping[str, float | None] = field(default_factory=dict)
+    parameters: tuple[Reading, ...] = ()
+
+
+# A test of a new log against the active model; of the state of the log before under it, empty at
+# first.
+DriftJudge = Callable[[Model, Sources, np.random.Generator, Mapping[str, Any]], Drift]
+
+
+def drift_by_chart(
+    model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
+) -> Drift:
+    """The verdict on a log alone and by the mean of those since the model is active.
+
+    Raises BadModel where the stored state is none, or model and card are of different machines.
+    """
+    stream = Stream(_state(state), ()) if state else None
+    seed = int(rng.integers(2**31))
+    found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
+    worst = [one.test for one in found.tests if one.test.verdict == found.verdict][-1]
+    state_now: Any = strict(found.stream.state)
+    statistics = [one for one in (worst.single, worst.mean) if one is not None]
+    return Drift(
+        verdict=found.verdict,
+        reason=reason_sentence(worst, found.settings.to_be_seen),
+        moved=tuple(_moved(one) for one in worst.moved),
+        p_value=min((one.p_value for one in statistics), default=None),
+        state=state_now,
+        unsure=worst.unsure,
+        could_have_seen=detectable_sizes(worst),
+        parameters=tuple(_reading(one) for one in worst.shifts.values()),
+    )
+
+
+def _state(state: Mapping[str, Any]) -> DriftState:
+    try:
+        return TypeAdapter(DriftState).validate_json(dumps(state), strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise BadModel(f"stored drift state: {first['loc']}: {first['msg']}") from None
+
+
+def _reading(shift: Shift) -> Reading:
+    half = float(norm.ppf(0.975)) * shift.after_sd
+    low, high = shift.after - half, shift.after + half
+    return Reading(
+        shift.name, shift.unit, shift.before, shift.after, low, high, shift.change, shift.sd
+    )
+
+
+def _moved(shift: Shift) -> Moved:
+    p_value = float(2.0 * norm.sf(abs(shift.change) / shift.sd)) if shift.sd > 0 else 0.0
+    return Moved(shift.name, shift.unit, shift.before, shift.after, p_value)
+
 
 HELD_OUT_SHARE = 0.35  # of a log's time that a challenger is not fitted on
 

@@ -8,10 +8,10 @@ from prometheus_client import CollectorRegistry, write_to_textfile
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.registry import Collector
 
-from workbench.registry.errors import RegistryAway
 from workbench.registry.outbox import Outbox
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
+from workbench.registry.values import RegistryAway
 
 PREFIX = "servo_workbench"
 

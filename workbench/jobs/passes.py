@@ -1,26 +1,101 @@
 """One pass over the machines that have new logs; safe to run at any time, in any number.
 
-A pass looks for complete files, notes their fingerprints, and claims one machine after the other.
-Whatever it dies of, a log either has its result, with all that belongs to it, or waits for the
-next pass.
+A pass looks for complete files, notes their fingerprints, and claims one machine after the other;
+the claim is kept alive while a worker is busy. Whatever it dies of, a log either has its result,
+with all that belongs to it, or waits for the next pass.
 """
 
 import errno
+import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
+
+from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
-from workbench.jobs.lease import SHARE, Clock, Patience, renewed
 from workbench.jobs.options import JobOptions, is_gone
 from workbench.jobs.scan import BadRoot, MachineFolder, Scan, machine_folders, scan, unchanged
-from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.database import Database
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
+from workbench.registry.values import (
+    Claim,
+    Judgement,
+    LogOutcome,
+    LostClaim,
+    RegistryAway,
+    SeenLog,
+    Version,
+)
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Clock = Callable[[], datetime]
+SHARE = 3.0  # renewals in one lease
+LONGEST_PAUSE = 5.0  # s between two tries
+
+
+@dataclass(frozen=True)
+class Patience:
+    """Tries again for `seconds` what fails because the database is away; then raises it."""
+
+    seconds: float = 60.0
+
+    def __call__(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """What the call gives; raises RegistryAway once patience has ended."""
+        again = Retrying(
+            retry=retry_if_exception_type(RegistryAway),
+            stop=stop_after_delay(self.seconds),
+            wait=wait_random_exponential(multiplier=0.1, max=LONGEST_PAUSE),
+            reraise=True,
+        )
+        return again(call, *args, **kwargs)
+
+
+def shared_clock(database: Database, here: Clock) -> Clock:
+    """The database's clock, which all its workers share, read once and carried on by `here`.
+
+    Raises RegistryAway.
+    """
+    ahead = database.now(here()) - here()
+    return lambda: here() + ahead
+
+
+@contextmanager
+def renewed(
+    renew: Callable[[], None], every: float, lost: Callable[[threading.Event], None] | None = None
+) -> Iterator[None]:
+    """Renews a claim from a thread, every so many seconds, until the block ends.
+
+    What goes wrong there is not raised here: a result is recorded only where the claim holds.
+    lost: called in the thread where the claim is lost, with the event of the block's end.
+    """
+    over = threading.Event()
+
+    def beat() -> None:
+        while not over.wait(every):
+            try:
+                renew()
+            except RegistryAway:
+                continue  # the next renewal comes before the lease ends, or the claim is lost
+            except LostClaim:
+                if lost is not None:
+                    lost(over)
+                return
+
+    thread = threading.Thread(target=beat, name="lease", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
 
 MOST_ATTEMPTS = 20  # times that a log is begun without a result, after which it is excluded
 OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)

@@ -15,8 +15,7 @@ from watchfiles import Change, watch
 
 from identification.errors import UserError
 from workbench.files import LOGS
-from workbench.jobs.lease import Clock
-from workbench.jobs.passes import Report
+from workbench.jobs.passes import Clock, Report
 from workbench.jobs.scan import SUFFIXES
 
 SOON = "soon"

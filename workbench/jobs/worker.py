@@ -10,10 +10,9 @@ from workbench.jobs.alarms import Delivery, Webhook, send_alarms
 from workbench.jobs.challenge import Terms
 from workbench.jobs.events import reporter
 from workbench.jobs.judge import Chain
-from workbench.jobs.lease import Patience, shared_clock
 from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.options import JobOptions, clock, worker_name
-from workbench.jobs.passes import Pass, PassReport, Report
+from workbench.jobs.passes import Pass, PassReport, Patience, Report, shared_clock
 from workbench.jobs.scan import machine_folders
 from workbench.registry.database import location
 from workbench.registry.outbox import Outbox

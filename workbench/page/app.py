@@ -14,15 +14,15 @@ from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
-from workbench.page import drops, fleet, health, machine, visitors, work
+from workbench.page import drops, health, machine, visitors, work
 from workbench.page.asked import Asked, Server, Visitor
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
 from workbench.page.settings import PageSettings, handed_over
 from workbench.page.visitors import Doorkeeper, Moment
 from workbench.registry.access import Access
-from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.store import Registry
+from workbench.registry.values import BadRegistry, RegistryAway
 
 HERE = Path(__file__).parent
 ASSETS = HERE.parent / "assets"
@@ -59,7 +59,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
 
     app = Starlette(
         routes=[
-            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *drops.DROP_ROUTES, *work.WORK_ROUTES,
+            *machine.FLEET_ROUTES, *machine.MACHINE_ROUTES, *drops.DROP_ROUTES, *work.WORK_ROUTES,
             *visitors.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
             Mount("/static/assets", StaticFiles(directory=ASSETS)),
             Mount("/static", StaticFiles(directory=HERE / "static")),

@@ -14,7 +14,7 @@ from typing import BinaryIO
 from identification.errors import BadLog
 from workbench.files import CARD_FILE, LOGS, sha256_of
 from workbench.output import write_whole
-from workbench.registry.errors import BadRegistry
+from workbench.registry.values import BadRegistry
 
 LOG_FOLDER = "log"  # of an upload, in which nothing else lies
 DROPS = ".drops"  # no machine's name begins so, and no pass looks into it

@@ -14,8 +14,8 @@ from starlette.types import Message, Send
 from workbench.jobs.metrics import PREFIX, MachineFigures, collected
 from workbench.page.asked import Asked, Server
 from workbench.page.visitors import reading
-from workbench.registry.errors import RegistryAway
 from workbench.registry.overview import any_machine
+from workbench.registry.values import RegistryAway
 
 REQUESTS = CollectorRegistry()
 ANSWERED = Counter(

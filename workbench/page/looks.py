@@ -253,7 +253,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
 
 def _design(text: str) -> "Design":
     """The design of a document as text, read as from its file; raises UserError."""
-    from workbench.documents.design_file import read_design
     from workbench.documents.reading import Stored
+    from workbench.documents.result_files import read_design
 
     return read_design(Stored("design.json", json.loads(text)))

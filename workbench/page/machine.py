@@ -1,10 +1,11 @@
-"""A machine: parameters over time as charts, what was decided and why, alarms, logs, versions,
-reports; what changes it, and its controllers as code."""
+"""The fleet, a line a machine; and a machine: parameters over time as charts, what was decided and
+why, alarms, logs, versions, reports; what changes it, and its controllers as code."""
 
 import io
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, get_args
 
@@ -18,14 +19,13 @@ from identification.errors import UserError
 from workbench.cards.readable import shown_unit
 from workbench.jobs.options import clock
 from workbench.page import looks
-from workbench.page.asked import Asked, download
+from workbench.page.asked import STATE_WORDS, Asked, download, part
 from workbench.page.looks import EXPORTS
-from workbench.page.pages import part
 from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
 from workbench.registry.difference import as_read, difference
-from workbench.registry.overview import INTERVAL_DEVIATIONS
+from workbench.registry.overview import FLEET_ORDERS, INTERVAL_DEVIATIONS, FleetAsked, fleet_page
 from workbench.registry.results import TestedLog, condition, last_logs, newest_lights
 from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import Area, Chart, Line, Panel, chart_html
@@ -233,3 +233,46 @@ def _times(seconds: Sequence[float]) -> tuple[Array, str]:
         return np.arange(1.0, len(seconds) + 1.0), "log"
     size, unit = next((one for one in SPANS if span > 2.0 * one[0]), SPANS[-1])
     return at / size + 1e-6 * np.arange(len(at)), f"{unit} before the last log"
+
+
+LONGEST_FILTER = 100
+LAST_PAGE = 1_000_000
+HEADS = {
+    "machine": "machine",
+    "state": "state",
+    "heard": "last log",
+    "moved": "moved most",
+}
+
+
+def fleet(asked: Asked) -> Response:
+    """The page, or the table alone where htmx asks for it."""
+    wanted = asked_for(asked.request.query_params, asked.server.settings.silent_days)
+    found = fleet_page(asked.database, wanted)
+    pages = max(1, -(-found.found // wanted.per_page))
+    selection = {"text": wanted.text, "state": wanted.state, "order": wanted.order,
+                 "down": "1" if wanted.down else ""}  # fmt: skip
+    part_only = asked.request.headers.get("hx-target") == "fleet"
+    return asked.show(
+        "fleet_table" if part_only else "fleet", title="Fleet", asked=wanted, found=found,
+        pages=pages, selection=selection, heads=HEADS, states=STATE_WORDS,
+        total=sum(found.counts.values()),
+    )  # fmt: skip
+
+
+def asked_for(query: Mapping[str, Any], silent_days: float) -> FleetAsked:
+    """What the address asks for; what cannot be is left out."""
+    page = str(query.get("page", "1"))
+    state: Any = query.get("state")
+    order: Any = query.get("order")
+    return FleetAsked(
+        silent_since=datetime.now(UTC) - timedelta(days=silent_days),
+        text=str(query.get("text", ""))[:LONGEST_FILTER].replace("\0", ""),
+        state=state if state in STATE_WORDS else None,
+        order=order if order in FLEET_ORDERS else "state",
+        down=query.get("down") == "1",
+        page=min(max(int(page), 1), LAST_PAGE) if page.isascii() and page.isdigit() else 1,
+    )
+
+
+FLEET_ROUTES = [Route("/", reading(briefly(fleet)))]

@@ -9,9 +9,8 @@ from typing import Literal
 
 import click
 
-from identification.errors import UserError
 from workbench import options
-from workbench.output import dumps
+from workbench.output import MissingLibrary, dumps
 from workbench.signature import asked
 
 SETTINGS_VARIABLE = "WORKBENCH_PAGE"
@@ -93,15 +92,8 @@ def handed_over() -> PageSettings:
 NEEDED_LIBRARIES = ("starlette", "uvicorn", "python_multipart")
 
 
-class MissingPage(UserError):
-    """A library of the page is not installed."""
-
-
 def refuse_missing() -> None:
-    """Raises MissingPage with the extra to install."""
-    lost = [name for name in NEEDED_LIBRARIES if find_spec(name) is None]
-    if lost:
-        raise MissingPage(
-            f"the page needs the library {lost[0]!r}, which is not installed; run"
-            " pip install 'servo-workbench[page]'"
-        )
+    """Raises MissingLibrary with the extra to install."""
+    for name in NEEDED_LIBRARIES:
+        if find_spec(name) is None:
+            raise MissingLibrary("the page", name, "page")

@@ -15,9 +15,8 @@ from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
 from workbench.jobs.options import clock
-from workbench.page.asked import Asked
+from workbench.page.asked import Asked, part
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE, refuse_machine, store_files
-from workbench.page.pages import part
 from workbench.page.visitors import changing, reading
 from workbench.registry.tables import TaskRow
 from workbench.registry.values import Candidate, TaskKind

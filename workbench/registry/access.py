@@ -12,9 +12,8 @@ from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from workbench.registry.database import Database
-from workbench.registry.errors import BadRegistry
 from workbench.registry.tables import AccessTokenEndRow, AccessTokenRow, AuditRow
-from workbench.registry.values import Role, of_row
+from workbench.registry.values import BadRegistry, Role, of_row
 
 TOKEN_PREFIX = "wb_"  # by which a token is known as one where it should not be
 RANDOM_BYTES = 32

@@ -16,9 +16,8 @@ from sqlalchemy.orm import Session
 
 from workbench.registry.access import note
 from workbench.registry.database import Database, changed
-from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.tables import TaskRow, UploadRow
-from workbench.registry.values import TaskKind
+from workbench.registry.values import BadRegistry, LostClaim, TaskKind
 
 Row = TypeVar("Row", UploadRow, TaskRow)
 EndState = Literal["done", "failed"]

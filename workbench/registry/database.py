@@ -40,8 +40,8 @@ from sqlalchemy.exc import (
 from sqlalchemy.orm import DeclarativeBase, Session, sessionmaker
 
 from workbench.files import broken_link
-from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import upgrade
+from workbench.registry.values import BadRegistry, RegistryAway
 
 REGISTRY_VARIABLE = "WORKBENCH_REGISTRY"
 DEFAULT = "registry.db"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, Table, UniqueConstraint, inspect, text
 
-from workbench.registry.errors import BadRegistry
 from workbench.registry.tables import APPEND_ONLY, PAGE_APPEND_ONLY, Base
+from workbench.registry.values import BadRegistry
 
 if TYPE_CHECKING:
     from alembic.config import Config

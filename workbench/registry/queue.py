@@ -16,7 +16,6 @@ from sqlalchemy.orm import Session
 
 from workbench.registry import rows
 from workbench.registry.database import Database, changed
-from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.overview import summary_tested
 from workbench.registry.tables import (
     AttemptRow,
@@ -28,12 +27,14 @@ from workbench.registry.tables import (
     VersionRow,
 )
 from workbench.registry.values import (
+    BadRegistry,
     Candidate,
     Claim,
     DecisionKind,
     Document,
     Judgement,
     LogOutcome,
+    LostClaim,
     Order,
     SeenLog,
     Version,

@@ -11,7 +11,6 @@ from sqlalchemy.orm import Session, aliased
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.database import insert_missing
-from workbench.registry.errors import BadRegistry
 from workbench.registry.overview import summary_moved
 from workbench.registry.tables import (
     ActiveVersionRow,
@@ -27,6 +26,7 @@ from workbench.registry.tables import (
 )
 from workbench.registry.values import (
     MOVES,
+    BadRegistry,
     Candidate,
     Decision,
     DecisionKind,

@@ -11,7 +11,6 @@ from sqlalchemy.orm import Session
 
 from workbench.registry import rows
 from workbench.registry.database import Database
-from workbench.registry.errors import BadRegistry
 from workbench.registry.tables import (
     ActiveVersionRow,
     DecisionRow,
@@ -21,7 +20,15 @@ from workbench.registry.tables import (
     RecordRow,
     VersionRow,
 )
-from workbench.registry.values import MOVES, Candidate, Decision, Kind, MachineState, Version
+from workbench.registry.values import (
+    MOVES,
+    BadRegistry,
+    Candidate,
+    Decision,
+    Kind,
+    MachineState,
+    Version,
+)
 
 _NAME = re.compile(r"[^/\\\x00-\x1f\x7f]+")
 

@@ -1,4 +1,5 @@
-"""What the registry holds, as values, and which of two logs of a machine is the older."""
+"""What the registry holds, as values; which of two logs of a machine is the older, and what may be
+wrong with a registry."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -6,6 +7,8 @@ from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import PurePath
 from typing import Any, Literal, TypeVar
+
+from identification.errors import UserError
 
 Value = TypeVar("Value")
 
@@ -190,3 +193,15 @@ def _numbered(file: str) -> tuple[tuple[str, ...], tuple[int, ...]] | None:
     if not numbers or any(_YEAR.fullmatch(number) for number in numbers[1:]):
         return None
     return tuple(parts[0::2]), tuple(int(number) for number in numbers)
+
+
+class BadRegistry(UserError):
+    """A registry that cannot be used, or a question that it cannot answer."""
+
+
+class RegistryAway(UserError):
+    """A database that does not answer, is locked or full; the same may work later."""
+
+
+class LostClaim(UserError):
+    """A worker's lease has ended and another has taken over; its result is dropped."""

@@ -4,11 +4,10 @@ import numpy as np
 
 from identification.estimation.estimates import counted
 from workbench.cards.readable import in_digits, number, shown_unit, units_of
-from workbench.output import Row
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.templating import render
 from workbench.report.view import Section, View
-from workbench.screen import listed, tabled
+from workbench.screen import Row, listed, tabled
 from workbench.steps.axis_test import AxisTest, Quantity, axis_document
 
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")

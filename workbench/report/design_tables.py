@@ -5,9 +5,8 @@ from workbench.cards.readable import length, number
 from workbench.documents.codec import Output
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import equation_lines, force_lines
-from workbench.output import Row
 from workbench.report.view import notes
-from workbench.screen import Part, instead, listed, more, tabled
+from workbench.screen import Part, Row, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import COMPENSATED, takes_compensator
 from workbench.steps.recommend import FIGURES_SAID, called, other_figures, own_figures

@@ -1,8 +1,10 @@
-"""A log before any fit on one screen, and as charts: position, drive, clock, force over speed."""
+"""A log before any fit on one screen, and as charts: position, drive, clock, force over speed; and
+the installation on a terminal."""
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from workbench.report.chart_figure import chart_figure, evenly_spread
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import CheckedLog, Clock, Delay, Examined, SensorState
 from workbench.steps.identifiable_by_log import Way
+from workbench.steps.installation import OPTIONAL, Installation
 
 LABEL_WIDTH = 15
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
@@ -277,3 +280,33 @@ def _over_speed(found: CheckedLog, log: Log) -> list[Chart]:
     band = Band("velocity within its noise", -sure, sure, "x", "band")
     panel = Panel(f"velocity [{per}]", f"{DRIVE_WORDS[name]} [{unit}]", [dots], bands=[band])
     return [Chart("speed", f"{DRIVE_WORDS[name]} of {found.file} over velocity", [panel])]
+
+
+def installation_view(
+    found: Installation, registry: Mapping[str, Any] | None, wrong: Sequence[str]
+) -> Screen:
+    """Versions, kernels, data and registry, a line each, and what is wrong."""
+    packages = ", ".join(f"{name} {number}" for name, number in found.packages.items())
+    cache, cards, places = found.cache, found.data["cards"], found.cache["places"]
+    size = float(str(cache["bytes"])) / 1e6
+    writable = "writable" if cache["writable"] else "NOT writable"
+    folder = "WORKBENCH_DATA is not set: measured sets are fetched when needed"
+    says = "none named (--registry, or WORKBENCH_REGISTRY)"
+    if registry is not None:
+        many = f"answers, {registry['machines']} machines" if registry["answers"] else "no answer"
+        says = f"{registry['where']}: {many}"
+    rows = [
+        ("python", found.python),
+        ("system", f"{found.platform}, {found.processors} processors"),
+        ("packages", packages),
+        *(("optional", f"{name} {number or 'not installed'}: {OPTIONAL[name]}")
+          for name, number in found.optional.items()),
+        ("kernels", f"{cache['kernels']} compiled, {size:.3g} MB, {writable}"),
+        *(("", f"in {place}") for place in (places if isinstance(places, list) else ())),
+        ("data", found.data["folder"] or folder),
+        *(("", f"{name}: {of['there']} of {of['of']} files")
+          for name, of in (cards.items() if isinstance(cards, Mapping) else ())),
+        ("registry", says),
+        *(("wrong", one) for one in wrong),
+    ]  # fmt: skip
+    return screen(*(f"{label:10}{text}" for label, text in rows))

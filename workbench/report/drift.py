@@ -9,13 +9,12 @@ from identification.arrays import Array
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import reported_estimate
 from workbench.cards.readable import number, shown_unit
-from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
 from workbench.report.model_tables import reasons_once
 from workbench.report.next_steps import after_drift
 from workbench.report.view import Section, View, notes, report_notes
-from workbench.screen import Part, instead, tabled
+from workbench.screen import Part, Row, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
 from workbench.verdicts import in_words
 

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from workbench.cards.parameter_units import shown
-from workbench.output import Row
+from workbench.cards.readable import shown
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table
-from workbench.screen import Part, listed, more, tabled
+from workbench.screen import Part, Row, listed, more, tabled
 from workbench.steps.experiment.planned import Experiment, experiment_document
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")

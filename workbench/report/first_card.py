@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from workbench.output import Row, next_step
-from workbench.screen import Screen, listed, screen, tabled
+from workbench.output import next_step
+from workbench.screen import Row, Screen, listed, screen, tabled
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 from workbench.steps.first_card.rig_guess import RigGuess
 

@@ -9,15 +9,13 @@ from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.cards.effect_values import known_effect
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import as_shown, in_digits, length, number, times
+from workbench.cards.readable import as_shown, in_digits, length, number, shown, times
 from workbench.documents.model import Model, used
 from workbench.documents.velocity import VelocityModel
-from workbench.output import Row
 from workbench.remarks import printed_once
 from workbench.report.trace_words import share_of_friction
 from workbench.report.view import notes
-from workbench.screen import Part, instead, more, tabled
+from workbench.screen import Part, Row, instead, more, tabled
 
 MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")
 MEANING = {

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.ending import Step, step
 from workbench.files import CARD_FILE, shipped_cards
+from workbench.output import Step, step
 
 if TYPE_CHECKING:
     from workbench.documents.design import Controller, Design

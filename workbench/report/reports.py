@@ -14,9 +14,8 @@ from identification.arrays import Array
 from identification.estimation.windowed_run.parameters import AT_ZERO
 from identification.simulation.free_run import FreeRun
 from workbench.documents.design import Controller, Design
-from workbench.documents.design_file import design_document
 from workbench.documents.model import Model, used
-from workbench.documents.model_file import model_document
+from workbench.documents.result_files import design_document, model_document
 from workbench.report.chart import Chart, Colour, Line, Mark, Panel
 from workbench.report.design_tables import (
     design_lines,

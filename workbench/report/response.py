@@ -12,8 +12,7 @@ from identification.frequency.modes import Peak
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from identification.thresholds import COHERENCE_SURE
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import number
+from workbench.cards.readable import number, shown
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html

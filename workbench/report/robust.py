@@ -7,13 +7,12 @@ import numpy as np
 
 from identification.arrays import Array
 from workbench.cards.readable import length, number, units_of
-from workbench.documents.design_file import design_document
-from workbench.output import Row
+from workbench.documents.result_files import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
 from workbench.report.view import Section, View, notes, table
-from workbench.screen import Part, listed, tabled
+from workbench.screen import Part, Row, listed, tabled
 from workbench.steps.loop_figures import PRESENT
 from workbench.steps.recommend import FIGURES_SAID
 from workbench.steps.robust.outcomes import MEASURES, Measure

@@ -10,10 +10,8 @@ from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
 from identification.tracing.result import FoundEffect, Trace
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import as_shown, in_digits, number, shown_unit, small, units_of
-from workbench.documents.model_file import model_document
-from workbench.output import Row
+from workbench.cards.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
+from workbench.documents.result_files import model_document
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart
 from workbench.report.friction import trace_friction_chart
@@ -30,7 +28,7 @@ from workbench.report.trace_pictures import (
 )
 from workbench.report.trace_words import advice, percent, trace_sentence, words
 from workbench.report.view import Section, View, notes, report_notes
-from workbench.screen import Part, more, tabled
+from workbench.screen import Part, Row, more, tabled
 from workbench.steps.trace import Traced, effect_estimates, trace_document
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")

@@ -12,12 +12,11 @@ from identification.velocity.record import RUN_IN
 from identification.velocity.rivals import STRUCTURES, is_noise
 from workbench.cards.readable import length, number
 from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity_document
-from workbench.ending import Step, step
-from workbench.output import Row
+from workbench.output import Step, step
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.prediction import csv_text
 from workbench.report.view import Section, View, notes
-from workbench.screen import Part, tabled
+from workbench.screen import Part, Row, tabled
 from workbench.steps.velocity import (
     VelocityPrediction,
     VelocityTraced,

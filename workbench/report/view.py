@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from identification.remarks import MinorRemark
-from workbench.ending import Step
 from workbench.files import REPORT_FILE
-from workbench.output import OutputFolder, dumps, emit, next_step, written
+from workbench.output import OutputFolder, Step, dumps, emit, next_step, written
 from workbench.remarks import Merged, merged, printed_once
 from workbench.report.chart import Chart, chart_assets, chart_html
 from workbench.report.templating import render, safe, used_symbols

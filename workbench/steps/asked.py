@@ -1,7 +1,7 @@
 """What is asked of a computation: each number with its default, and the option that says it.
 
-Of these the commands make their options, and the functions of Python take them as they are. Light
-to import, since every `--help` asks for it.
+Of these the commands make their options, and the functions of Python take them as they are; and
+which part of a command's bar each stage takes. Light to import, since every `--help` asks for it.
 """
 
 from collections.abc import Mapping
@@ -104,3 +104,22 @@ class Wanted:
     )
     seed: int = asked(0, "", type=SEEDS)
     rivals: tuple[str, ...] = ()
+
+
+IDENTIFY_STAGES = {
+    "refining": (0.0, 0.4),
+    "searching": (0.4, 0.6),
+    "weighing": (0.5, 0.95),
+    "posterior": (0.6, 1.0),
+}
+TRACE_STAGES = {
+    "recording": (0.0, 0.03),
+    "refining": (0.03, 0.35),
+    "tracing": (0.35, 0.55),
+    "refitting": (0.55, 0.75),
+    "judging": (0.75, 0.9),
+    "settling": (0.45, 0.5),
+    "searching": (0.5, 0.7),
+    "weighing": (0.6, 0.95),
+    "telling": (0.95, 1.0),
+}

@@ -18,8 +18,7 @@ from identification.model.plant import Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
 from workbench.steps.cascade import feed_forward, reference_limits, unseen_lag
-from workbench.steps.closed_loop import DrivenLoop, run_plant
-from workbench.steps.drawn import drawn_plants, in_loop
+from workbench.steps.closed_loop import DrivenLoop, drawn_plants, in_loop, run_plant
 from workbench.steps.loop_figures import risen_sine, speed_seen
 
 CLEARLY_LESS = 0.8  # of the other's root mean square error

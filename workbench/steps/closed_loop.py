@@ -1,25 +1,37 @@
-"""A design in its loop on a machine: what `design.loop` needs, put together from results."""
+"""A design in its loop on a machine: what `design.loop` needs, put together from results; the
+controller of a card as the law that its drive runs; and the plants that the machine may be, drawn
+by what is not sure."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from design.compensator import Compensator
-from design.drive_law import DriveLaw
+from design.drive_law import DriveLaw, drive_law
 from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise
 from design.loop_signals import OfForce, pressures
+from design.pid import pd_to_rst, pid_to_rst
+from design.present import cascade_to_rst
+from design.rst import RST
 from design.schedule import Schedule
 from design.servo import Compensation, SecondMass, Servo, ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.effects._base import Acting
-from identification.errors import BadModel
+from identification.errors import BadCard, BadModel, BadSpecification
+from identification.estimation.windowed_run.parameters import plant_with
 from identification.log import Rig
 from identification.model.plant import Actuator, Motor, Plant
+from workbench.cards.card import Card, load_card
+from workbench.cards.controller import CardController, Kind
 from workbench.documents.design import Controller, Design, Structure
 from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model, used
+from workbench.logs.sources import card_path
+from workbench.steps.drift import active_model
 from workbench.steps.linear_loop import command_of
 
 
@@ -191,3 +203,120 @@ def chambers(rig: Rig) -> dict[str, OfForce]:
         return {}
     supply = rig.supply_pressure
     return pressures(rig.area_p, rig.area_n, 0.5 * supply, supply) if supply > 0 else {}
+
+
+NO_BAND_SHARE = 1e-3  # of the logs' speed: a band that none has
+USUAL_BAND_SHARE = 0.03  # the same of a usual one
+UNIDENTIFIED_SPREAD = 0.3  # log of a value that no log identifies, one sigma
+
+
+def in_loop(model: Model) -> Plant:
+    """The plant as its simulated loop has it; a band that is next to none is taken for one that no
+    log identifies, whatever its interval."""
+    plant = replace(model.simulated, effects=in_the_loop(model))
+    lost = lost_bands(model)
+    return plant_with(plant, tuple(lost), np.array(list(lost.values()))) if lost else plant
+
+
+def lost_bands(model: Model) -> dict[str, float]:
+    """Bands narrower than a thousandth of the logs' speed, with what is assumed in their place."""
+    speed, nine = model.speed or 0.0, model.karnopp
+    return {
+        name: sign * USUAL_BAND_SHARE * speed
+        for name, band, sign in (("dv_p", nine.dv_p, 1.0), ("dv_n", nine.dv_n, -1.0))
+        if abs(band) < NO_BAND_SHARE * speed
+    }
+
+
+def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Plant, ...]:
+    """Plants drawn from the errors of the model's parameters; those that no log identifies within a
+    third of what is assumed."""
+    known = active_model(model, "")
+    plant = in_loop(model)
+    drawn = rng.multivariate_normal(
+        known.values, known.covariance, count, check_valid="ignore", method="svd"
+    )
+    every = {**model.friction, **(model.actuator or {})}
+    assumed = {
+        name: used(one)
+        for name, one in every.items()
+        if name in known.untold and name != "k_a" and used(one) != 0.0
+    } | lost_bands(model)
+    free = np.exp(UNIDENTIFIED_SPREAD * rng.standard_normal((count, len(assumed))))
+    names = (*known.names, *assumed)
+    sets = np.hstack([drawn, free * np.array(list(assumed.values()))])
+    last = {name: i for i, name in enumerate(names)}  # what is assumed replaces what was lost
+    effects = {one.key for one in plant.effects}
+    indices = [i for n, i in last.items() if "." not in n or n.split(".")[0] in effects]
+    return tuple(plant_with(plant, [names[i] for i in indices], row[indices]) for row in sets)
+
+
+LAWS: Mapping[Kind, Callable[..., RST]] = {
+    "PD": pd_to_rst,
+    "PID": pid_to_rst,
+    "P-PI": cascade_to_rst,
+}
+
+
+def present_of_card(card: Card, rig: Rig, h: float) -> Present | None:
+    """What model.json holds of the card's controller; h [s]: period of the logs.
+
+    None where the card names none. Raises BadCard where it is none, or does not fit the rig.
+    """
+    if card.controller is None:
+        return None
+    try:
+        return present(card.controller, rig, h)
+    except (BadCard, BadSpecification) as error:
+        raise BadCard(f"{card.path}: controller: {error}") from None
+
+
+def with_card(model: Model, name: str | None) -> Model:
+    """The model with the controller of another card in place of its own; as it is without a card.
+
+    Raises BadCard where the card names none, or its command is in another unit.
+    """
+    if name is None:
+        return model
+    card = load_card(card_path(name), with_recipe=False)
+    own, unit = card.rig().command_unit, model.rig.command_unit
+    if own != unit:
+        raise BadCard(
+            f"{card.path}: its command is in {own!r}, that of the model in {unit!r}; give the card"
+            " of the model's machine"
+        )
+    found = present_of_card(card, model.rig, model.period)
+    if found is None:
+        raise BadCard(f"{card.path}: has no [controller]; add the one that the machine has now")
+    return replace(model, controller=found)
+
+
+def present(given: CardController, rig: Rig, h: float) -> Present:
+    """The controller as the law that the drive runs every h [s], or at its own period.
+
+    One that gives a motor's force is the law of its command. Raises BadSpecification where it is no
+    controller, BadCard where it gives a force that the card does not make of a command.
+    """
+    h = given.period or h
+    output, per = given.output, 1.0
+    if output == "force" and rig.kind == "motor":
+        if not rig.force_per_command:
+            raise BadCard('output = "force" needs the force_per_command of the motor')
+        output, per = "command", rig.force_per_command
+    gains = {name: one.value or 0.0 for name, one in given.gains.items()}
+    law = drive_law(rst_of(given.kind, {**gains, **given.polynomials}, h), given.forget, per)
+    force = None
+    if given.force is not None:
+        fast = given.force.period or h
+        if abs(round(h / fast) * fast - h) > 1e-6 * h or fast > h:
+            raise BadCard(f"force.period_s = {fast:g} s must divide the period of {h:g} s")
+        force = ForceLoop(given.force.k_i, given.force.T_i, h / round(h / fast))
+    return Present(given.kind, given.gains, output, law, force, given.rate)
+
+
+def rst_of(kind: Kind, numbers: Mapping[str, Any], h: float) -> RST:
+    """The law of a kind every h [s], by its gains in SI, or by an RST's coefficients."""
+    if kind == "RST":
+        R, S, T = (np.array(numbers[key]) for key in "RST")
+        return RST(R, S, T, h)
+    return LAWS[kind](**numbers, h=h)

@@ -14,8 +14,7 @@ from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
 from identification.model.plant import Actuator, Motor
 from identification.remarks import MinorRemark
-from workbench.cards.parameter_units import Shown, shown
-from workbench.cards.readable import length, number, shown_unit
+from workbench.cards.readable import Shown, length, number, shown, shown_unit
 from workbench.documents.design import (
     DESIGNED_STRUCTURES,
     Controller,

@@ -24,8 +24,8 @@ from identification.signals.even_clock import LONGEST_GAP, even_clock, rows_lost
 from identification.signals.noise import local_noise
 from identification.signals.offsets import ROUNDED_OFF
 from identification.signals.relations import command_lag, lead
-from workbench.cards.against_header import contradicted_units
 from workbench.cards.card import Card
+from workbench.cards.headers import contradicted_units
 from workbench.cards.units import conversion
 from workbench.documents.model import Identifiable
 from workbench.documents.plausible import log_remarks

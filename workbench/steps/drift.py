@@ -24,9 +24,9 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, OF_ACCOUNT, TWICE
 from workbench.cards.readable import number
 from workbench.documents.model import Model, used
-from workbench.documents.model_file import model_document
 from workbench.documents.plausible import refuse_other_machine, refuse_other_units
 from workbench.documents.reading import as_number, plain, read_result, versions
+from workbench.documents.result_files import model_document
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
 from workbench.steps.predict import of_one_instant

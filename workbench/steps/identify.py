@@ -31,7 +31,7 @@ from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.effect_values import relabelled
-from workbench.cards.parameter_units import friction_units
+from workbench.cards.readable import friction_units
 from workbench.documents.model import (
     ArxPlant,
     ArxTests,

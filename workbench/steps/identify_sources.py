@@ -14,12 +14,12 @@ from workbench.documents.model import Model
 from workbench.documents.plausible import model_remarks
 from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
+from workbench.steps.closed_loop import present_of_card
 from workbench.steps.hardly_identifiable import braked_by_its_voltage
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify
-from workbench.steps.other_kind import looks_like_velocity
-from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
+from workbench.steps.velocity import looks_like_velocity
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior

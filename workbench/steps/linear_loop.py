@@ -13,7 +13,7 @@ from identification.errors import BadSpecification, NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.documents.codec import Command
 from workbench.documents.design import From, Linear
 from workbench.documents.drive import ForceLoop

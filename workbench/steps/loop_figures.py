@@ -13,8 +13,7 @@ from design.tune import worst_modulus
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification
 from identification.model.plant import Motor
-from workbench.cards.parameter_units import shown
-from workbench.cards.readable import length
+from workbench.cards.readable import length, shown
 from workbench.documents.design import (
     DESIGNED_STRUCTURES,
     Design,

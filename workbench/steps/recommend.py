@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from identification.errors import BadModel
-from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import Shown, shown
 from workbench.documents.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
 from workbench.documents.model import Model
 from workbench.steps.clear_win import contest

@@ -21,7 +21,7 @@ from identification.frequency.swinging_load import swinging_load
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.size import Size
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.documents.model import Model, used
 from workbench.documents.plausible import refuse_other_machine
 from workbench.documents.reading import as_number

@@ -23,16 +23,15 @@ from identification.simulation.free_run import FreeRun, free_run
 from workbench.cards.card import Card
 from workbench.cards.controller import CardController
 from workbench.cards.effect_values import exact
-from workbench.cards.parameter_units import friction_units
+from workbench.cards.readable import friction_units
 from workbench.cards.recipe import Recipe
 from workbench.documents.codec import written
 from workbench.documents.drive import Present
-from workbench.documents.model_file import around_of
 from workbench.documents.reading import as_number
+from workbench.documents.result_files import around_of
 from workbench.files import ABSURD
-from workbench.steps.closed_loop import DrivenLoop
+from workbench.steps.closed_loop import DrivenLoop, present, rst_of
 from workbench.steps.predict import lacking_signals
-from workbench.steps.present import present, rst_of
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 CONVERGED_CHANGE = 1e-9  # relative change of the force from which it has settled

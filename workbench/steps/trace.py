@@ -23,8 +23,8 @@ from workbench.documents.model import FitSummary, Model
 from workbench.documents.plausible import model_remarks, refuse_other_units
 from workbench.documents.reading import plain, versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
+from workbench.steps.closed_loop import present_of_card
 from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects
-from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 
 TRACE_SCHEMA = "trace/1"

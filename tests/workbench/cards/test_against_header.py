@@ -3,8 +3,8 @@
 import pytest
 
 from identification.log import Rig
-from workbench.cards.against_header import contradicted_units
 from workbench.cards.card_tables import SignalSpec
+from workbench.cards.headers import contradicted_units
 
 MOTOR = Rig("motor", force_per_command=30.0, command_unit="A")
 

@@ -14,8 +14,12 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cli import main
-from workbench.documents.design_file import design_document, read_design
-from workbench.documents.model_file import model_document, read_model
+from workbench.documents.result_files import (
+    design_document,
+    model_document,
+    read_design,
+    read_model,
+)
 from workbench.output import dumps
 from workbench.steps.design import design
 

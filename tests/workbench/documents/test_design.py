@@ -14,7 +14,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, model_of
 from workbench.documents.design import Design
-from workbench.documents.design_file import design_document, read_design
+from workbench.documents.result_files import design_document, read_design
 from workbench.output import dumps
 from workbench.steps.design import design
 

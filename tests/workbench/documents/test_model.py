@@ -15,7 +15,7 @@ from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cards.effect_values import effect_units, relabelled
 from workbench.documents.model import Model
-from workbench.documents.model_file import model_document, read_model
+from workbench.documents.result_files import model_document, read_model
 from workbench.output import dumps
 
 ACTUATOR = Actuator(19530.0, 10405.0)

@@ -16,13 +16,13 @@ from workbench.cards.card import load_card
 from workbench.cards.card_tables import SignalSpec
 from workbench.cli import main
 from workbench.documents.model import Model
-from workbench.documents.model_file import model_document
 from workbench.documents.plausible import (
     bandwidth_remarks,
     log_remarks,
     model_remarks,
     stored_remarks,
 )
+from workbench.documents.result_files import model_document
 from workbench.logs.sources import card_path, read_sources
 from workbench.output import dumps
 from workbench.steps.design import design

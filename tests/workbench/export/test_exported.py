@@ -11,8 +11,7 @@ from identification.errors import BadModel
 from tests.workbench.export.designs import case
 from workbench.documents.compensator import CompensatorValues
 from workbench.documents.drive import Present
-from workbench.export.exported import exported, identifier
-from workbench.export.filled import lead_of, rows, title_of
+from workbench.export.exported import exported, identifier, lead_of, rows, title_of
 
 
 @given(st.text(max_size=60))

@@ -32,10 +32,10 @@ from workbench.fleet.run import (
 )
 from workbench.fleet.store import RESULTS_FOLDER, ResultStore
 from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
-from workbench.jobs.lease import Patience
-from workbench.registry.errors import RegistryAway
+from workbench.jobs.passes import Patience
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
+from workbench.registry.values import RegistryAway
 
 LOGS = [log_of(f"m{number}") for number in range(6)]
 

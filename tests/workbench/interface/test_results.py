@@ -17,7 +17,7 @@ import workbench as wb
 from identification.errors import UserError
 from identification.estimation.posterior import Posterior
 from tests.chain import identified
-from workbench.documents.model_file import model_document
+from workbench.documents.result_files import model_document
 from workbench.interface.models import IdentifyResult
 from workbench.output import dumps
 

@@ -13,7 +13,7 @@ import pytest
 import workbench as wb
 from tests.chain import CARD
 from workbench.cli import main
-from workbench.interface.result import Result
+from workbench.interface.models import Result
 from workbench.output import dumps
 
 pytestmark = pytest.mark.slow

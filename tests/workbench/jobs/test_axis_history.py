@@ -12,15 +12,14 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
 from workbench.cards.effect_values import written_effect
-from workbench.documents.model_file import model_document
+from workbench.documents.result_files import model_document
 from workbench.jobs.axis_history import by_quantity, earlier_of
-from workbench.jobs.drift_by_chart import Reading
+from workbench.jobs.judge import Reading
 from workbench.logs.sources import Source, Sources
 from workbench.output import strict
-from workbench.registry.errors import BadRegistry
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Judgement, SeenLog
+from workbench.registry.values import BadRegistry, Candidate, Judgement, SeenLog
 from workbench.steps.simulate import record
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)

@@ -16,11 +16,10 @@ from identification.model.karnopp import Karnopp
 from tests.chain import CARD, TABLES, designed
 from workbench.cards.card import Card, load_card
 from workbench.documents.model import Model
-from workbench.documents.model_file import read_model
+from workbench.documents.result_files import read_model
 from workbench.jobs import judge
 from workbench.jobs.challenge import Terms
-from workbench.jobs.drift_by_chart import Drift, drift_by_chart
-from workbench.jobs.judge import Chain, divided
+from workbench.jobs.judge import Chain, Drift, divided, drift_by_chart
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps

@@ -15,14 +15,12 @@ from identification.errors import BadCard, BadLog, NotIdentifiable
 from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, short_pass
 from tests.workbench.registry.postgres import Server
-from workbench.jobs.lease import shared_clock
 from workbench.jobs.options import is_gone
-from workbench.jobs.passes import Judge, PassReport, Task
+from workbench.jobs.passes import Judge, PassReport, Task, shared_clock
 from workbench.jobs.scan import BadRoot, open_for_writing
-from workbench.registry.errors import RegistryAway
 from workbench.registry.queue import OFTEN, Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Judgement
+from workbench.registry.values import Judgement, RegistryAway
 
 Run = Callable[..., PassReport]
 

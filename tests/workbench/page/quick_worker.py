@@ -10,7 +10,7 @@ from identification.errors import BadLog
 from workbench.course import Course
 from workbench.page import worker
 from workbench.page.settings import PageSettings
-from workbench.page.task_work import Work
+from workbench.page.worker import Work
 from workbench.registry.bench import Bench
 
 LEASE = timedelta(seconds=1.0)

@@ -9,9 +9,9 @@ import pytest
 from tests.workbench.page.conftest import NOW, Page
 from workbench.registry.access import Access
 from workbench.registry.bench import MOST_BEGUN, Bench
-from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.store import Registry
 from workbench.registry.tables import TaskRow, UploadRow
+from workbench.registry.values import BadRegistry, LostClaim
 
 LEASE = timedelta(seconds=30)
 UPLOAD = "0" * 16

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from tests.workbench.page.conftest import NOW, Page
-from workbench.page.fleet import asked_for
-from workbench.page.machine import parameter_charts
+from workbench.page.machine import asked_for, parameter_charts
 from workbench.registry import results
 from workbench.registry.overview import (
     TREND_LOGS,

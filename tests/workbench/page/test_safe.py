@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 
 from tests.workbench.page.conftest import NOW, Page
+from workbench.page.asked import spark
 from workbench.page.dropped import ENDINGS, Drop, file_name
 from workbench.page.guard import FORM_BYTES
-from workbench.page.pages import spark
 from workbench.page.visitors import CHANGES, TOKEN_COOKIE, WRONG_TRIES, Limiter, csrf_of
 from workbench.registry.access import Access, hashed
-from workbench.registry.errors import BadRegistry
 from workbench.registry.store import Registry
 from workbench.registry.tables import AccessTokenRow
-from workbench.registry.values import Candidate
+from workbench.registry.values import BadRegistry, Candidate
 
 NASTY = "<img src=x onerror=alert(1)>"
 CSV = b"t,y\n" + b"".join(b"%d,%d\n" % (k, k % 7) for k in range(300))

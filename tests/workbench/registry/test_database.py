@@ -14,13 +14,12 @@ from sqlalchemy import text
 
 from tests.workbench.registry.postgres import Server
 from workbench.registry.database import location
-from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import HEAD, config
 from workbench.registry.overview import FleetAsked, fleet_page
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import Base
-from workbench.registry.values import Candidate, Judgement, SeenLog
+from workbench.registry.values import BadRegistry, Candidate, Judgement, RegistryAway, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 PROCESSES, EACH = 6, 15

@@ -5,10 +5,9 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from workbench.registry.errors import BadRegistry, LostClaim
 from workbench.registry.queue import OFTEN, OLDER, Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Claim, Judgement, SeenLog
+from workbench.registry.values import BadRegistry, Candidate, Claim, Judgement, LostClaim, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 LEASE = timedelta(minutes=1)

@@ -19,7 +19,7 @@ from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
 from workbench.documents.design import Design
 from workbench.documents.model import Model
-from workbench.ending import Step, step
+from workbench.output import Step, step
 from workbench.report.next_steps import (
     after_demo,
     after_design,

@@ -9,7 +9,7 @@ import pytest
 
 from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, designed, identified, model_of
-from workbench.cards.parameter_units import friction_units
+from workbench.cards.readable import friction_units
 from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.reports import design_view, identified_view

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.ending import step
-from workbench.output import OutputFolder
+from workbench.output import OutputFolder, step
 from workbench.report.chart import Chart, Line, Panel
 from workbench.report.view import Section, View, notes
 from workbench.screen import instead, more, tabled

@@ -14,8 +14,8 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
 from workbench.documents.design import Design
-from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model, used
+from workbench.documents.result_files import design_document, read_design
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps

@@ -21,8 +21,8 @@ from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, identified, model_of, short_recipe
 from tests.identification.plants import made_log, table
 from workbench.cards.recipe import RecipePID
-from workbench.documents.design_file import design_document, read_design
 from workbench.documents.model import Model
+from workbench.documents.result_files import design_document, read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps import loop_figures

@@ -19,7 +19,7 @@ from tests.chain import CARD, TABLES, identified, model_of
 from tests.told import broken_in
 from workbench.cli import main
 from workbench.documents.model import ParameterCorrelation
-from workbench.documents.model_file import model_document, read_model
+from workbench.documents.result_files import model_document, read_model
 from workbench.output import dumps
 from workbench.report.drift import drift_sentence, reason_sentence
 from workbench.steps.drift import (

@@ -13,8 +13,8 @@ from identification.arrays import Array
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
-from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
+from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.steps.closed_loop import driven_loop, run_driven
 

@@ -21,9 +21,8 @@ from tests.chain import TABLES, model_of
 from workbench.cards.controller import CardController
 from workbench.documents.model import Model
 from workbench.report.experiment import experiment_view, reference_text
-from workbench.steps.drawn import drawn_plants, in_loop
-from workbench.steps.experiment.machines import bench_of
-from workbench.steps.experiment.plan import _remarks, experiment, made_safe
+from workbench.steps.closed_loop import drawn_plants, in_loop, present
+from workbench.steps.experiment.plan import _remarks, bench_of, experiment, made_safe
 from workbench.steps.experiment.planned import (
     Experiment,
     Wanted,
@@ -31,7 +30,6 @@ from workbench.steps.experiment.planned import (
     limits_of,
     read_rivals,
 )
-from workbench.steps.present import present
 
 pytestmark = pytest.mark.slow
 

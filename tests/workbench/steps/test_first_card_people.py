@@ -14,7 +14,7 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
-from workbench.page.card_form import OTHER_FIELD, form_of, stored_form
+from workbench.page.drops import OTHER_FIELD, form_of, stored_form
 from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
 from workbench.steps.first_card.proposal import Proposal, proposed
 from workbench.steps.first_card.written import checked_proposal, written

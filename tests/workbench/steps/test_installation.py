@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.report.installation import installation_view
+from workbench.report.doctor import installation_view
 from workbench.steps.installation import check_installation
 
 

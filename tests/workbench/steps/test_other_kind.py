@@ -6,7 +6,7 @@ from identification.velocity.record import recorded
 from identification.velocity.rivals import held_out
 from tests.identification.motor_logs import made as made_motor
 from tests.identification.velocity.made import made
-from workbench.steps.other_kind import looks_like_friction, looks_like_velocity
+from workbench.steps.velocity import looks_like_friction, looks_like_velocity
 
 MOTOR, FORCE = Rig("motor", force_per_command=1.0), Rig("force")
 VALVE = made(90, duration=30.0)

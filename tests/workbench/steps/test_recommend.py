@@ -16,11 +16,11 @@ from workbench.documents.model import Model
 from workbench.report.design_tables import margins_table
 from workbench.report.validation import validation_table
 from workbench.steps import recommend
+from workbench.steps.closed_loop import present
 from workbench.steps.design import with_choice
 from workbench.steps.linear_loop import force_period, periods
 from workbench.steps.loop_figures import PRESENT, LoopFigures
 from workbench.steps.loop_motion import LimitCycle
-from workbench.steps.present import present
 from workbench.steps.recommend import recommended
 from workbench.steps.validate import validate
 

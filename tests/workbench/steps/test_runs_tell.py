@@ -10,7 +10,7 @@ import pytest
 from identification.model.karnopp import NAMES
 from tests.identification.motor_logs import K_A, made
 from workbench.documents.model import Model
-from workbench.documents.model_file import model_document, read_model
+from workbench.documents.result_files import model_document, read_model
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines, runs_to_add

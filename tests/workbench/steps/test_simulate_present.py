@@ -17,8 +17,7 @@ from tests.chain import model_of
 from workbench.cards.card import Card, load_card
 from workbench.cli import main
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import present_loop, run_driven
-from workbench.steps.present import present_of_card
+from workbench.steps.closed_loop import present_loop, present_of_card, run_driven
 from workbench.steps.simulate import record
 
 PLANT = """

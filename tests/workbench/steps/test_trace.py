@@ -28,7 +28,7 @@ from identification.tracing.result import (
 from tests.told import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
-from workbench.documents.model_file import model_document, read_model
+from workbench.documents.result_files import model_document, read_model
 from workbench.output import dumps
 from workbench.report.friction import sliding_friction
 from workbench.report.trace import (

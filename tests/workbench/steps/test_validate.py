@@ -13,10 +13,10 @@ from design.loop import LoopRun
 from design.tune import Asked
 from identification.arrays import Array
 from tests.chain import EMPS, designed, model_of
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import shown
 from workbench.documents.design import Recommendation
-from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
+from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.report.chart import Chart
 from workbench.report.design_tables import design_sentence

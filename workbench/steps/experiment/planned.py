@@ -22,10 +22,13 @@ from workbench.documents.reading import plain, read_raw
 from workbench.steps.asked import Wanted as Wanted
 
 Criterion = Literal["D", "T"]
-FASTER_THAN_LOGS = (
-    1.5  # times the speed of the logs, that an experiment goes where no limit is given
-)
-STRONGER_THAN_LOGS = 1.2  # the same of the force
+# Times the speed and the force of the logs, that an experiment goes to where no limit is given.
+FASTER_THAN_LOGS, STRONGER_THAN_LOGS = 1.5, 1.2
+WRITTEN = (
+    "schema", "card", "motion", "criterion", "parameters", "limits", "h", "samples", "controller",
+    "segments", "promise", "separation", "safety", "efficiency", "loose", "tried", "seed",
+    "remarks", "versions",
+)  # fmt: skip
 SAID_EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
 
 
@@ -151,30 +154,16 @@ def experiment_document(found: Experiment) -> dict[str, Any]:
     """The experiment as experiment.json writes it; infinite limits are null."""
     limits = ("stroke", "speed", "force", "command", "seconds")
     safety = ("machines", "exceeding", "scale", "peaks")
-    document: dict[str, Any] = plain(
-        {
-            "schema": "experiment/1",
-            "card": found.card,
-            "motion": found.motion,
-            "criterion": found.criterion,
-            "parameters": found.parameters,
-            "limits": {name: getattr(found.limits, name) for name in limits},
-            "h": found.h,
-            "samples": len(found.r),
-            "controller": found.controller,
-            "segments": list(found.segments),
-            "promise": {
-                one.name: {k: v for k, v in vars(one).items() if k != "name"}
-                for one in found.promise
-            },
-            "separation": list(found.separation),
-            "safety": {name: getattr(found.safety, name) for name in safety},
-            "efficiency": found.efficiency,
-            "loose": found.chaotic,
-            "tried": {"segments": found.tried[0], "runs": found.tried[1]},
-            "seed": found.seed,
-            "remarks": found.remarks,
-            "versions": found.versions,
-        }
-    )
-    return document
+    own = {
+        **vars(found),
+        "schema": "experiment/1",
+        "limits": {name: getattr(found.limits, name) for name in limits},
+        "samples": len(found.r),
+        "promise": {
+            one.name: {k: v for k, v in vars(one).items() if k != "name"} for one in found.promise
+        },
+        "safety": {name: getattr(found.safety, name) for name in safety},
+        "loose": found.chaotic,
+        "tried": dict(zip(("segments", "runs"), found.tried, strict=True)),
+    }
+    return {key: plain(own[key]) for key in WRITTEN}

@@ -20,8 +20,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Motor, Plant
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
-from workbench.steps.closed_loop import DrivenLoop, limit_on, run_plant
-from workbench.steps.drawn import drawn_plants, in_loop
+from workbench.steps.closed_loop import DrivenLoop, drawn_plants, in_loop, limit_on, run_plant
 from workbench.steps.linear_loop import sampled
 from workbench.steps.loop_figures import Limits
 from workbench.steps.loop_motion import loop_motion

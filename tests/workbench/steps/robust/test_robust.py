@@ -12,8 +12,8 @@ from identification.errors import NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from tests.chain import TABLES, model_of
-from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
+from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.report.robust import robust_lines, robust_sentence, robust_view
 from workbench.steps.closed_loop import driven_loop
