@@ -119,8 +119,8 @@ def _by_force(
         again = _traced(alone[0], alone[1], rig, library, rng, report, halt)
     except NotIdentifiable:
         return told
-    if again.verdict not in ("none", "effect"):
-        return told
+    if again.verdict not in ("none", "effect") or again.verdict == told.verdict:
+        return told  # the run by the command knows its parameters better
     known = {one.effect.key for one in again.effects}
     like = (one.effect.key for one in told.effects if one.effect.key not in known)
     return replace(again, actuator_like=tuple(like))
