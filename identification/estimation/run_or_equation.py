@@ -220,10 +220,9 @@ def by_equation_if_surer(
 def left_by(p: Karnopp, recorded: RecordedLogs) -> LeftOfEquation | None:
     """What a plant of this friction, and the equation itself, leave of the force while sliding.
 
-    None where too little slides, or in one stretch alone. Of rows faster than the plant's band, in
-    which it says something else of friction; where hardly any are, of all of a body driven by the
-    measured force, whose run begins anew in every window, so that a band may take the sliding and
-    still be followed. Source:
+    None where too little slides. Of rows faster than the plant's band, in which it says something
+    else of friction; where hardly any are, of all of a body driven by the measured force, whose run
+    begins anew in every window, so that a band may take the sliding and still be followed. Source:
     cross-validation, Stone (1974).
     """
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
@@ -234,8 +233,6 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> LeftOfEquation | None:
             return None
         fast = np.ones(len(fast), dtype=np.bool_)
     rows = stacked([one.rows for one in made]).at(fast)
-    if not np.ptp(rows.block):
-        return None  # nothing is held out
     return LeftOfEquation(rms(rows.b - rows.X @ theta), rms(left_unseen(rows)), rms(rows.b))
 
 
