@@ -1,6 +1,7 @@
 """Clean rotary machines behind coarse encoders and slow logs: do the intervals hold the truth?
 
-    python benchmarks/encoders.py [--first 0] [--seeds 6]
+    python benchmarks/encoders.py [--first 0] [--seeds 6] [--kinds motor held late]
+        [--rates 200 1000]
 
 A body with Coulomb, viscous and breakaway friction under a PID loop of 1 kHz, by trapezoidal steps
 of 2 us written apart from the kernels of the fit; its sensors have no noise but the encoder's
@@ -28,6 +29,7 @@ LOOP, STEPS, SECONDS = 1e-3, 500, 30.0  # s, steps in a period, s
 TORQUE_NOISE, LIMIT, BANDWIDTH = 0.01, 5.0, 2.0 * np.pi * 6.0
 WAVES = ((1.0, 0.23), (0.5, 0.71), (0.2, 1.7), (0.05, 4.1))  # rad, Hz
 COUNTS, RATES = (500, 2000, 8000, 65536), (200.0, 1000.0)  # a turn, Hz
+KINDS = ("motor", "held", "late")
 SLIDING, STICK = ("m", "F_cp", "F_cn", "F_vp", "F_vn"), ("F_sp", "F_sn")
 
 
@@ -97,12 +99,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--rates", nargs="+", type=float, default=list(RATES), help="Hz")
     asked = parser.parse_args()
     seeds = range(asked.first, asked.first + asked.seeds)
     print("log                  told  F_c, F_v off by [%]  sliding in 95 %  stick in 95 %  refused")
-    for kind in ("motor", "held", "late"):
+    for kind in asked.kinds:
         for counts in COUNTS:
-            for rate in RATES:
+            for rate in asked.rates:
                 found, refused, began = list[tuple[str, float, bool]](), 0, time.perf_counter()
                 for seed in seeds:
                     log, rig, true = logged(kind, counts, rate, seed)

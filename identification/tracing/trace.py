@@ -24,7 +24,7 @@ from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
-from identification.thresholds import COMPLETE
+from identification.thresholds import ADEQUATE, COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.judgement import judgement
@@ -89,7 +89,7 @@ def trace(
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
     by_command = rig.kind != "motor" and told.plant.actuator is not None
-    nothing_found = not told.effects and not told.complete
+    nothing_found = not (told.effects or told.complete or _is_followed(told))
     if (told.verdict == "unknown" or nothing_found) and by_command and not halt.reached():
         told = _by_force(told, train, test, rig, library, rng, report, halt)
     if still:
@@ -106,6 +106,13 @@ def trace(
         return told
     around = replace(beside, resonance=resonance)
     return replace(told, surroundings=around, missing_force=None)  # which is of one body
+
+
+def _is_followed(told: Trace) -> bool:
+    """Whether the run leaves hardly more of the position of the test logs than noise: then the
+    command says more of the parameters than the measured force, whatever the equation leaves."""
+    error = told.after["test"].position_rms
+    return error is not None and error**2 <= ADEQUATE * told.noise_y**2
 
 
 def _by_force(

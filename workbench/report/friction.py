@@ -13,6 +13,8 @@ from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.inverse_model import zoh_force
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.resonance import load_acceleration
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
 from workbench.cards.readable import units_of
@@ -22,6 +24,7 @@ from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
 from workbench.report.chart_figure import evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
+from workbench.steps.predict import of_one_instant
 from workbench.steps.trace import Traced
 
 POINTS = 80  # of a branch of the curve
@@ -37,11 +40,14 @@ Curve = tuple[Karnopp, Sequence[Acting], Colour, str]  # colour and name of its 
 def _friction_data(model: Model, log: Log) -> tuple[Array, Array]:
     """Velocity [m/s] and friction force F_e - m a [N] of a log, (n,), both smoothed alike.
 
-    Without the model's position-dependent forces (gravity, cogging, a spring), and of two masses
-    with the second's own acceleration, so that what is left is friction alone.
+    Of the instants at which the force acts, without the model's position-dependent forces (gravity,
+    cogging, a spring), and of two masses with the second's own acceleration, so that what is left
+    is friction alone.
     """
+    late = sum(a.values["tau"] for a in model.acting if a.effect.place.delays)
+    log = Surroundings(lag=Size(late)).of_one_instant(log) if late else of_one_instant(log, model)
     motion = differentiate(log["y"], log.h)
-    F = zoh_force(log["F"]) if model.rig.kind == "motor" else log["F"]
+    F = zoh_force(log["F"]) if model.holds_force else log["F"]
     F = low_pass(F + _of_place(model, log), log.h, motion.cutoff)
     inner = slice(motion.edge, len(F) - motion.edge)
     left = F - _inertia(model, motion.a, log.h)

@@ -57,7 +57,7 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     sd = float(spread_of_left_out(np.array(apart)))
     best = share_of(found.theta)
     share = significant_share(best, sd, 1.0 - found.cost / without)
-    return Size(share, min(sd if share else float(np.hypot(sd, best)), UNSEEN.sd))
+    return Size(share, min(sd if share else float(np.hypot(sd, max(best, 0.0))), UNSEEN.sd))
 
 
 def could_show(found: Size) -> bool:

@@ -83,12 +83,14 @@ def inverse_of_gram(A: Array) -> Array:
 
 
 def left_unseen(rows: Rows) -> Array:
-    """What is left (r,) of each block by the least squares of all others.
+    """What is left (r,) of each block by the least squares of all others: of the only one, all.
 
     Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111.
     """
-    left = np.zeros(len(rows.b))
-    for block in np.unique(rows.block):
+    blocks, left = np.unique(rows.block), np.zeros(len(rows.b))
+    if len(blocks) == 1:
+        return rows.b
+    for block in blocks:
         out = rows.block == block
         left[out] = (rows.b - rows.X @ solve_rows(rows, ~out).theta)[out]
     return left
