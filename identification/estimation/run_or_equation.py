@@ -94,17 +94,16 @@ def answered(
 ) -> KarnoppFit:
     """The fit of whatever answers for the logs, from a plain structure that has been searched.
 
-    quick: not over whole runs, and not in windows where the equation is surer, as where no run
-    follows. Source: as `on_the_floor`, Stone (1974).
+    quick: not over whole runs, and not in windows where the equation is surer. Source: as
+    `on_the_floor`, Stone (1974).
     """
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else "no free run follows these logs"
         if recorded.steps:
             raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
         return fit_imposed(recorded, why)
-    no_run = is_no_run(found.misfit)
-    if no_run or (quick and not is_adequate(found.misfit)):
-        fit = by_equation_if_surer(found.plant.friction, recorded, no_run=no_run)
+    if quick and not is_adequate(found.misfit):
+        fit = by_equation_if_surer(found.plant.friction, recorded)
         if fit is not None:
             return fit
     try:
@@ -206,15 +205,11 @@ def _bends(plant: Plant, fit: KarnoppFit, recorded: RecordedLogs) -> bool:
     return now is not None and was is not None and now.by_plant > WORSE * was.by_plant
 
 
-def by_equation_if_surer(
-    p: Karnopp, recorded: RecordedLogs, *, no_run: bool = False
-) -> KarnoppFit | None:
-    """The fit by the equation of motion, where a plant leaves clearly more of it, or no run
-    follows; else None."""
+def by_equation_if_surer(p: Karnopp, recorded: RecordedLogs) -> KarnoppFit | None:
+    """The fit by the equation of motion, where a plant leaves clearly more of it; else None."""
     left = left_by(p, recorded)
-    surer = left is not None and left.surer
-    fit = _by_equation(recorded, FLOOR_WHY) if surer or no_run else None
-    return fit if fit is None or left is None else _unless_unexplained(fit, left)
+    fit = _by_equation(recorded, FLOOR_WHY) if left is not None and left.surer else None
+    return None if fit is None or left is None else _unless_unexplained(fit, left)
 
 
 def left_by(p: Karnopp, recorded: RecordedLogs) -> LeftOfEquation | None:
@@ -237,7 +232,7 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> LeftOfEquation | None:
 
 
 def is_no_run(misfit: float) -> bool:
-    """Whether a run that leaves so much is not the body's own motion."""
+    """Whether a run by the measured force that leaves so much is not the body's own motion."""
     return misfit > HOPELESS
 
 

@@ -109,10 +109,12 @@ def trace(
 
 
 def _is_followed(told: Trace) -> bool:
-    """Whether the run leaves hardly more of the position of the test logs than noise: then the
-    command says more of the parameters than the measured force, whatever the equation leaves."""
+    """Whether nothing is named and the run leaves hardly more of the position of the test logs than
+    noise: then the command says more of the parameters than the measured force, whatever the
+    equation leaves."""
     error = told.after["test"].position_rms
-    return error is not None and error**2 <= ADEQUATE * told.noise_y**2
+    followed = error is not None and error**2 <= ADEQUATE * told.noise_y**2
+    return told.verdict == "none" and followed
 
 
 def _by_force(

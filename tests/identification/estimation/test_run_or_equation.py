@@ -10,14 +10,11 @@ import pytest
 from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
-from identification.estimation.run_or_equation import FLOOR_WHY, LIKELIEST, answered, likeliest
-from identification.estimation.structure_fit import plain_structure
+from identification.estimation.run_or_equation import LIKELIEST, likeliest
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant
-from identification.progress import Halt, quiet
-from identification.thresholds import HOPELESS
-from tests.identification.estimation.regression.test_held_command import M, driven
+from identification.progress import Halt
 from tests.identification.plants import made_log, table
 
 RIG = Rig("force")
@@ -66,17 +63,3 @@ def test_a_fit_that_is_not_adequate_or_was_halted_stays_as_it_is() -> None:
     halt = Halt(lambda: False)
     assert likeliest(fit, replace(recorded, halt=halt)) is fit
     assert halt.not_tried == (LIKELIEST,)
-
-
-def test_of_a_run_that_no_model_follows_no_window_is_fitted(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A slow motor without a sign of inertia: stiff runs that stay hopeless took a minute."""
-    log = driven(1)[0]
-    recorded = recorded_logs([log], Rig("motor", force_per_command=1.0))
-    found = plain_structure(recorded, np.random.default_rng(0))
-    calls = list[float]()
-    monkeypatch.setattr(run_or_equation, "settled", lambda *_, **__: calls.append(1.0))
-    fit = answered(replace(found, misfit=2.0 * HOPELESS), recorded, quiet)
-    assert not calls and FLOOR_WHY in fit.remarks[0]
-    assert fit.estimates["m"].value == pytest.approx(M, rel=0.01)
