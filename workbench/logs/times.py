@@ -304,9 +304,8 @@ def even_stamps(t: Array) -> tuple[Array, str]:
     period = float(line[1] - line[0])
     together = step < _TOGETHER * period
     at_a_time = len(t) / (1 + int(np.sum(~together)))
-    uneven = (
-        float(np.ptp(step[together]) if np.any(together) else 0.0) > MOST_FAULTY * period
-    )  # as no sampler is
+    # As no sampler is.
+    uneven = np.any(together) and float(np.ptp(step[together])) > MOST_FAULTY * period
     buffered = uneven and _FEWEST_AT_A_TIME < at_a_time < _ROWS_OF_A_MEAN
     if not buffered and not np.any(same):
         return _without_rounding(t, step)

@@ -88,6 +88,15 @@ def test_a_lag_of_the_equation_is_refined_by_a_run_that_shows_another() -> None:
     assert late_position._best_lag(lambda _: 1.2, Halt(), 6.0) == 6.0  # it follows as it is
 
 
+def test_the_lags_beside_that_of_the_equation_come_first() -> None:
+    """Where hardly any lag lets a run follow, a step down a flat slope leads past the one."""
+
+    def left(samples: float) -> float:
+        return 0.5 if samples == 1.5 else 50.0 - samples
+
+    assert late_position._best_lag(left, Halt(), 1.0) == 1.5
+
+
 @pytest.mark.parametrize(("seed", "late"), [(0, 0), (0, 1), (1, 0), (1, 2), (4, 1)])
 def test_a_lag_of_a_short_slow_log_is_found_where_the_command_jumps_and_nowhere_else(
     seed: int, late: int

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log
 from identification.model.estimates import Drive, Estimate
@@ -15,7 +16,9 @@ from tests.chain import model_of
 from workbench.cards.card import load_card
 from workbench.documents.model import Model
 from workbench.logs.sources import Source, Sources, card_path
+from workbench.report import friction
 from workbench.steps import drift
+from workbench.steps import predict as predict_step
 from workbench.steps.predict import force_by_model, of_one_instant, seen_moving
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
@@ -80,6 +83,32 @@ def test_a_log_is_taken_at_the_lag_of_the_model_and_held_as_its_logs_were() -> N
     assert of_one_instant(log, replace(late_model(), lag=None)) is log
     # Of an actuator it is the period of its command, whose integral is the force.
     assert not of_one_instant(log, late_model(command_period=1e-3, drive="command")).held
+
+
+@pytest.mark.parametrize(("period", "held"), [(1e-3, True), (None, False)])
+def test_a_force_that_is_held_is_so_in_its_prediction(
+    period: float | None, held: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line through its samples is half of one ahead: 3 % of a chattering force was left."""
+    seen: list[bool] = []
+
+    def force(model: Model, log: Log, how: Smoothing) -> Array:
+        seen.append(how.held)
+        return np.zeros(len(log))
+
+    monkeypatch.setattr(predict_step, "force_by_model", force)
+    model = late_model(command_period=period)
+    predict_step.predict(model, swing().with_signals(F=np.sin(np.arange(4000.0))))
+    assert seen == [held] and model.holds_force is held
+
+
+def test_the_friction_of_a_log_is_that_of_the_instants_at_which_its_force_acts() -> None:
+    log, model = swing(), late_model()
+    F = np.sin(40.0 * log["t"])
+    behind = log.with_signals(F=np.append(F[3:], np.full(3, F[-1])))  # 3 ms before its position
+    _, on_time = friction._friction_data(replace(model, lag=None), log.with_signals(F=F))
+    _, late = friction._friction_data(model, behind)
+    assert late[50:-50] == pytest.approx(on_time[50:-50], abs=1e-3)
 
 
 def test_a_log_is_tested_for_drift_at_the_lag_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
