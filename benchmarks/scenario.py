@@ -160,8 +160,9 @@ def write(folder: Path, day: Day, seed: int) -> None:
     pd.DataFrame(as_columns(log, card)).to_csv(path, index=False, float_format="%.10g")
     if day.fault == "unreadable":
         text = path.read_text("utf-8")
-        # A logger that was switched off half-way through a line, and one that lost a column.
-        path.write_text(text[: len(text) // 2] if day.number % 2 else text.replace("F,", "", 1))
+        # A logger that was switched off before its first row, and one that lost a column's name.
+        cut = text.splitlines(keepends=True)[0]
+        path.write_text(cut if day.number % 2 else text.replace("F,", "", 1))
     os.utime(path, (day.at.timestamp(), day.at.timestamp()))
 
 

@@ -21,7 +21,7 @@ from identification.estimation.windowed_run.run_errors import soft
 from identification.estimation.windowed_run.windows import left_in_windows, starts, window_of
 from identification.model.estimates import Drive
 from identification.signals.sampling import samples
-from identification.thresholds import ASTRAY
+from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.dependence import MOST_SIGNALS, dependence
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import joined, signals_at, signals_of
@@ -38,7 +38,7 @@ def remaining_structure(choice: Choice, after: FittedStructure) -> Dependence:
     """The strongest structure that is left in any equation, if there is any."""
     best, most = Dependence((), 0.0), 0.0
     for equation, o in choice.base.items():
-        if o.robust and mean_square(o) < ASTRAY:
+        if o.robust and mean_square(o) < ADEQUATE:
             continue
         keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         found = _in_equation(choice, equation, keep)

@@ -119,6 +119,8 @@ def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress)
     recorded = plain.recorded
     asking = recorded.halt.asking(report)
     fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
+    if recorded.halt.reached():  # a fit that is halted in its last steps gives the best so far
+        recorded.halt.left_out(INTERVALS)
     if fit is None:  # at least no worse than the equation of motion by itself
         with recorded.halt.closing():
             fit = by_equation_if_surer(plain.model.plant.friction, recorded)
