@@ -9,6 +9,7 @@ import pytest
 
 from identification.effects._library import Library, built_in
 from identification.estimation.fit import fit_plant
+from identification.estimation.surroundings import surrounding_estimates
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.tracing.trace import trace
@@ -33,11 +34,11 @@ MOST_LOGS = 3  # of a set
 def both(
     logs: list[Log], rig: Rig, library: Library
 ) -> tuple[Mapping[str, Estimate], Mapping[str, Estimate]]:
-    """What the estimator and the tracer say of the parameters."""
+    """What the estimator and the tracer say of the parameters, with what acts beside friction."""
     fit = fit_plant(logs, np.random.default_rng(SEED), rig=rig)
     found = trace(logs, [], rig, library, np.random.default_rng(SEED))
     assert not found.effects
-    return fit.estimates, found.parameters_after
+    return fit.estimates, {**found.parameters_after, **surrounding_estimates(found.surroundings)}
 
 
 @pytest.mark.method
