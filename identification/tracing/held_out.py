@@ -28,6 +28,7 @@ from identification.tracing.probability import Evidence, evidence
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import missing_force
 from identification.tracing.result import Change, Errors, MissingForce
+from identification.tracing.structure_search import likelier_plain
 from identification.tracing.verdict import explains_most
 
 AS_LARGE_AS_FRICTION = (
@@ -226,10 +227,18 @@ class HeldOut:
         """The force that either model lacks on the test logs."""
         return self._missing(())
 
+    @cached_property
+    def _likelier_plain(self) -> FittedStructure:
+        """The plain model against which effects, where there are any, are held."""
+        plain = self.plain.model
+        if self.model is plain:
+            return plain
+        return likelier_plain(self.plain, self.choice.base[MECHANICAL].slowest)
+
     def _missing(self, changed: Sequence[Change]) -> MissingForce | None:
         """The same with the parameters that have changed as they are on the test logs."""
         slowest = max(self.choice.base[MECHANICAL].slowest, band(self.model))
-        before = with_changes(self.plain.model, changed)
+        before = with_changes(self._likelier_plain, changed)
         after = before if self.model is self.plain.model else with_changes(self.model, changed)
         return missing_force(before, after, self.unseen, slowest)
 

@@ -1,14 +1,20 @@
 """Selection and refinement: effects that the equations call for, and that the run confirms."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from identification.effects._base import Effect
 from identification.estimation.fit import finished
-from identification.estimation.latent_force import latent_forces
+from identification.estimation.latent_force import LatentForces, latent_forces
 from identification.estimation.prediction_error import prediction_error_fit, significant
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regressed_plant import regressed_plant
+from identification.estimation.regression.effect_columns import Values
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL
+from identification.estimation.regression.row_fit import RowFit
 from identification.estimation.run_or_equation import (
     LIKELIEST,
     by_equation_if_surer,
@@ -69,17 +75,10 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     """
     if model.imposed or not choice.steps:
         return model
-    found = regressed_plant(choice.end, choice.base, choice.effects, setting.recorded)
-    known = {name for name, sd in found.prior.items() if name in model.sd and sd > 0.0}
-    names = [name for name in shown_sliding(model.plant) if name in known]
-    given = [*names, *(name for name in ("k1", "k2") if name in known)]
-    plant = plant_with(model.plant, given, values_of(found.plant, given))
     slowest = choice.base[MECHANICAL].slowest
-    lacks, other = (latent_forces(one, setting.logs, slowest) for one in (model.plant, plant))
-    bent = significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names))
-    if bent:
-        lacks = other
-        model = replace(model, plant=plant, sd={**model.sd, **{n: found.prior[n] for n in given}})
+    model, names, bent, lacks = _by_equations(
+        model, choice.end, choice.base, choice.effects, setting.recorded, slowest
+    )
     walks = any(one.walks(setting.drive) for one in setting.logs)
     if not (bent or walks):
         return model
@@ -98,6 +97,33 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     rows = {n: x for n, x in model.sd.items() if n not in _searched(model.plant)}
     own = {name: max(sd, rows.get(name, 0.0)) for name, sd in best.sd.items()}
     return replace(model, plant=best.plant, sd={**model.sd, **own})
+
+
+def _by_equations(
+    model: FittedStructure, stage: EffectRows, base: Mapping[str, RowFit],
+    effects: Sequence[tuple[Effect, Values]], recorded: RecordedLogs, slowest: float,
+) -> tuple[FittedStructure, list[str], bool, LatentForces]:  # fmt: skip
+    """The model with sliding friction and effects as the equations identify them, if that is
+    significantly likelier than as its run has them; the parameters of sliding that it identifies,
+    whether it is, and what the model then lacks."""
+    found = regressed_plant(stage, base, effects, recorded)
+    known = {name for name, sd in found.prior.items() if name in model.sd and sd > 0.0}
+    names = [name for name in shown_sliding(model.plant) if name in known]
+    given = [*names, *(name for name in ("k1", "k2") if name in known)]
+    plant = plant_with(model.plant, given, values_of(found.plant, given))
+    lacks, other = (latent_forces(one, recorded.logs, slowest) for one in (model.plant, plant))
+    if not significant(2.0 * (other.log_likelihood - lacks.log_likelihood), len(names)):
+        return model, names, False, lacks
+    sd = {**model.sd, **{n: found.prior[n] for n in given}}
+    return replace(model, plant=plant, sd=sd), names, True, other
+
+
+def likelier_plain(plain: PlainModel, slowest: float) -> FittedStructure:
+    """The plain model as effects are to be held against it: as its equations have it, where those
+    are likelier than its run, so that what this bent is not laid to an effect. As `likelier`."""
+    if plain.model.imposed:
+        return plain.model
+    return _by_equations(plain.model, plain.start, plain.first, (), plain.rows.recorded, slowest)[0]
 
 
 def _searched(plant: Plant) -> set[str]:
