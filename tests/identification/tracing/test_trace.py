@@ -142,7 +142,7 @@ def test_an_effect_that_the_library_lacks_is_unknown(
     assert found.next_experiment
 
 
-@pytest.mark.method
+@pytest.mark.slow
 def test_what_an_actuator_lacks_is_not_laid_to_friction() -> None:
     """A valve whose leakage the library does not know: friction is traced by the measured force."""
     library = {k: e for k, e in built_in().items() if k != "leakage"}

@@ -34,16 +34,21 @@ def colored(n: int, rng: np.random.Generator) -> Array:
     return np.asarray(lfilter([0.6], [1.0, -0.8], white))
 
 
+def white(n: int, rng: np.random.Generator) -> Array:
+    """Noise of a position [m] whose speed is known: a steep law reads each error of it."""
+    return NOISE_Y * rng.standard_normal(n)
+
+
 def nothing(v: Array) -> Array:
     return 0.0 * v
 
 
 def strokes(
     bar: float, speeds: Sequence[float], seed: int, *, stroke: float = 0.02, name: str = "",
-    added: Callable[[Array], Array] = nothing,
+    added: Callable[[Array], Array] = nothing, noise: Callable[..., Array] = colored,
 ) -> Log:  # fmt: skip
     """Strokes to and fro at these speeds [m/s], with friction that grows with the pressure and
-    what is added to it [N] at a speed."""
+    what is added to it [N] at a speed; noise: of the position [m]."""
     rng = np.random.default_rng(seed)
     ways = [np.full(round(2 * stroke / s / H), way * s) for s in speeds for way in (1, -1)]
     v = np.concatenate(ways)
@@ -51,7 +56,7 @@ def strokes(
     friction = COULOMB + PER_BAR * bar + added(np.abs(v))
     signals = {
         "t": H * np.arange(n, dtype=np.float64),
-        "y": H * np.cumsum(v) + colored(n, rng),
+        "y": H * np.cumsum(v) + noise(n, rng),
         "F": np.sign(v) * friction + NOISE_F * rng.standard_normal(n),
         "p_n": 1e5 * bar + 2e3 * rng.standard_normal(n),
     }
@@ -85,7 +90,9 @@ def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     def falls(v: Array) -> Array:
         return np.asarray(2.0 * np.exp(-((v / 6e-3) ** 2)))
 
-    one, other = (strokes(1, SPEEDS, seed, stroke=0.01, added=falls) for seed in (1, 2))
+    one, other = (
+        strokes(1, SPEEDS, seed, stroke=0.01, added=falls, noise=white) for seed in (1, 2)
+    )
     found = traced([one], [other])
     assert [e.effect.key for e in found.effects] == ["stribeck"]
     assert found.effects[0].params["v_s"].value == pytest.approx(6e-3, rel=0.1)
