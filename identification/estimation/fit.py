@@ -108,8 +108,10 @@ def fit_beside(
     inertia does not show.
     """
     alone = [beside.taken_out(log) for log in logs]
+    up = way_of(alone, held=rig.kind == "motor")
+    turns = bool(beside.orders) and up is not None
     try:
-        fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick)
+        fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick, turns=turns)
     except NotIdentifiable as refused:
         if are_steps(alone):
             raise
@@ -120,7 +122,6 @@ def fit_beside(
     if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
         with suppress(NotIdentifiable):
             fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
-    up = way_of(alone, held=rig.kind == "motor")
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
     if shows and not (fit.adequate or beside.orders or halt.reached()):
@@ -142,8 +143,13 @@ def fit_beside(
 def _fit(
     logs: Sequence[Log], rng: np.random.Generator, rig: Rig, drive: Drive | None,
     prior: Plant | None, on_progress: Progress | None, halt: Halt, *, quick: bool = False,
+    turns: bool = False,
 ) -> KarnoppFit:  # fmt: skip
-    """As `fit_plant`, of logs beside whose applied force nothing acts but what the prior has."""
+    """As `fit_plant`, of logs beside whose applied force nothing acts but what the prior has.
+
+    turns: they turn one way, with orders of the turn; raises NotIdentifiable where no run is near,
+    which a long fit would not bring there.
+    """
     report = on_progress or quiet
     report("refining", 0.0)
     recorded = recorded_logs(logs, rig, drive, halt)
@@ -158,6 +164,8 @@ def _fit(
             fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
             return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     recorded, found = by_exact_force(recorded, plain_structure(recorded, begin), other)
+    if turns and found.misfit > HOPELESS:
+        raise NotIdentifiable(ONE_WAY_WHY)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
     fit = finished(found, recorded, settle, report, by=drive, quick=quick)
