@@ -7,7 +7,7 @@ is evidence only, which the column's own numbers may outweigh.
 
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -18,7 +18,7 @@ from identification.errors import BadCard
 from identification.log import Rig
 from workbench.cards.card_tables import SignalSpec
 from workbench.cards.units import scale_or_none
-from workbench.cards.written_units import Quantity, WrittenUnit, written_unit
+from workbench.cards.written_units import LOG_WORDS, Quantity, WrittenUnit, written_unit
 
 Purpose = Literal["reference", "demand", "measured", "error", "model", "filtered", ""]
 
@@ -62,87 +62,23 @@ _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
 
-_WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they contain others
-    "time": "timestamp time zeit clock elapsed uhr 時間 時刻 时间 时刻 temps tempo tiempo",
-    "position": "position posizione posicion posn pos displacement displ disp deplacement weg lage"
-    " auslenkung hub stroke travel laser encoder lvdt schlitten spostamento abstand distance 位置"
-    " 変位 ストローク 位移 行程 转角 angle winkel angulo theta phi 角度 回転角 joint gelenk",
-    "velocity": "velocity velocita velocidad vel speed geschw drehzahl vitesse 速度 回転数 转速"
-    " omega",
-    "acceleration": "acceler accel acc beschl 加速度",
-    "force": "loadcell force kraft thrust fuerza forza effort torque moment couple coppia トルク 力"
-    " 荷重 推力 扭矩 转矩 力矩 拉力",
-    "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧 压力 气压",
-    "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung voltaje"
-    " tensao dac output ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
-    " courant corrente corriente 電流 电流 电压 控制量 motor",
-    "temperature": "temperatur temper temp thermo 温度",
-    "count": "index idx sample counter scan zaehler lfd row 番号 連番 序号 编号",
-    "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
-    " schleppfehler 偏差 误差 使能 报警 状态 supply versorgung input_volts 電源"
-    " saturation saturated sättigung saettigung activated active aktiv fault warning"
-    " warnung valid betriebsart zustand state"
-    " battery batterie akku vbus vbat vdc vcc udc zwischenkreis power leistung energy energie"
-    " i2t gain trigger 状態 異常 電力 trust feedforward vorsteuerung humidity frequency frequenz"
-    " load_cycle checksum crc latency integrator integral",
+_WORDS: Mapping[Quantity, Sequence[str]] = {
+    what: line.split() for what, line in LOG_WORDS["words"].items()
 }
-_SHORT: Mapping[Quantity, str] = {  # whole words of up to five letters, each with its weight
-    "time": "t 3 dt 1",
-    "position": "y 3 x 3 z 2 q 2 s 1.5 enc 2 alpha 1.5 beta 1.5 psi 1.5",
-    "velocity": "v 2 w 0.5 n 0.5 qd 2 dq 2 dx 2 dy 2 spd 3 rpm 3 erpm 3",
-    "acceleration": "a 1 acc 3 qdd 2 ddq 2",
-    "force": "f 3 m 0.5 tau 2 trq 3 tor 2 eff 2",
-    "pressure": "p 2.5 pa 2 pb 2 pp 2 pn 2",
-    "command": "u 3 i 1.5 v 0.5 vm 2 mot 1 iq 3 isq 3 ia 2.5 im 2 cur 2 amp 2 uq 2 vq 2 ua 2 in 1"
-    " out 1",
-    "temperature": "t 0.5",
-    "count": "n 1 k 1 i 0.5 nr 2 no 2",
-    "other": "id 2 isd 2 ud 2 vd 2 kp 2 ki 2 kd 2 ff 1.5",
-}
+_MAY_TURN: Mapping[str, float] = LOG_WORDS["turning"]
+_WHOLE: Mapping[str, Sequence[str]] = LOG_WORDS["whole"]
 
 
 def _short_words() -> dict[str, dict[Quantity, float]]:
     """What each short word may mean, with its weight."""
     out: dict[str, dict[Quantity, float]] = {}
-    for quantity, line in _SHORT.items():
-        words = line.split()
-        for word, weight in zip(words[::2], words[1::2], strict=True):
+    for quantity, words in LOG_WORDS["short"].items():
+        for word, weight in words.items():
             out.setdefault(word, {})[quantity] = float(weight)
     return out
 
 
 _SHORT_WORDS = _short_words()
-_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "torque", "トルク", "扭矩",
-           "转矩", "力矩", "转速", "转角", "drehmoment", "motormoment", "drehzahl", "omega", "rpm",
-           "elbow", "knee", "wrist", "shoulder", "pendulum", "pendel")  # fmt: skip
-# Words that machines which turn use more than others: currents of a rotor's axes, Greek letters.
-_MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5, "alpha": 1.0,
-             "beta": 1.0, "psi": 1.0, "q": 0.5, "qd": 0.5, "hip": 1.5, "yaw": 1.5, "moment": 1.0,
-             "phase": 0.5, "joint": 1.2, "gelenk": 1.2, "関節": 1.2, "steering": 1.0, "axle": 1.0,
-             "arm": 0.5}  # fmt: skip
-_REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
-              "vorgabe", "consigne", "fuehrung", "führung", "目標", "目标", "设定", "给定", "指令",
-              "rif", "trajectory", "planned")  # fmt: skip
-_REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
-_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定", "实际",
-             "反馈", "测量", "messwert", "encoder")  # fmt: skip
-_MEASURED_SHORT = ("ist", "act", "meas", "msr", "mes", "fb", "fbk", "m")
-_MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
-          "推定", "vorhersage")  # fmt: skip
-_MODEL_SHORT = ("pred", "hat", "sim", "mdl", "nn", "mlp", "lstm", "net", "modell")
-_ERRORS = (
-    "error",
-    "abweichung",
-    "differenz",
-    "schleppfehler",
-    "偏差",
-    "deviation",
-    "following",
-    "误差",
-)
-_FILTERED = ("filter", "smooth", "geglätt", "geglaett", "lowpass", "low pass", "滤波", "フィルタ")
-_FILTERED_SHORT = ("filt", "lpf")
-_SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
 _GREEK = str.maketrans({"θ": "theta", "φ": "phi", "ω": "omega", "τ": "tau", "α": "alpha",
                         "β": "beta", "ψ": "psi"})  # fmt: skip
 _PARTS = re.compile(r"/|(?<=\w)[\"']?\.(?=[^\W\d])")  # of a path, and of a variable in a structure
@@ -192,7 +128,7 @@ def _read(text: str, unit_below: str) -> Header:
         means, purpose = {"command": 2.0}, "demand"
     elif purpose == "reference" and not means:
         means = {"position": 1.5}
-    angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
+    angle = _holds(whole, "angles") or bool(unit and unit.rotary)
     turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
     return Header(text, name, unit, means, purpose, angle, doubtful, turning)
 
@@ -261,10 +197,15 @@ def words_of(name: str) -> list[str]:
     return [one for one in re.split(r"[\W_]+", small) if one]
 
 
+def _holds(text: str, *kinds: str) -> bool:
+    """Whether the text holds a part of a word of one of these kinds."""
+    return any(part in text for kind in kinds for part in LOG_WORDS["parts"][kind])
+
+
 def says_purpose(word: str) -> bool:
     """Whether a word says what a signal is for (soll, actual, cmd), not what it is."""
-    parts = any(one in word for one in (*_REFERENCE, *_MEASURED, *_MODEL))
-    return parts or word in (*_REFERENCE_SHORT, *_MEASURED_SHORT, *_MODEL_SHORT, "command")
+    parts = _holds(word, "reference", "measured", "model")
+    return parts or word in (*_WHOLE["reference"], *_WHOLE["measured"], *_WHOLE["model"], "command")
 
 
 def meaning(word: str) -> Mapping[Quantity, float]:
@@ -281,14 +222,14 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
                 found[quantity] = max(found.get(quantity, 0.0), weight)
             continue
         best: tuple[int, Quantity] | None = None
-        for quantity, line in _WORDS.items():
-            for part in line.split():
+        for quantity, parts in _WORDS.items():
+            for part in parts:
                 if part in word and (best is None or len(part) > best[0]):
                     best = (len(part), quantity)
         if best is not None:
             found[best[1]] = max(found.get(best[1], 0.0), _TWO_WEIGHTS)
-    wrong = any(one in whole for one in _ERRORS) or {"err", "e"} & set(words)
-    if ("other" in found and not wrong) or any(one in whole for one in _SUPPLIES) or "bus" in words:
+    wrong = _holds(whole, "errors") or {"err", "e"} & set(words)
+    if ("other" in found and not wrong) or _holds(whole, "supplies") or "bus" in words:
         return {"other": _TWO_WEIGHTS}
     if found.get("temperature", 0.0) >= _TWO_WEIGHTS:
         return {"temperature": _TWO_WEIGHTS}
@@ -309,30 +250,30 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
 
 def _commands(word: str) -> bool:
     """Whether a word holds one that may mean a command."""
-    parts = any(one in word for one in _WORDS["command"].split())
+    parts = any(one in word for one in _WORDS["command"])
     return parts or "command" in _SHORT_WORDS.get(word, {})
 
 
 def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> Purpose:
-    if any(one in whole for one in _ERRORS) or {"err", "e"} & set(words):
+    if _holds(whole, "errors") or {"err", "e"} & set(words):
         return "error"
-    if any(one in whole for one in _MODEL) or any(one in _MODEL_SHORT for one in words):
+    if _holds(whole, "model") or any(one in _WHOLE["model"] for one in words):
         return "model"
-    said = any(one in whole for one in _MEASURED)
-    letters = said or any(one in _MEASURED_SHORT and len(one) > 1 for one in words)
+    said = _holds(whole, "measured")
+    letters = said or any(one in _WHOLE["measured"] and len(one) > 1 for one in words)
     # A letter is then that of a parameter, as it is before a number: the R of "R820".
     named = {one for one, after in pairwise(words) if after.isdigit() and len(after) > 1}
-    short = [one for one in words if one in _REFERENCE_SHORT
+    short = [one for one in words if one in _WHOLE["reference"]
              and not (len(one) == 1 and (letters or one in named))]  # fmt: skip
-    if any(one in whole for one in _REFERENCE) or short:
+    if _holds(whole, "reference") or short:
         return "reference"
     if any(one.startswith("command") for one in words) and "position" in means:
         return "reference"
-    if said or any(one in _MEASURED_SHORT for one in words):
+    if said or any(one in _WHOLE["measured"] for one in words):
         return "measured"
     if any(one.startswith("ist") for one in words):  # Istposition, Istwert
         return "measured"
-    if any(one in whole for one in _FILTERED) or any(one in _FILTERED_SHORT for one in words):
+    if _holds(whole, "filtered") or any(one in _WHOLE["filtered"] for one in words):
         return "filtered"
     return ""
 

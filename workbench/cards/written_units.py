@@ -1,9 +1,11 @@
 """Units as logs of machines write them, in the languages of their loggers."""
 
 import re
+import tomllib
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.resources import files
 from typing import Literal
 
 Quantity = Literal[
@@ -26,48 +28,13 @@ class WrittenUnit:
         return self.card.lstrip("0123456789. ") or self.card
 
 
-_SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
-    "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis 毫秒"
-    " milliseconds millisekunden ミリ秒; us: us µs usec micros microseconds mikrosekunden 微秒;"
-    " ns: ns nsec nanoseconds; min: min minutes minuten 分 分钟",
-    "position": "m: m meter metre meters 米; mm: mm millimeter millimetre ミリ 毫米; cm: cm 厘米;"
-    " um: um µm micron microns mikrometer micrometer 微米; nm: nm 纳米;"
-    " inch: in inch inches zoll; foot: ft",
-    "velocity": "m/s: m/s mps m/sec meters/sec 米/秒; mm/s: mm/s mmps mm/sec 毫米/秒;"
-    " um/s: um/s µm/s; cm/s: cm/s; inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
-    "acceleration": "m/s^2: m/s^2 m/s² m/s2 m/s**2; mm/s^2: mm/s^2 mm/s² mm/s2",
-    "force": "N: n newton newtons 牛 牛顿; kN: kn 千牛; mN: mn; lbf: lbf lb lbs;"
-    " kip: kip; kgf: kgf kp kg",
-    "pressure": "bar: bar barg bara bar(g) 巴; mbar: mbar 毫巴; Pa: pa pascal 帕;"
-    " kPa: kpa 千帕; hPa: hpa; MPa: mpa 兆帕; psi: psi psig psia; atm: atm;"
-    " kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
-    "command": "V: v volt volts vdc vrms 伏 伏特; mV: mv 毫伏;"
-    " A: a amp amps ampere arms apk adc 安 安培;"
-    " mA: ma 毫安; %: % pct percent prozent"
-    " %pwm %duty; 1: 1 - dimensionless",
-    "count": "count: count counts counts16bit counts32bit cnt cnts inc"
-    " incs ink inkremente increments pulse pulses pls"
-    " パルス 脉冲 ticks tick digits digit dig lsb steps",
-    "temperature": "degC: °c ℃ degc deg_c celsius c 摄氏度; degF: °f degf; K: k kelvin",
-}
-_SPELT_ROTARY: Mapping[Quantity, str] = {
-    "position": "rad: rad radians 弧度; mrad: mrad; deg: deg degree degrees ° grad 度;"
-    " turn: turn turns rev revs rot rotation rotations u umdr umdrehungen 回転 转",
-    "velocity": "rad/s: rad/s rads radps rad/sec radians/sec; deg/s: deg/s °/s dps degps deg/sec"
-    " degrees/sec; rpm: rpm u/min 1/min min-1"
-    " 转/分 r/min rev/min upm; turn/s: rev/s turn/s rps rotations/sec rot/sec",
-    "acceleration": "rad/s^2: rad/s^2 rad/s² rad/s2; deg/s^2: deg/s^2 deg/s² deg/s2 °/s² °/s^2",
-    "force": "N m: nm n·m n.m n*m n-m newtonmeter 牛米 牛·米; mN m: mnm mn·m; N cm: ncm;"
-    " lbf inch: lb-in lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft; ozf inch: oz-in ozin;"
-    " kgf cm: kgf-cm kgf·cm kgfcm kg-cm kg·cm kgcm; N mm: nmm n·mm n-mm",
-}
+LOG_WORDS = tomllib.loads((files("workbench.cards") / "log_words.toml").read_text("utf-8"))
 
 
 def _table() -> Iterator[tuple[str, WrittenUnit]]:
-    for spelt, rotary in ((_SPELT, False), (_SPELT_ROTARY, True)):
-        for quantity, line in spelt.items():
-            for entry in line.split(";"):
-                card, _, spellings = entry.strip().partition(": ")
+    for table, rotary in (("units", False), ("rotary_units", True)):
+        for quantity, units in LOG_WORDS[table].items():
+            for card, spellings in units.items():
                 for one in spellings.split():
                     yield one, WrittenUnit(card, quantity, rotary)
 

@@ -13,44 +13,18 @@ from workbench.cards.readable import as_shown, in_digits, length, number, shown,
 from workbench.documents.model import Model, used
 from workbench.documents.velocity import VelocityModel
 from workbench.remarks import printed_once
+from workbench.report.templating import MEANINGS
 from workbench.report.trace_words import share_of_friction
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, more, tabled
 
 MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")
-MEANING = {
-    "m": "moving mass",
-    "F_cp": "Coulomb friction, positive direction",
-    "F_cn": "Coulomb friction, negative direction",
-    "F_vp": "viscous friction, positive direction",
-    "F_vn": "viscous friction, negative direction",
-    "dv_p": "stick band, upper velocity limit",
-    "dv_n": "stick band, lower velocity limit",
-    "F_sp": "breakaway force, positive direction",
-    "F_sn": "breakaway force, negative direction",
-    "k1": "actuator gain",
-    "k2": "actuator back-effect of velocity",
-    "k_a": "motor constant",
-}
-RESONANCE = {
-    "frequency": "resonance of two masses with a spring between",
-    "anti_resonance": "below it, where the measured mass stands still",
-    "damping": "of the resonance",
-    "m_1": "the mass that is measured",
-    "m_2": "the mass behind the spring",
-}
-ROTARY_MEANING = {
-    **MEANING,
-    "m": "moment of inertia",
-    "F_sp": "breakaway torque, positive direction",
-    "F_sn": "breakaway torque, negative direction",
-}
 
 
 def parameter_rows(model: Model) -> list[Row]:
     """Parameter, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
     found = {**model.friction, **(model.actuator or {})}
-    meaning = ROTARY_MEANING if model.rotary else MEANING
+    meaning = MEANINGS["parameters"] | (MEANINGS["parameters_of_rotary"] if model.rotary else {})
     rows: list[Row] = [
         (name, *estimate_cells(value), meaning.get(name, "")) for name, value in found.items()
     ]
@@ -67,7 +41,7 @@ def parameter_rows(model: Model) -> list[Row]:
         )
     for name, one in (model.resonance or {}).items():
         rows.append((name.replace("_", "-") if "resonance" in name else name,
-                     *estimate_cells(one), RESONANCE[name]))  # fmt: skip
+                     *estimate_cells(one), MEANINGS["resonance"][name]))  # fmt: skip
     return rows
 
 

@@ -15,6 +15,7 @@ from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity
 from workbench.output import Step, step
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.prediction import csv_text
+from workbench.report.templating import MEANINGS
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, Row, tabled
 from workbench.steps.velocity import (
@@ -25,28 +26,6 @@ from workbench.steps.velocity import (
 )
 from workbench.steps.velocity_loop import VelocityValidation, velocity_validation_document
 
-VALVE_MEANING = {
-    "g_p": "gain, positive direction",
-    "g_n": "gain, negative direction",
-    "d_p": "dead zone, positive direction",
-    "d_n": "dead zone, negative direction",
-    "delay": "of the command",
-    "lag": "of the velocity",
-    "curve_p": "of the gain at the largest command, positive direction",
-    "curve_n": "of the gain at the largest command, negative direction",
-    "lag_other": "lag of the negative direction over the positive, less 1",
-    "second_lag": "over the first lag",
-    "creep": "velocity that no command gives",
-    "place": "of the gain along the travel",
-}
-LAW_MEANING = {
-    "k_p": "of the error",
-    "k_i": "of its integral",
-    "h": "period",
-    "smooth": "speed up to which the dead zone's offset grows",
-    "band": "error within which the integral rests",
-    "limit": "of the command",
-}
 WHAT_LAW = (
     "law: v = k_p e + k_i int(e) + dr/dt, e = r - y; u = v/g_p + d_p min(|v|/smooth, 1) where"
     " v/g_p > 0, else u = v/g_n - d_n min(|v|/smooth, 1)"
@@ -76,7 +55,7 @@ def _summary(model: VelocityModel) -> str:
 def _valve(model: VelocityModel) -> Part:
     """The numbers: value, unit, 95 % interval (or why there is none), at length what each is."""
     rows = [
-        (key, *estimate_cells(one), VALVE_MEANING.get(key, ""))
+        (key, *estimate_cells(one), MEANINGS["valve"].get(key, ""))
         for key, one in model.numbers.items()
     ]
     short = tabled(MODEL_HEAD, [row[:4] for row in rows], whole=rows)
@@ -207,7 +186,7 @@ def _margins(margins: dict[str, float | None]) -> str:
 
 def design_lines(found: VelocityDesign) -> list[str]:
     """The controller in words and numbers."""
-    meaning = {**VALVE_MEANING, **LAW_MEANING}
+    meaning = MEANINGS["valve"] | MEANINGS["valve_law"]
     numbers = [
         f"  {name} = {number(one.value or 0.0, 4)} {one.unit}: {meaning.get(name, '')}"
         for name, one in found.controller.items()
