@@ -1,16 +1,16 @@
 """Sizes that servo machines have, the slip of a unit that a size far off suggests, and documents in
 which a unit was changed and the number was not.
 
-The ranges are wide on purpose: a remark on a sound machine is worse than none. They hold
-positioners of a milligram and friction bearings under a hundred tonnes, cylinders of 1 mm and of
-1 m, drives logged at 10 Hz and at 50 kHz. A remark changes nothing; it names what to look at.
+A remark changes nothing; it names what to look at.
 
 A document is refused where the rest of it rules a value out. Only values in another unit than our
 commands write are looked at: a command writes no such file, a hand or another program did.
 """
 
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from math import sqrt
 
 import numpy as np
@@ -22,15 +22,6 @@ from workbench.cards.card_tables import SignalSpec
 from workbench.cards.headers import contradicted_units
 from workbench.documents.model import LogEntry, Model
 
-Slips = tuple[tuple[float, str], ...]
-_TIME: Slips = ((1e-3, "ms"), (1e-6, "us"), (60.0, "min"))
-_LENGTH: Slips = ((1e-3, "mm"), (1e-6, "um"))
-_ANGLE: Slips = ((np.pi / 180, "deg"), (1e-3, "mrad"))
-_FORCE: Slips = ((1e3, "kN"), (1e-3, "mN"))
-_TORQUE: Slips = ((1e-3, "mN m"), (1e3, "kN m"))
-_PRESSURE: Slips = ((1e5, "bar"), (1e3, "kPa"), (1e6, "MPa"))
-_AREA: Slips = ((1e-6, "mm^2"), (1e-4, "cm^2"))
-
 
 @dataclass(frozen=True)
 class Size:
@@ -39,28 +30,12 @@ class Size:
     low: float
     high: float
     unit: str
-    slips: Slips = ()
+    slips: Sequence[tuple[float, str]] = ()
 
 
-LINEAR: Mapping[str, Size] = {
-    "period": Size(1.5e-5, 0.2, "s", _TIME),  # slower than 5 Hz no breakaway shows
-    "travel": Size(1e-6, 20.0, "m", _LENGTH),  # piezo stages to gantries
-    "speed": Size(1e-7, 20.0, "m/s", _LENGTH),  # linear motors reach 10
-    "force": Size(1e-5, 1e7, "N", _FORCE),
-    "pressure": Size(5e3, 1e8, "Pa", _PRESSURE),  # vacuum grippers to 1000 bar
-    "area": Size(1e-7, 1.0, "m^2", _AREA),
-    "mass": Size(1e-7, 1e6, "kg"),
-    "acceleration": Size(0.03, 1e4, "m/s^2", _LENGTH),  # of the peak force; shakers reach 1e3
-    "bandwidth": Size(0.03, 2e4, "rad/s"),  # 5 mHz, which no position loop is for, to 3 kHz
-}
-ROTARY: Mapping[str, Size] = {
-    **LINEAR,
-    "travel": Size(1e-5, 1e6, "rad", _ANGLE),
-    "speed": Size(1e-6, 2e4, "rad/s", _ANGLE),  # spindles reach 2e4
-    "force": Size(1e-7, 1e7, "N m", _TORQUE),
-    "mass": Size(1e-11, 1e6, "kg m^2"),
-    "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
-}
+_SIZES = tomllib.loads((files("workbench.documents") / "sizes.toml").read_text("utf-8"))
+LINEAR = {name: Size(**one) for name, one in _SIZES["linear"].items()}
+ROTARY = {**LINEAR, **{name: Size(**one) for name, one in _SIZES["rotary"].items()}}
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
 # Times another log's clock or travel: a slip of 1000, and motions alike in part.
 _OTHER_UNIT = 200.0

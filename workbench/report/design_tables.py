@@ -8,8 +8,8 @@ from workbench.documents.drive import equation_lines, force_lines
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
-from workbench.steps.loop_figures import COMPENSATED, takes_compensator
-from workbench.steps.recommend import FIGURES_SAID, called, other_figures, own_figures
+from workbench.steps.loop_figures import COMPENSATED, FIGURES_SAID, takes_compensator
+from workbench.steps.recommend import called, other_figures, own_figures
 
 DESIGN_HEAD = (
     "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",

@@ -13,8 +13,7 @@ from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, Row, listed, tabled
-from workbench.steps.loop_figures import PRESENT
-from workbench.steps.recommend import FIGURES_SAID
+from workbench.steps.loop_figures import FIGURES_SAID, PRESENT
 from workbench.steps.robust.outcomes import MEASURES, Measure
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
 from workbench.steps.robust.search import WEIGHED

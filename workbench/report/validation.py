@@ -22,10 +22,16 @@ from workbench.report.trace_words import trace_sentence, words
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, Row, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
-from workbench.steps.loop_figures import COMPENSATED, PRESENT, SCHEDULED, LoopFigures, Traces
+from workbench.steps.loop_figures import (
+    COMPENSATED,
+    FIGURES_SAID,
+    PRESENT,
+    SCHEDULED,
+    LoopFigures,
+    Traces,
+)
 from workbench.steps.loop_motion import worst_rest
 from workbench.steps.recommend import (
-    FIGURES_SAID,
     called,
     in_thousandths,
     other_figures,

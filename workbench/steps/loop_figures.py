@@ -32,7 +32,7 @@ from workbench.steps.closed_loop import (
     scheduled_loop,
 )
 from workbench.steps.linear_loop import plants_of
-from workbench.steps.loop_motion import JUDGED_SHARE, LoopMotion, loop_motion
+from workbench.steps.loop_motion import JUDGED_SHARE, SETTLING_BAND, LoopMotion, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -47,6 +47,14 @@ COMPENSATED = " + compensator"  # behind a controller's name
 SCHEDULED = " + schedule"  # the same
 PRESENT = "present"  # the controller that the machine has now
 ALMOST = 0.9  # of a limit, from which a loop is reported to come near it
+FIGURES_SAID = (
+    f"static error: the largest in the last {100 * JUDGED_SHARE:g} % of the time after a step of"
+    f" {100 * STEP_SHARE:g} % of the logs' travel, held for {DWELLS:g} time constants of the"
+    f" slowest loop ({SHORTEST_DWELL:g} s at least), of that step; settling time: until a step"
+    f" stays within {100 * SETTLING_BAND:g} %; tracking error: root mean square along a sine over"
+    f" {200 * SMOOTH_SHARE:g} % of the travel, at {100 * SMOOTH_OF_LOGS:g} % of the logs' speed, of"
+    " its amplitude"
+)  # the same in `design`, `validate` and `design --robust`
 
 
 @dataclass(frozen=True, kw_only=True)

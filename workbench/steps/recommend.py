@@ -11,33 +11,12 @@ from workbench.documents.design import DESIGNED_STRUCTURES, Design, Recommendati
 from workbench.documents.model import Model
 from workbench.steps.clear_win import contest
 from workbench.steps.closed_loop import driven_loop, present_loop
-from workbench.steps.loop_figures import (
-    COMPENSATED,
-    DWELLS,
-    PRESENT,
-    SHORTEST_DWELL,
-    SMOOTH_OF_LOGS,
-    SMOOTH_SHARE,
-    STEP_SHARE,
-    Limits,
-    LoopFigures,
-    tried_loops,
-)
-from workbench.steps.loop_motion import JUDGED_SHARE, SETTLING_BAND, LimitCycle
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures, tried_loops
+from workbench.steps.loop_motion import SETTLING_BAND, LimitCycle
 
 USUAL_SEED = 0  # of the noise, where none is asked for: that of `validate`
 EQUAL = 0.05  # mean relative difference of the measures below which two loops are as good
 LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no better
-
-
-FIGURES_SAID = (
-    f"static error: the largest in the last {100 * JUDGED_SHARE:g} % of the time after a step of"
-    f" {100 * STEP_SHARE:g} % of the logs' travel, held for {DWELLS:g} time constants of the"
-    f" slowest loop ({SHORTEST_DWELL:g} s at least), of that step; settling time: until a step"
-    f" stays within {100 * SETTLING_BAND:g} %; tracking error: root mean square along a sine over"
-    f" {200 * SMOOTH_SHARE:g} % of the travel, at {100 * SMOOTH_OF_LOGS:g} % of the logs' speed, of"
-    " its amplitude"
-)  # the same in `design`, `validate` and `design --robust`
 
 
 def recommended(model: Model, found: Design) -> Recommendation:
