@@ -89,7 +89,7 @@ _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 def read_header(text: str, unit_below: str = "") -> Header:
     """The header's parts; unit_below: the field of a row of units under it.
 
-    Of a path, as a message's field has, the last part tells the quantity, all of it the purpose.
+    Of a path, as a message's field has, the last part gives the quantity, all of it the purpose.
     """
     whole, last = _read(text, unit_below), _PARTS.split(text)[-1]
     path = text.count("/") >= _PATH or last != text.rpartition("/")[2]
@@ -105,7 +105,7 @@ def _read(text: str, unit_below: str) -> Header:
     if unit_below.strip():
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
-    words = _telling(words_of(name))
+    words = _unambiguous(words_of(name))
     if _INDEX.search(plain):  # of a robot's state, and no status
         words = ["joint" if one == "state" else one for one in words]
     means = _meanings(words, " ".join(words_of(plain)))
@@ -133,7 +133,7 @@ def _read(text: str, unit_below: str) -> Header:
     return Header(text, name, unit, means, purpose, angle, doubtful, turning)
 
 
-def _telling(words: list[str]) -> list[str]:
+def _unambiguous(words: list[str]) -> list[str]:
     """The words without what two of them mean otherwise together."""
     if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
         return ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere

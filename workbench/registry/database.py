@@ -19,24 +19,13 @@ from sqlalchemy import (
     Select,
     create_engine,
     event,
+    exc,
     func,
     make_url,
     select,
     update,
 )
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import (
-    ArgumentError,
-    DatabaseError,
-    DBAPIError,
-    IntegrityError,
-    InterfaceError,
-    InternalError,
-    NoSuchModuleError,
-    OperationalError,
-    ProgrammingError,
-    TimeoutError,
-)
 from sqlalchemy.orm import DeclarativeBase, Session, sessionmaker
 
 from workbench.files import broken_link
@@ -135,17 +124,17 @@ def _guarded(where: str) -> Iterator[None]:
     """What the driver says of a database away or full, as RegistryAway in one line."""
     try:
         yield
-    except IntegrityError:
+    except exc.IntegrityError:
         raise
-    except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
+    except (exc.OperationalError, exc.InterfaceError, exc.InternalError, exc.TimeoutError) as error:
         raise RegistryAway(_away(where, error)) from error
-    except DatabaseError as error:
+    except exc.DatabaseError as error:
         if isinstance(error.orig, sqlite3.DatabaseError):
             raise BadRegistry(
                 f"registry {where}: {error.orig}; name a registry's file, or a new one"
             ) from None
         # Without a statement it is of an option in the URL that the driver does not know.
-        if isinstance(error, ProgrammingError) and error.statement is None:
+        if isinstance(error, exc.ProgrammingError) and error.statement is None:
             said = " ".join(str(error.orig).split())
             raise BadRegistry(f"registry {where}: {said}; correct the URL") from None
         raise
@@ -165,7 +154,7 @@ def _url(where: str) -> URL:
         return URL.create("sqlite", database=str(Path(where)))
     try:
         url = make_url(where)
-    except ArgumentError:
+    except exc.ArgumentError:
         raise _unreadable("its parts are not found") from None
     except ValueError:  # of what stands where the port should be
         raise _unreadable("its port is no number") from None
@@ -256,9 +245,9 @@ def _engine(url: URL, where: str) -> Engine:
             pool_pre_ping=True,
             connect_args={"connect_timeout": CONNECT, "application_name": "workbench"},
         )
-    except ArgumentError:
+    except exc.ArgumentError:
         raise _unreadable("its hosts and ports do not fit") from None
-    except (ImportError, NoSuchModuleError):
+    except (ImportError, exc.NoSuchModuleError):
         raise BadRegistry(
             f"registry {where}: PostgreSQL needs a driver that is not installed; install"
             " 'servo-workbench[postgres]'"
@@ -282,7 +271,7 @@ def _begin_sqlite(connection: Connection) -> None:
 
 
 def _away(where: str, error: Exception) -> str:
-    said = error.orig if isinstance(error, DBAPIError) else error
+    said = error.orig if isinstance(error, exc.DBAPIError) else error
     line = " ".join(str(said).split())
     advice = "nothing is lost; check the database and run again"
     if "full" in line or "I/O" in line:

@@ -207,7 +207,7 @@ class Queue:
                     session, claim.machine, judgement.verdict, judgement.evidence, of_accepted
                 )
             session.flush()
-            session.expire(done)  # so that it is told as the database keeps it
+            session.expire(done)  # so that it is read as the database keeps it
             return _recorded(session, done)
 
     def reopen(

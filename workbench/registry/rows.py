@@ -120,7 +120,7 @@ def decide(
     )
     session.add(row)
     session.flush()
-    session.expire(row)  # so that it is told as the database keeps it
+    session.expire(row)  # so that it is read as the database keeps it
     if kind in MOVES:
         pointer = session.get(ActiveVersionRow, version.machine)
         pointer = pointer or ActiveVersionRow(machine=version.machine)

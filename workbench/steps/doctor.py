@@ -154,9 +154,9 @@ def checked_log(path: Path, card: Card) -> CheckedLog:
     except BadLog as error:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)
-    told = {one.signal for one in bad if one.kind == "saturated"}
+    reported = {one.signal for one in bad if one.kind == "saturated"}
     bad += [
-        one for name in LIMITED if name in raw and name not in told for one in limits(raw, name)
+        one for name in LIMITED if name in raw and name not in reported for one in limits(raw, name)
     ]
     spec = card.signals.get("u")
     units = [unit for unit in ("V", "A") if spec is not None and conversion(spec.unit, unit)]
