@@ -66,7 +66,7 @@ _WORDS: Mapping[Quantity, Sequence[str]] = {
     what: line.split() for what, line in LOG_WORDS["words"].items()
 }
 _MAY_TURN: Mapping[str, float] = LOG_WORDS["turning"]
-_WHOLE: Mapping[str, Sequence[str]] = LOG_WORDS["whole"]
+_EXACT: Mapping[str, Sequence[str]] = LOG_WORDS["whole"]
 
 
 def _short_words() -> dict[str, dict[Quantity, float]]:
@@ -205,7 +205,7 @@ def _holds(text: str, *kinds: str) -> bool:
 def says_purpose(word: str) -> bool:
     """Whether a word says what a signal is for (soll, actual, cmd), not what it is."""
     parts = _holds(word, "reference", "measured", "model")
-    return parts or word in (*_WHOLE["reference"], *_WHOLE["measured"], *_WHOLE["model"], "command")
+    return parts or word in (*_EXACT["reference"], *_EXACT["measured"], *_EXACT["model"], "command")
 
 
 def meaning(word: str) -> Mapping[Quantity, float]:
@@ -257,23 +257,23 @@ def _commands(word: str) -> bool:
 def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> Purpose:
     if _holds(whole, "errors") or {"err", "e"} & set(words):
         return "error"
-    if _holds(whole, "model") or any(one in _WHOLE["model"] for one in words):
+    if _holds(whole, "model") or any(one in _EXACT["model"] for one in words):
         return "model"
     said = _holds(whole, "measured")
-    letters = said or any(one in _WHOLE["measured"] and len(one) > 1 for one in words)
+    letters = said or any(one in _EXACT["measured"] and len(one) > 1 for one in words)
     # A letter is then that of a parameter, as it is before a number: the R of "R820".
     named = {one for one, after in pairwise(words) if after.isdigit() and len(after) > 1}
-    short = [one for one in words if one in _WHOLE["reference"]
+    short = [one for one in words if one in _EXACT["reference"]
              and not (len(one) == 1 and (letters or one in named))]  # fmt: skip
     if _holds(whole, "reference") or short:
         return "reference"
     if any(one.startswith("command") for one in words) and "position" in means:
         return "reference"
-    if said or any(one in _WHOLE["measured"] for one in words):
+    if said or any(one in _EXACT["measured"] for one in words):
         return "measured"
     if any(one.startswith("ist") for one in words):  # Istposition, Istwert
         return "measured"
-    if _holds(whole, "filtered") or any(one in _WHOLE["filtered"] for one in words):
+    if _holds(whole, "filtered") or any(one in _EXACT["filtered"] for one in words):
         return "filtered"
     return ""
 
