@@ -92,7 +92,9 @@ def fit_plant(
     """
     halt = Halt(keep_going)
     if prior is not None:
-        return _fit(logs, rng, rig, drive, prior, on_progress, halt)
+        report = on_progress or quiet
+        report("refining", 0.0)
+        return _near_prior(prior, recorded_logs(logs, rig, drive, halt), rng, report, drive)
     check_driven(logs)
     beside = what_acts_beside(logs, rig, halt)
     return fit_beside(logs, beside, rng, rig, drive, on_progress, halt)
@@ -107,11 +109,14 @@ def fit_beside(
     quick: as a first look has it, without a search or whole runs, and without a second mass where
     inertia does not show.
     """
+    report = on_progress or quiet
+    report("refining", 0.0)
     alone = [beside.taken_out(log) for log in logs]
     up = way_of(alone, held=rig.kind == "motor")
     turns = bool(beside.orders) and up is not None
     try:
-        fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick, turns=turns)
+        recorded = recorded_logs(alone, rig, drive, halt)
+        fit = _plain_fit(recorded, rng, report, by=drive, quick=quick, turns=turns)
     except NotIdentifiable as refused:
         if are_steps(alone):
             raise
@@ -140,36 +145,38 @@ def fit_beside(
     )
 
 
-def _fit(
-    logs: Sequence[Log], rng: np.random.Generator, rig: Rig, drive: Drive | None,
-    prior: Plant | None, on_progress: Progress | None, halt: Halt, *, quick: bool = False,
-    turns: bool = False,
+def _near_prior(
+    prior: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
+    by: Drive | None,
 ) -> KarnoppFit:  # fmt: skip
-    """As `fit_plant`, of logs beside whose applied force nothing acts but what the prior has.
-
-    turns: they turn one way, with orders of the turn; raises NotIdentifiable where no run is near,
-    which a long fit would not bring there.
-    """
-    report = on_progress or quiet
-    report("refining", 0.0)
-    recorded = recorded_logs(logs, rig, drive, halt)
-    begin, settle, other = rng.spawn(3)
-    if prior is not None and prior.effects:
+    """As `fit_plant`, from a plant that was active."""
+    if prior.effects:
         fit = likeliest(_with_effects(prior, recorded, report), recorded)
         return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
-    near = None
-    if prior is not None:
-        near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
-        if near.misfit <= COMPLETE:
-            fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
-            return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
+    near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+    if near.misfit > COMPLETE:
+        return _plain_fit(recorded, rng, report, by=by, near=near)
+    fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
+    return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
+
+
+def _plain_fit(
+    recorded: RecordedLogs, rng: np.random.Generator, report: Progress, *, by: Drive | None,
+    near: Refit | None = None, quick: bool = False, turns: bool = False,
+) -> KarnoppFit:  # fmt: skip
+    """The fit of logs beside whose applied force nothing acts.
+
+    near: another plant, refined, which stands where it is the better; turns: they turn one way,
+    with orders of the turn; raises NotIdentifiable where no run is near, which a long fit would not
+    bring there.
+    """
+    begin, settle, other = rng.spawn(3)
     recorded, found = by_exact_force(recorded, plain_structure(recorded, begin), other)
     if turns and found.misfit > HOPELESS:
         raise NotIdentifiable(ONE_WAY_WHY)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
-    fit = finished(found, recorded, settle, report, by=drive, quick=quick)
-    fit = _with_actuator(fit, recorded)
+    fit = _with_actuator(finished(found, recorded, settle, report, by=by, quick=quick), recorded)
     return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
 
 
