@@ -200,7 +200,7 @@ def test_alarms_that_are_not_taken_are_told(here: Path, capsys: pytest.CaptureFi
             found = json.loads(shown.out)
             assert (found["alarms"]["sent"], found["alarms"]["waiting"]) == (sent, 1)
             assert len(found["outcomes"]) == judged
-            assert shown.err.splitlines()[-1].startswith("error: --webhook: 1 alarm(s) not taken")
+            assert shown.err.splitlines()[-1].startswith("error: --webhook: 1 alarm not taken")
             assert "geheim" not in shown.err + shown.out
         assert [one["machine"] for one in listener.taken] == ["Pr\u00fcfstand"]
     assert done(capsys, "reidentify", "machines", "--settle", "0")["alarms"] is None

@@ -125,16 +125,16 @@ def after_fleet(
 def fleet_view(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
     from workbench.screen import screen, tabled
-    from workbench.verdicts import in_words
+    from workbench.verdicts import counted, in_words
 
-    counted = ", ".join(
+    verdicts = ", ".join(
         f"{count} {in_words(name)}" for name, count in sorted(done.verdicts.items())
     )
-    left = f"{done.later} log(s) left: their machines are in another worker's hands"
+    left = f"{counted(done.later, 'log')} left, of machines in another worker's hands"
     rows = [(one.log.machine, in_words(one.verdict), one.reason) for one in done.bad]
     new, used = sum(done.verdicts.values()), f"at most {done.memory / 2**20:.0f} MiB a worker"
     return screen(
-        f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before",
+        f"{counted(done.logs, 'log')}: {verdicts or 'none new'}, {done.before} done before",
         *([left] if done.later else []),
         tabled(("machine", "verdict", "reason"), rows, (), most=MOST_BAD),
         *([f"{done.seconds:.1f} s, {done.busy / new:.2f} processor seconds a log, {used}"]

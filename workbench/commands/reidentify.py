@@ -8,6 +8,7 @@ import click
 from workbench import options
 from workbench.jobs.options import JobOptions
 from workbench.output import Step, emit, step
+from workbench.verdicts import counted
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery
@@ -66,10 +67,10 @@ def after_pass(done: "PassReport", where: str | None) -> Step | None:
 def undelivered(alarms: "Delivery") -> str:
     """What the webhook has not taken, in one line."""
     counts = {
-        f"{alarms.waiting} alarm(s) not taken yet, tried again by later passes": alarms.waiting,
-        f"{alarms.given_up} alarm(s) given up after a day": alarms.given_up,
+        "not taken yet, tried again by later passes": alarms.waiting,
+        "given up after a day": alarms.given_up,
     }
-    said = ", ".join(text for text, count in counts.items() if count)
+    said = ", ".join(f"{counted(count, 'alarm')} {what}" for what, count in counts.items() if count)
     why = f" ({alarms.reason})" if alarms.reason else ""
     return f"--webhook: {said}{why}; check the receiver"
 
@@ -79,7 +80,7 @@ def pass_view(done: "PassReport") -> "Screen":
     from workbench.registry.views import outcomes_table
     from workbench.screen import listed, screen
 
-    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) tested"
+    judged = f"{counted(done.machines, 'machine')}, {counted(len(done.outcomes), 'log')} tested"
     return screen(
         judged,
         listed(remarks(done), MOST_LINES),
@@ -91,7 +92,8 @@ def remarks(done: "PassReport") -> Sequence[str]:
     """What a pass left for a later one, in words."""
     out = []
     if done.growing:
-        out.append(f"{done.growing} file(s) still being written (--settle), left for later")
+        growing = counted(done.growing, "file")
+        out.append(f"{growing} still being written (--settle), left for later")
     if done.no_logs:
         out.append(f"no log, without a line of numbers: {', '.join(done.no_logs)}")
     for name in done.without_model:

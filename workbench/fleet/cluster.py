@@ -13,6 +13,7 @@ from workbench.addresses import shown
 from workbench.documents.reading import versions
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
+from workbench.verdicts import counted
 
 try:
     import dask
@@ -76,8 +77,8 @@ class Cluster:
         except CancelledError as error:
             raise _gone(error) from error
         except KilledWorker as error:
-            count = error.allowed_failures + 1
-            return f"{count} worker(s) died of it, one after the other; it is not tried again"
+            died = counted(error.allowed_failures + 1, "worker")
+            return f"{died} died of it, one after the other; it is not tried again"
         except TimeoutError:
             return None
         except Exception as error:  # of the cluster: `work` itself raises none

@@ -21,6 +21,7 @@ from identification.errors import UserError
 from workbench.jobs.passes import Clock, Report
 from workbench.registry.outbox import Outbox
 from workbench.registry.values import ALARMING, Alarm
+from workbench.verdicts import counted
 
 GIVEN_UP_AFTER = timedelta(days=1)  # an alarm older than this is given up
 IN_HAND = timedelta(minutes=2)  # for so long no other worker sends an alarm that one has taken
@@ -150,9 +151,13 @@ def send_alarms(
     outbox.fill(ALARMING, since=now - GIVEN_UP_AFTER, now=now)
     lost = outbox.give_up(before=now - GIVEN_UP_AFTER, now=now)
     for alarm in lost:
-        report("alarm_given_up", machine=alarm.machine, file=alarm.log, verdict=alarm.verdict,
-               reason=f"not taken by {webhook.shown} within {GIVEN_UP_AFTER.days}"
-                      " day(s)")  # fmt: skip
+        report(
+            "alarm_given_up",
+            machine=alarm.machine,
+            file=alarm.log,
+            verdict=alarm.verdict,
+            reason=f"not taken by {webhook.shown} within {counted(GIVEN_UP_AFTER.days, 'day')}",
+        )
     logging.getLogger("httpx").setLevel(logging.WARNING)  # else it logs whole addresses
     done = Delivery(given_up=len(lost))
     unreached = _Sending(outbox, webhook, clock, report, stop, done).send(outbox.due(now))

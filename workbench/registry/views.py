@@ -8,7 +8,7 @@ from workbench.cards.readable import in_digits, number
 from workbench.registry.difference import Line, Number, as_read
 from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled
-from workbench.verdicts import in_words
+from workbench.verdicts import counted, in_words
 
 SHORT = 12  # characters of a fingerprint that are shown
 
@@ -61,7 +61,7 @@ def machine_view(
     if outcomes:
         parts.append(outcomes_table(outcomes))
     if state.waiting:
-        parts.append(f"{state.waiting} log(s) wait for a result")
+        parts.append(f"{counted(state.waiting, 'log')} still without a result")
     return screen(*parts)
 
 

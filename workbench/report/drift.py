@@ -16,7 +16,7 @@ from workbench.report.next_steps import after_drift
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, Row, instead, tabled
 from workbench.steps.drift import Drifted, Tested, drift_document
-from workbench.verdicts import in_words
+from workbench.verdicts import counted, in_words
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]
 LEAST_STATISTIC = 1e-3  # over its threshold, that is drawn
@@ -155,7 +155,8 @@ def drift_sentence(found: Drifted) -> str:
             return f"INCONCLUSIVE, which is no all-clear: {newest[-1].reason}"
     known = sum(test.verdict == "none" for test in tests)
     margin = f"{100 * found.settings.margin:.3g} %"
-    said = f"No drift in {known} of {len(tests)} log(s): no change significantly beyond {margin}."
+    of = counted(len(tests), "log")
+    said = f"No drift in {known} of {of}: no change significantly beyond {margin}."
     coarse = sum(test.verdict == "not_judged" for test in tests)
     return said + (f" {coarse} INCONCLUSIVE: see the notes." if coarse else "")
 

@@ -108,7 +108,7 @@ def test_a_log_that_kills_its_workers_fails_alone(cluster: Cluster, tmp_path: Pa
     assert done.verdicts == {"identified": 6, "failed": 1}
     (bad,) = done.bad
     assert bad.log.machine == DEADLY
-    assert "2 worker(s) died of it" in bad.reason
+    assert "2 workers died of it" in bad.reason
     assert verdicts(tmp_path)[DEADLY] == "failed"
 
 
