@@ -1,12 +1,13 @@
 """What a named effect stands for, as a free curve of its own signal beside its law."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.effects._base import Effect
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import signals_at
 from identification.tracing.result import FreeCurve
@@ -18,11 +19,12 @@ CURVE_ROWS = 8  # at least
 def free_curves(choice: Choice) -> tuple[FreeCurve, ...]:
     """A curve of each effect that the equations hold as a sum of columns, where one of its signals
     is logged; the other parameters are those found with the effect."""
-    found = (_curve_of(step.candidate.effect, choice) for step in choice.steps)
+    found = (_curve_of(step.candidate, choice) for step in choice.steps)
     return tuple(one for one in found if one is not None)
 
 
-def _curve_of(effect: Effect, choice: Choice) -> FreeCurve | None:
+def _curve_of(candidate: EffectCandidate, choice: Choice) -> FreeCurve | None:
+    effect, period = candidate.effect, candidate.values.get("period")
     for equation in (MECHANICAL, ACTUATOR):
         if equation not in choice.base:
             continue
@@ -36,16 +38,12 @@ def _curve_of(effect: Effect, choice: Choice) -> FreeCurve | None:
         way = np.sign(signals["v"]) if not effect.place.sign else effect.place.sign
         law = (way * (o.rows.X[:, own] @ o.fit.theta[own]))[keep]
         left = (way * o.fit.residual * o.rows.sd)[keep]
-        return _told_best(effect.key, equation, {n: signals[n][keep] for n in names}, left, law)
+        curves = [_against(effect.key, equation, n, signals[n][keep], left, law) for n in names]
+        if period and "y" in names:
+            y = signals["y"][keep] % period
+            curves.append(replace(_against(effect.key, equation, "y", y, left, law), period=period))
+        return max(curves, key=lambda one: float(np.var(one.law)))  # which shows most of the law
     return None
-
-
-def _told_best(
-    key: str, equation: str, signals: dict[str, Array], left: Array, law: Array
-) -> FreeCurve:
-    """The curve against that of the signals which tells most of the law."""
-    curves = [_against(key, equation, name, x, left, law) for name, x in signals.items()]
-    return max(curves, key=lambda one: float(np.var(one.law)))
 
 
 def _against(key: str, equation: str, name: str, x: Array, left: Array, law: Array) -> FreeCurve:

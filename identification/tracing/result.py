@@ -129,9 +129,10 @@ class MissingForce:
 class FreeCurve:
     """An effect's part of an equation against a signal, free of its law and by its law.
 
-    at (k,): middles of the pieces in the signal's unit; free, sd (k,): mean of what the model
-    without the effect leaves there and the deviation of that mean; law (k,): mean of what the
-    effect gives: friction against the motion, a driving force [N], or a rate of the force [N/s].
+    at (k,): middles of the pieces in the signal's unit, within `period` of it where the law repeats;
+    free, sd (k,): mean of what the model without the effect leaves there and the deviation of that
+    mean; law (k,): mean of what the effect gives: friction against the motion, a driving force [N],
+    or a rate of the force [N/s].
     """
 
     effect: str
@@ -141,6 +142,7 @@ class FreeCurve:
     free: Array
     sd: Array
     law: Array
+    period: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

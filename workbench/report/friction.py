@@ -1,7 +1,7 @@
 """Sections: friction against velocity, the data under the identified curve; of a trace, before and
 after."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.log import Log
-from identification.model.estimates import NORMAL_95, KarnoppFit
+from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.inverse_model import zoh_force
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.resonance import load_acceleration
@@ -75,12 +75,19 @@ def _inertia(model: Model, a: Array, h: float) -> Array:
 
 def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> Section:
     """Friction of the logs' samples against velocity, with the Karnopp curve and its band."""
-    p, dots = model.karnopp, _dots("log: F_e − m a", model, sources)
+    p, dots = _identified(model.karnopp, model.friction), _dots("log: F_e − m a", model, sources)
     reach = min(float(dots.x.min()), 1.2 * p.dv_n), max(float(dots.x.max()), 1.2 * p.dv_p)
     panels = _panels(model, dots, [(p, [], "model", "Karnopp model")], reach, fit)
     what = "friction force against velocity, samples of the logs and the model"
     chart = Chart("friction", what, panels, 2, shared_x=False, caption=_caption(model))
     return Section("Friction", chart)
+
+
+def _identified(p: Karnopp, known: Mapping[str, Estimate]) -> Karnopp:
+    """The friction to draw: a breakaway limit that the logs do not identify ends at the Coulomb
+    level, whatever a run has made of it."""
+    limits = {"F_sp": p.F_cp, "F_sn": -p.F_cn}
+    return replace(p, **{n: level for n, level in limits.items() if known[n].value is None})
 
 
 def _panels(
@@ -176,7 +183,7 @@ def _caption(model: Model) -> str:
     text = (
         "Each dot is one sample: applied force less inertia, smoothed as the velocity is. Within"
         " the shaded band the model sticks; there, friction takes any value between the two"
-        " breakaway limits (the bar at zero)."
+        " breakaway limits (the bar at zero; a limit that is not identified at the Coulomb level)."
     )
     if model.friction["m"].value is None:
         text += " The mass is not identified, so the assumed one is used for the inertia."
@@ -188,13 +195,15 @@ def trace_friction_chart(traced: Traced) -> Chart:
 
     Where the machine has drifted without lacking an effect, on training and test logs.
     """
-    found, model, after = traced.trace, traced.model, traced.model.karnopp
+    found, model = traced.trace, traced.model
+    after = _identified(model.karnopp, model.friction)
     every = model.acting
     speeds = [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
     drifted = bool(found.drift) and not found.effects
     curves: list[Curve] = [(after, speeds, "model", "after" if found.effects else "model")]
     if found.effects:
         before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
+        before = _identified(before, found.parameters_before)
         curves.insert(0, (before, [], "reference", "before"))
     if drifted:
         changed = {one.name: max(one.after, 0.0) for one in found.drift if one.name in NAMES}
@@ -207,7 +216,10 @@ def trace_friction_chart(traced: Traced) -> Chart:
     dots = _dots(name, model, sources)
     reach = max(float(np.quantile(np.abs(dots.x), 0.999)), 2 * max(after.dv_p, -after.dv_n))
     panels = _panels(model, dots, curves, (-reach, reach))
-    caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
+    caption = (
+        "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits, one that is"
+        " not identified at the Coulomb level."
+    )
     other = [words(a.key) for a in every if a not in speeds]
     if other:
         caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."

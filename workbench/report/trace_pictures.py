@@ -340,6 +340,7 @@ def free_curves(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -
     panels = []
     for one in curves:
         label, x_factor = axis_of(one.signal, rotary, command)
+        label = label if one.period is None else label.replace(" [", " within a period [")
         unit, factor = residual_unit(one.equation, rotary)
         x, free, wide = x_factor * one.at, factor * one.free, 1.96 * factor * one.sd
         panels.append(

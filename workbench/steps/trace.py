@@ -179,6 +179,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
     ]  # fmt: skip
     curves = [
         {"key": one.effect, "equation": one.equation, "signal": one.signal,
+         **({} if one.period is None else {"period": one.period}),
          **{name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}}
         for one in found.curves
     ]  # fmt: skip

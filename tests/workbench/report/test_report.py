@@ -10,8 +10,10 @@ import pytest
 from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, designed, identified, model_of
 from workbench.cards.readable import friction_units
+from workbench.report.chart import Chart
 from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
+from workbench.report.friction import friction_curve
 from workbench.report.reports import design_view, identified_view
 from workbench.report.validation import (
     validation_lines,
@@ -67,6 +69,19 @@ def test_identification_report() -> None:
                  "time [s]", "moving mass", "95 % interval", "short.csv", "a remark",
                  "Over frequency", "from force to position [m/N]"):  # fmt: skip
         assert text in html
+
+
+def test_a_breakaway_limit_that_is_not_identified_is_drawn_at_the_coulomb_level() -> None:
+    found = identified()
+    known = found.model.friction
+    for value, top in ((500.0, 500.0), (None, found.model.karnopp.F_cp)):
+        limit = replace(known["F_sp"], value=value, assumed=500.0, reason="no rest")
+        model = replace(found.model, friction={**known, "F_sp": limit})
+        chart = friction_curve(model, found.fit, found.sources).content
+        assert isinstance(chart, Chart)
+        for panel in chart.panels:
+            curve = panel.lines[-1]
+            assert np.nanmax(curve.y[np.abs(curve.x) < 1e-2]) == pytest.approx(top)
 
 
 def test_a_rotary_report_shows_rotary_units() -> None:

@@ -398,6 +398,8 @@ def test_a_law_is_drawn_beside_what_the_logs_say_without_it() -> None:
     html = checked(traced_view(traced(found)).page(), 5)
     for text in ("Law and logs", "stribeck [N]", "by the logs alone", "velocity [mm/s]"):
         assert text in html
+    found = replace(found, curves=(replace(curve, signal="y", period=0.3),))
+    assert "position within a period [mm]" in traced_view(traced(found)).page()
 
 
 def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:
