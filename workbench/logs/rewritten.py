@@ -30,6 +30,7 @@ _CELL = re.compile(
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\s,;]*)?"
 )
 _NEXT_LABEL = re.compile(r"(?<=\S)[ \t]+(?=[^\W\d][^\s:=,;|]*[ \t]*[:=][ \t]*[+-]?\.?\d)")
+_NEXT_WORDS = re.compile(r"(?<=\d)[ \t]+(?=(?P<words>[^\W\d][^\d:=,;|]*)[:=][ \t]*[+-]?\.?\d)")
 _BRACES = re.compile(r"[^\s,;|]*\{|[}'\"]")
 _VECTOR = re.compile(r'(?<!\w)"?[\[(]([^\[\](){}"]*)[\])]"?')
 _BETWEEN = re.compile(r"[\s,;]+")
@@ -212,8 +213,11 @@ def _parted(text: str) -> str:
         text = _BRACES.sub("", text)
     lines = _seen(text)
     apart = any(sign in line for line in lines for sign in _SEPARATORS)
-    labels = lines and not apart and all(map(_NEXT_LABEL.search, lines))
-    return _NEXT_LABEL.sub(", ", text) if labels else text
+    if not lines or apart or not all(map(_NEXT_LABEL.search, lines)):
+        return text
+    units = (found["words"].split()[0] for line in lines for found in _NEXT_WORDS.finditer(line))
+    words = all(map(_NEXT_WORDS.search, lines)) and not any(map(written_unit, units))
+    return (_NEXT_WORDS if words else _NEXT_LABEL).sub(", ", text)
 
 
 class _Part(NamedTuple):

@@ -132,7 +132,7 @@ def _layout(head: _Head, spec: FileSpec) -> Layout | None:
     """Where header and data lie in these lines."""
     noted = {}
     for k, line in enumerate(head.lines if spec.comment else ()):
-        if head.fields[k] and is_number(head.fields[k][0]):
+        if len(head.fields[k]) > 1 and is_number(head.fields[k][0]):
             break
         if line.lstrip().startswith(spec.comment):
             bare = _split(line.lstrip().lstrip(f"{spec.comment} "), head.marks)

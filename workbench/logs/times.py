@@ -314,7 +314,11 @@ def even_stamps(t: Array) -> tuple[Array, str]:
     blocks = max(1, len(t) // _ROWS_OF_A_MEAN)
     late = [float(np.mean(one)) for one in np.array_split(t - line, blocks)]
     if np.ptp(late) > period * (at_a_time if buffered else HALF):
-        return t, ""
+        waited = int(np.argmin(together))  # rows that were in the buffer before it was first read
+        rest, said = even_stamps(t[waited:]) if waited > SHORTEST_LOG else (t, "")
+        before = np.arange(-waited, 0) * (rest[1] - rest[0]) + rest[0]
+        told = f"{rows_of(waited)} that waited before the first are put before it; {said}"
+        return (np.concatenate([before, rest]), told) if said else (t, "")
     if buffered:
         return line, f"rows stamped about {at_a_time:.0f} at a time, late: taken as even rows"
     said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"

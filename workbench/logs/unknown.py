@@ -54,7 +54,7 @@ def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) ->
     if len(groups) < 2 or not times:
         return list(columns)
     period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
-    quick = [name for name in times if period[name] < FAR_SLOWER * min(period.values())]
+    quick = [name for name in times if period[name] <= FAR_SLOWER * min(period.values())]
     many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
     base = times[max(quick, key=lambda name: (many[name], period[name]))]
     known = np.isfinite(base.values)

@@ -26,6 +26,7 @@ from workbench.steps.first_card.remarks import (
     refuse_resting,
     refuse_sign_bits,
     refuse_undriven,
+    refuse_unsigned,
     remarks_on,
 )
 from workbench.steps.first_card.rig_guess import DRIVEN_BY, RigGuess, area_of, kind_guess, rig_of
@@ -128,13 +129,14 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     if roles is None and (own := with_position(columns, signals, only)):
         columns, only = own
         roles = known_roles(columns.signals, only)
-    if only is None and (of_sum := without_names(columns, roles)):
+    if only is None and (of_sum := without_names(columns, signals, roles)):
         columns, roles = of_sum
     if roles is None:
         raise no_body(columns)
     refuse_error(columns, roles)
     refuse_resting(columns, roles)
     refuse_sign_bits(columns, roles)
+    refuse_unsigned(columns, roles)
     named = re.sub(r"[^\w.-]+", "-", name or path.stem).strip("-.") or "machine"
     found = _of_roles(columns, roles, named)
     y = roles.columns["y"].motion

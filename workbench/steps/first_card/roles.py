@@ -58,6 +58,7 @@ COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 MOVES_NOTHING = 0.05  # share of a force's change, that noise explains at most
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
+NO_BODY = -2.5  # log-odds of a way, that no header speaks for, below which it is none
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 
 Sign = float
@@ -122,6 +123,8 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     ways.sort(key=lambda one: -with_reference(one))
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
+    if choices[0].score < NO_BODY and said(choices[0].way.y, "y") < HEADER_SAYS:
+        return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
     same = (one for one in choices if one.way.y is best.way.y)

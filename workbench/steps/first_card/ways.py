@@ -109,7 +109,8 @@ def ways_of(
         if as_force > -3.0:
             yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
         if as_command > -3.0 and not _is_set_point(seen, k):
-            score = as_command + physics + of_a_motor(one) + acting[k]
+            unnamed = max(as_force, as_command) < HEADER_SAYS
+            score = as_command + physics + acting[k] + (of_a_motor(one) if unnamed else 0.0)
             yield Way(seen, "motor", {"u": one}, law, force, score)
     if laws:
         yield from _chambers(seen, own)
@@ -188,7 +189,7 @@ def with_reference(way: Way) -> float:
 def moves_rather(way: Way, k: int) -> bool:
     """Whether what drives the body drives another column far more exactly: then that is the
     position, and the body here a copy of it, late or by a model."""
-    other = way.seen.pairs.bodies.get(k)
+    other = None if way.y.header.purpose == "measured" else way.seen.pairs.bodies.get(k)
     if other is None or len(way.columns) != 1 or not other.laws:
         return False
     (drive,) = way.columns.values()
