@@ -94,8 +94,8 @@ def is_position(head: Header) -> bool:
         return head.unit.quantity == "position" or (
             head.unit.quantity == "count" and "position" in head.means
         )
-    if not head.means:  # of an angle that is asked for beside it
-        return head.purpose == "measured" and head.angle
+    if not head.means:
+        return head.purpose == "measured" and head.unit is None
     return max(head.means, key=lambda what: head.means[what]) == "position"
 
 

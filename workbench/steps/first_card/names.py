@@ -14,6 +14,8 @@ FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_ALIKE = 3  # headers that begin alike, from which that is the machine's name
 _CURRENTS = ("current", "strom", "courant", "corrente", "cur", "amps")
 _ARGUMENT = re.compile(r"\s*\([tkn]\)$")  # of a signal as a function of time: "u(t)"
+_PER = re.compile(r"(?<=[a-z])_per_(?=[a-z]+$)", re.I)  # "deg_per_sec"
+_NM = re.compile(r"(?<=[\W_])nm(?=\W*$)")  # as names in small letters have it
 _LETTER = re.compile(r"[^\W\d]")
 _WHOLE_WORDS = re.compile(r".*[_\s.-]")
 
@@ -21,7 +23,7 @@ _WHOLE_WORDS = re.compile(r".*[_\s.-]")
 def read_together(named: Sequence[tuple[str, str]]) -> list[Header]:
     """The headers of a log, each a text with the unit below it."""
     texts = [one for one, _ in named]
-    names = [_ARGUMENT.sub("()", one) for one in _without_blocks(texts)]
+    names = [_PER.sub("_", _ARGUMENT.sub("()", one)) for one in _without_blocks(texts)]
     left = {one.casefold() for one in names if one}
     names = [RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
              for x in names]  # fmt: skip
@@ -37,13 +39,21 @@ def read_together(named: Sequence[tuple[str, str]]) -> list[Header]:
 
 
 def _of_one_drive(head: Header) -> Header:
-    """The header, "torque_current" meaning the current, and "tau_motor" the motor's torque."""
+    """The header, "torque_current" meaning the current, "tau_motor" the motor's torque, "command"
+    beside a torque what "cmd" does, and a torque in nm no nanometres."""
+    if head.unit is not None and head.unit.card == "nm":
+        torque = replace(read_header(_NM.sub("Nm", head.text)), text=head.text)
+        return _of_one_drive(torque) if "force" in torque.means else head
     words = words_of(head.name)
     if not {"force", "command"} <= set(head.means) or head.purpose in ("reference", "demand"):
         return head
     commands = {one for one in words if "command" in meaning(one)}
-    other = "force" if words[-1] in _CURRENTS else "command" if commands == {"motor"} else ""
-    return replace(head, means={what: own for what, own in head.means.items() if what != other})
+    asked = all(one.startswith("command") for one in commands)
+    if words[-1] not in _CURRENTS and not asked and commands != {"motor"}:
+        return head
+    other = "force" if words[-1] in _CURRENTS else "command"
+    means = {what: own for what, own in head.means.items() if what != other}
+    return replace(head, means=means, purpose="reference" if asked else head.purpose)
 
 
 def _without_blocks(headers: Sequence[str]) -> list[str]:

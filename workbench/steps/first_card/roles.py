@@ -42,6 +42,7 @@ from workbench.steps.first_card.weights import (
     SURE,
     acts,
     drives,
+    is_steady,
     limits,
     said,
     together,
@@ -59,6 +60,7 @@ MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives 
 MOVES_NOTHING = 0.05  # share of a force's change, that noise explains at most
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
 NO_BODY = -2.5  # log-odds of a way, that no header speaks for, below which it is none
+EXPLAINED = 0.9  # share of a drive by its law along what no header calls a position
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 
 Sign = float
@@ -123,7 +125,9 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     ways.sort(key=lambda one: -with_reference(one))
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
-    if choices[0].score < NO_BODY and said(choices[0].way.y, "y") < HEADER_SAYS:
+    head, way = said(choices[0].way.y, "y"), choices[0].way
+    denied = head < LEAST_SCORE and way.law.share < EXPLAINED
+    if denied or (choices[0].score < NO_BODY and head < HEADER_SAYS):
         return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
@@ -213,8 +217,8 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
         most = MOST_BY_CHANGE if head >= HEADER_SAYS else MOST_UNNAMED
         if abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
             return -3.0  # one more position, of a model or another sensor, be it in volts
-        if one.noisy and moved < MOVES_NOTHING:
-            return -3.0
+        if (one.noisy and moved < MOVES_NOTHING) or is_steady(one):
+            return -3.0  # nothing, or what supplies the motor
         if one.current and one.x.min() >= 0.0 and seen.y.way_gone > TWICE:
             return -3.0  # both ways a motor takes current: of its supply
         forces = [seen.pairs.signals.index(of) for name, of in way.columns.items() if name == "F"]

@@ -9,6 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, force_laws
+from identification.thresholds import HALF
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
@@ -95,7 +96,8 @@ def ways_of(
     places = [i for i, one in enumerate(pairs.signals) if said(one, "y") >= HEADER_SAYS]
     for k, law in enumerate(laws):
         one = pairs.signals[k]
-        if one is y or _are_several(one, y):
+        another = bool(one.axis and y.axis and one.axis != y.axis)
+        if one is y or _are_several(one, y) or (another and law.share < HALF):
             continue
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:

@@ -97,7 +97,8 @@ def _by_purpose(one: Column, role: str) -> float:
         own = {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0, "u": -1.0}
         return own.get(role, 0.0)
     if purpose == "measured":
-        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
+        commands = 0.5 if means else -1.0  # what is given to a motor is hardly measured
+        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": commands}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
         return -2.0 if role == "u" else 0.0
     if purpose == "filtered":
@@ -191,10 +192,14 @@ def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
     """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
     x = pairs.signals[k].x
-    steady = abs(float(x.mean())) > STEADY * float(x.std())
     one_way = -3.0 if x.min() * x.max() > 0.0 else 0.0
     place = BEFORE_LIMIT if k in behind else ACTS if k in behind.values() else 0.0
-    return one_way + place - (3.0 if steady and one_way else 0.0)
+    return one_way + place - (3.0 if is_steady(pairs.signals[k]) else 0.0)
+
+
+def is_steady(one: Column) -> bool:
+    """Whether a column stays far from zero, as a supply does."""
+    return bool(one.x.min() * one.x.max() > 0.0 and abs(one.x.mean()) > STEADY * one.x.std())
 
 
 def turned(law: ForceLaw) -> ForceLaw:
