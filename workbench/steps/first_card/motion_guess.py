@@ -195,8 +195,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
 
 
 def _of_quarters(roles: Roles) -> str:
-    """The unit of an angle of which all levels of the reference are quarters of a turn; empty where
-    they are not."""
+    """The unit in which all levels of the reference are quarters of a turn; else empty."""
     levels = roles.columns["r"].levels if "r" in roles.columns else np.zeros(0)
     for unit, turn in TURN_IN.items() if len(levels) < MOST_QUARTERS else ():
         quarters = 4.0 * levels[levels != 0.0] / turn

@@ -57,8 +57,7 @@ def _of_one_drive(head: Header) -> Header:
 
 
 def _without_blocks(headers: Sequence[str]) -> list[str]:
-    """The headers without the blocks of a model in which all signals lie that have a path: they
-    tell nothing of one."""
+    """The headers without the blocks of a model in which all that have a path lie."""
     paths = [one.split("/") for one in headers if "/" in one]
     levels = zip(*(one[:-1] for one in paths), strict=False)
     common = sum(1 for _ in takewhile(lambda names: len(set(names)) == 1, levels))

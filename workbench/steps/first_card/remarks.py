@@ -85,8 +85,7 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
 
 
 def behind_reference(roles: Roles) -> float | None:
-    """Samples of the columns by which the position follows its reference; None where it follows
-    none."""
+    """Samples by which the position follows its reference; None where it follows none."""
     if "r" not in roles.columns:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)

@@ -14,14 +14,13 @@ from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
 from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import (
-    EXPLAINED,
     FRICTION_GIVES_SIGN,
     WORK_GIVES_SIGN,
     Roles,
     known_roles,
 )
 from workbench.steps.first_card.ways import HEADER_SAYS
-from workbench.steps.first_card.weights import said
+from workbench.steps.first_card.weights import EXPLAINED, said
 
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
