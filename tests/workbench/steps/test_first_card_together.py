@@ -125,8 +125,8 @@ def test_a_set_point_is_no_drive_of_what_follows_it(
 
 
 def test_a_power_of_both_signs_is_a_command(joint: dict[str, Array], tmp_path: Path) -> None:
-    share = np.round(100.0 * joint["F"] / np.max(np.abs(joint["F"])))
-    whole = np.round(np.rad2deg(joint["y"]))
+    share: Array = np.round(100.0 * joint["F"] / np.max(np.abs(joint["F"])))
+    whole: Array = np.round(57.3 * joint["y"])
     found = propose(tmp_path, "Timestamp,Angle,MotorPower", 1e3 * T, whole, share)
     assert roles(found)["u"] == "MotorPower"
 

@@ -117,6 +117,8 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     head, way = weights.said(choices[0].way.y, "y"), choices[0].way
     denied = head < weights.LEAST_SCORE and way.law.share < weights.EXPLAINED
     both = way.law.friction is not None
+    if any(one.header.purpose == "error" for one in signals):
+        denied = both = False  # said of what is made of it
     if denied or (both and way.law.share < NO_BODY and head < HEADER_SAYS):
         return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))

@@ -13,14 +13,9 @@ from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
 from workbench.steps.first_card.pairs import follows
-from workbench.steps.first_card.roles import (
-    FRICTION_GIVES_SIGN,
-    WORK_GIVES_SIGN,
-    Roles,
-    known_roles,
-)
+from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
 from workbench.steps.first_card.ways import HEADER_SAYS
-from workbench.steps.first_card.weights import EXPLAINED, said
+from workbench.steps.first_card.weights import EXPLAINED, NO_FRICTION, said
 
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
@@ -55,7 +50,7 @@ def without_names(
         whole, y = _summed(columns, signals, own)
         roles = known_roles(whole.signals, y)
         least = max(EXPLAINED, 1.0 - HALF * left)
-        if not roles or (roles.law.friction or 0.0) < FRICTION_GIVES_SIGN:
+        if not roles or (roles.law.friction or 0.0) < NO_FRICTION:
             continue  # of a set point, which goes as it does, there is none
         if roles.law.share > least and abs(roles.law.work) > WORK_GIVES_SIGN:
             found.append((whole, roles))
