@@ -47,7 +47,7 @@ COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 MOVES_NOTHING = 0.05  # share of a force's change, that noise explains at most
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
-NO_BODY = 0.1  # share of a drive by its law, below which what no header speaks for is none
+NO_BODY = -2.5  # log-odds of a way, that no header speaks for, below which it is none
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 
 Sign = float
@@ -116,10 +116,9 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     choices.sort(key=lambda one: -one.score)
     head, way = weights.said(choices[0].way.y, "y"), choices[0].way
     denied = head < weights.LEAST_SCORE and way.law.share < weights.EXPLAINED
-    both = way.law.friction is not None
-    if any(one.header.purpose == "error" for one in signals):
-        denied = both = False  # said of what is made of it
-    if denied or (both and way.law.share < NO_BODY and head < HEADER_SAYS):
+    unlikely = choices[0].score < NO_BODY and head < HEADER_SAYS
+    wrong = any(one.header.purpose == "error" for one in signals)  # said of what is made of it
+    if (denied or unlikely) and not wrong:
         return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
