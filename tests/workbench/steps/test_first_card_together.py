@@ -154,7 +154,7 @@ def test_what_is_half_alike_is_no_reference(joint: dict[str, Array], tmp_path: P
 
 def test_a_size_and_a_direction_are_no_command(joint: dict[str, Array], tmp_path: Path) -> None:
     size, way = np.abs(joint["u"]), (joint["u"] > 0.0).astype(float)
-    with pytest.raises(BadLog, match="'pwm' has no sign, 'dir' tells its direction"):
+    with pytest.raises(BadLog, match="'pwm' has no sign, 'dir' gives its direction"):
         propose(tmp_path, "t,enc,pwm,dir", T, joint["y"], size, way)
 
 

@@ -10,7 +10,7 @@ from workbench.cards.headers import Header, meaning, says_purpose, words_of
 from workbench.cards.written_units import WrittenUnit
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
-MOST_WORDS = 3  # of an axis's name
+WORDS_OF_A_NAME = 3  # of an axis's name
 SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
 
@@ -26,7 +26,9 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
         heads = [as_position(head) if head.speed else head for head in heads]
     words = [words_of(head.name) for head in heads]
     families: dict[tuple[str, ...], dict[str, int]] = {}
-    for count in range(1, MOST_WORDS + 1):  # of two that name as many axes the shorter is the name
+    for count in range(
+        1, WORDS_OF_A_NAME + 1
+    ):  # of two that name as many axes the shorter is the name
         for k, own in enumerate(words):
             for place in range(len(own) - count + 1):
                 name = own[place : place + count]

@@ -25,7 +25,7 @@ from workbench.steps.first_card.names import read_together
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
 VOLTS = ("V", "mV")
-POWERS = {"power", "leistung", "pow"}
+CALLED_POWER = {"power", "leistung", "pow"}
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -101,7 +101,7 @@ def _with_sign(one: Column) -> Column:
     """The column; of a power that goes as far below zero as above, as no motor's is that moves
     something, a share of what the motor is given."""
     low, high = (float(side(one.numbers, initial=0.0)) for side in (np.min, np.max))
-    power = POWERS & set(words_of(one.header.name)) and one.header.unit is None
+    power = CALLED_POWER & set(words_of(one.header.name)) and one.header.unit is None
     if not power or low > -HALF * high or high < -HALF * low:
         return one
     return replace(one, header=replace(one.header, means={"command": 2.0}))

@@ -260,7 +260,7 @@ def refuse_unsigned(columns: Columns, roles: Roles) -> None:
         law = force_law(motion, roles.columns["y"].x, signed)
         if law is not None and law.share > max(MOSTLY_ITS_LAW, TWICE * roles.law.share):
             raise BadLog(
-                f"{columns.log.path}: column {u.shown} has no sign, {flag.shown} tells its"
+                f"{columns.log.path}: column {u.shown} has no sign, {flag.shown} gives its"
                 " direction; add a column of the one with the sign of the other, and give that log"
             )
 
