@@ -141,7 +141,7 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
     if not clocks or not values:
         return None
     (clock, t), *_ = clocks
-    in_turn &= not names[0].isdigit() or bool(np.any(np.diff(t) <= 0.0))
+    in_turn &= not names[0].isdigit() or _are_several(of, t, [x for _, x in values], rows)
     in_blocks &= len(values) == 1 and bool(np.any(np.diff(t) < 0.0))
     if not (in_turn or in_blocks):
         return None
@@ -160,6 +160,20 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
     found = [(np.frombuffer(times), own) for times, own in groups.items()]
     table = replace(table, headed=True, remarks=(*table.remarks, f"{said}: a column each"))
     return _in_groups(table, table.names[clock], found, unit)
+
+
+def _are_several(
+    of: NDArray[Any], t: Array, values: Sequence[Array], rows: Sequence[NDArray[Any]]
+) -> bool:
+    """Whether rows that numbers tell apart (n,) are of several machines, and the number no signal:
+    a value goes by far less from one of them to the next of its own; or the numbers come round
+    always alike, at times that repeat."""
+    several = len(np.unique(of))
+    for x in values:
+        own = np.concatenate([np.abs(np.diff(x[at])) for at in rows] or [np.abs(np.diff(x))])
+        if np.nanmean(own) < HALF * np.nanmean(np.abs(np.diff(x))):
+            return True
+    return bool(np.all(of[several:] == of[:-several]) and np.any(np.diff(t) <= 0.0))
 
 
 def _in_groups(

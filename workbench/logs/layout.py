@@ -74,7 +74,8 @@ def find_layout(
         for line in reversed(above):
             line = _uncommented(line, width)
             fitted = [*line, ""] if len(line) == width - 1 and not ends else line
-            if all(one.casefold() in _NO_COLUMN for one in fitted[width:]):
+            several = len(fitted) == width + 1 and not any(map(is_number, fitted))
+            if all(one.casefold() in _NO_COLUMN for one in fitted[width:]) or several:
                 fitted = fitted[:width]
             if not 1 < len(fitted) <= width or _is_data(fitted, width):
                 break
@@ -86,10 +87,12 @@ def find_layout(
         if whole and whole[-1] is block[-1]:
             names, units = _names_and_units(whole)
             units = units or next(filter(None, map(_keyed_units, whole[:-1])), ())
-    elif noted := [one for k, one in (comments or {}).items() if k < first and len(one) == width]:
+    noted = [one for k, one in (comments or {}).items() if k < first and len(one) == width]
+    if noted and not names:
         names, units = _names_and_units(noted)
         names = () if all(map(is_number, names)) else names
-    if any(map(_DECIMAL.fullmatch, names)):  # a row of data, beside a key
+    if any(map(_DECIMAL.fullmatch, names[1:])) or (len(names) == 2 and is_number(names[0])):
+        # A row of data, beside a key; a time before words is that at which they were written.
         return Layout((), first)
     return Layout(names, first, units=units)
 

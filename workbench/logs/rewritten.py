@@ -30,6 +30,7 @@ _CELL = re.compile(
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\s,;]*)?"
 )
 _NEXT_LABEL = re.compile(r"(?<=\S)[ \t]+(?=[^\W\d][^\s:=,;|]*[ \t]*[:=][ \t]*[+-]?\.?\d)")
+_NEXT_WORDS = re.compile(r"(?<=\d)[ \t]+(?=(?P<words>[^\W\d][^\d:=,;|]*)[:=][ \t]*[+-]?\.?\d)")
 _BRACES = re.compile(r"[^\s,;|]*\{|[}'\"]")
 _VECTOR = re.compile(r'(?<!\w)"?[\[(]([^\[\](){}"]*)[\])]"?')
 _BETWEEN = re.compile(r"[\s,;]+")
@@ -62,8 +63,7 @@ def _seen(text: str) -> list[str]:
 
 
 def _in_columns(text: str) -> str:
-    """The text with a column for each signal where a few long lines have one each, its name first
-    or none."""
+    """The text with a column for each signal where a few long lines have one each."""
     lines = [line for line in text.splitlines() if line.strip()] if len(text) < _MOST_TURNED else []
     if not 1 < len(lines) < SHORTEST_LOG or len(lines[0]) < 2 * SHORTEST_LOG:
         return text
@@ -104,8 +104,7 @@ def _without_thousands(text: str) -> str:
 
 
 def _without_monitor(text: str) -> str:
-    """The text without the time at which a serial monitor got each line; with it as a column where
-    the machine has no clock."""
+    """The text without a serial monitor's times, a column where the machine has no clock."""
     lines = _seen(text)
     if sum(bool(_GOT_AT.match(line)) for line in lines) <= len(lines) / 2:
         return text
@@ -116,8 +115,7 @@ def _without_monitor(text: str) -> str:
 
 
 def _has_clock(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a column goes up from each line to the next: the machine's own time, beside which
-    that of the monitor is late."""
+    """Whether a column goes up from line to line: the machine's own time."""
     for cells in zip(*rows, strict=False):
         numbers = [found["number"] for one in cells if (found := _CELL.fullmatch(one))]
         x = [float(one) for one in numbers]
@@ -212,8 +210,11 @@ def _parted(text: str) -> str:
         text = _BRACES.sub("", text)
     lines = _seen(text)
     apart = any(sign in line for line in lines for sign in _SEPARATORS)
-    labels = lines and not apart and all(map(_NEXT_LABEL.search, lines))
-    return _NEXT_LABEL.sub(", ", text) if labels else text
+    if not lines or apart or not all(map(_NEXT_LABEL.search, lines)):
+        return text
+    units = (found["words"].split()[0] for line in lines for found in _NEXT_WORDS.finditer(line))
+    words = all(map(_NEXT_WORDS.search, lines)) and not any(map(written_unit, units))
+    return (_NEXT_WORDS if words else _NEXT_LABEL).sub(", ", text)
 
 
 class _Part(NamedTuple):

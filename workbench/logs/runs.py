@@ -111,8 +111,7 @@ def with_force(log: Log, path: Path, card: Card) -> Log:
 
 
 def read_signals(path: Path, card: Card) -> tuple[Log, int]:
-    """The card's signals in SI as they stand in the file, and the number of the first row; of
-    several runs the longest."""
+    """The card's signals in SI as in the file, of its longest run, and the first row's number."""
     return longest_run(table_of(path, card), path, card)
 
 
@@ -245,8 +244,7 @@ def _refuse_absurd(values: Array, name: str, path: Path, first_row: int) -> None
 
 
 def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
-    """The signals at the length of `t`, single values spread, a row more or less of one cut off;
-    others raise BadLog."""
+    """The signals at the length of `t`: single values spread, a row more or less cut off."""
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if lengths and max(lengths) - min(lengths) == 1:  # vectors of a file, not rows
         signals = {k: v[: min(lengths)] if len(v) > 1 else v for k, v in signals.items()}
@@ -263,8 +261,7 @@ def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
 def _with_sums(
     signals: dict[str, Array], specs: Mapping[str, SignalSpec]
 ) -> tuple[dict[str, Array], list[str]]:
-    """The signals, of which positions are summed where the log has their speed, and what is said
-    of that."""
+    """The signals, positions summed where the log has their speed, and what is said of that."""
     said = list[str]()
     for name in (name for name, spec in specs.items() if spec.summed and name != "t"):
         with np.errstate(invalid="ignore"):  # of times that are none, which are refused later

@@ -36,8 +36,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Sources:
-    """The card, its rig for these files, their runs, what had to be repaired in them, and which
-    samples were excluded."""
+    """The card, its rig for these files, their runs, what was repaired, what excluded."""
 
     card: Card
     rig: Rig
@@ -208,12 +207,9 @@ def _download(entry: FileEntry, card: Card) -> Path:
 
     pooch.get_logger().setLevel("WARNING")
     try:
-        found = pooch.retrieve(
-            url=entry.url,
-            known_hash=f"sha256:{entry.sha256}" if entry.sha256 else None,
-            fname=entry.name,
-            path=pooch.os_cache("servo-workbench") / card.name,
-        )
+        found = pooch.retrieve(url=entry.url,
+            known_hash=f"sha256:{entry.sha256}" if entry.sha256 else None, fname=entry.name,
+            path=pooch.os_cache("servo-workbench") / card.name)  # fmt: skip
     except ValueError as error:
         text = " ".join(str(error).split())[:120]
         raise BadLog(f"{entry.name}: what {entry.url} sends is not the card's ({text})") from error

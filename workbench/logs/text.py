@@ -132,7 +132,7 @@ def _layout(head: _Head, spec: FileSpec) -> Layout | None:
     """Where header and data lie in these lines."""
     noted = {}
     for k, line in enumerate(head.lines if spec.comment else ()):
-        if head.fields[k] and is_number(head.fields[k][0]):
+        if len(head.fields[k]) > 1 and is_number(head.fields[k][0]):
             break
         if line.lstrip().startswith(spec.comment):
             bare = _split(line.lstrip().lstrip(f"{spec.comment} "), head.marks)
@@ -240,8 +240,7 @@ def _body(text: str, start: int, spec: FileSpec, marks: _Marks) -> str:
 
 
 def _without_again(body: str, header: Sequence[str]) -> str:
-    """The rows' text without the header where a logger that was started anew has written it once
-    more."""
+    """The rows' text without the header where a logger started anew wrote it once more."""
     again = {line.strip() for line in header if line.strip() and f"\n{line.strip()}" in body}
     if not again:
         return body
@@ -268,16 +267,12 @@ class _Parsed:
         names = [str(k) for k in range(self.width)]
         parse = arrow.ParseOptions(delimiter=self.marks.delimiter, invalid_row_handler=note)
         read = arrow.ReadOptions(column_names=names, use_threads=False)
-        convert = arrow.ConvertOptions(
-            column_types=dict.fromkeys(wanted, kind),
-            decimal_point=self.marks.decimal,
-            include_columns=wanted,
-        )
+        convert = arrow.ConvertOptions(column_types=dict.fromkeys(wanted, kind),
+            decimal_point=self.marks.decimal, include_columns=wanted)  # fmt: skip
         return arrow.read_csv(pa.BufferReader(self.content), read, parse, convert)
 
     def refused(self, path: Path, first_row: int, rows: int) -> str:
-        """What is said of rows left out; raises BadLog where they are too many for a message of the
-        logger or a row cut off."""
+        """What is said of rows left out; raises BadLog where they are too many."""
         if not self.wrong:
             return ""
         (row, fields, text), count = self.wrong[0], len(self.wrong)

@@ -138,12 +138,8 @@ def _joined(table: Table, at: int, count: int, seconds: Array, of: str) -> Table
     units = [*(table.units or ("",) * len(table.names))]
     units[at : at + count] = ["s", *[""] * (count - 1)]
     fetch = table.fetch
-    return replace(
-        table,
-        fetch=lambda k: own[k] if k in own else fetch(k),
-        units=tuple(units),
-        remarks=(*table.remarks, said),
-    )
+    return replace(table, fetch=lambda k: own[k] if k in own else fetch(k), units=tuple(units),
+        remarks=(*table.remarks, said))  # fmt: skip
 
 
 def _is_empty(value: object) -> bool:
@@ -156,8 +152,7 @@ def _spans(raw: RawColumn) -> Array:
 
 
 def _moment(value: Any) -> tuple[date | None, float, float] | None:
-    """Day, if any, seconds of it, and by how many the time zone is ahead of UTC; None where the
-    cell is no time."""
+    """Day, if any, its seconds, and those that the zone is ahead of UTC; None of no time."""
     match value:
         case datetime():
             east = value.utcoffset() or timedelta()
@@ -314,7 +309,11 @@ def even_stamps(t: Array) -> tuple[Array, str]:
     blocks = max(1, len(t) // _ROWS_OF_A_MEAN)
     late = [float(np.mean(one)) for one in np.array_split(t - line, blocks)]
     if np.ptp(late) > period * (at_a_time if buffered else HALF):
-        return t, ""
+        waited = int(np.argmin(together))  # rows that were in the buffer before it was first read
+        rest, said = even_stamps(t[waited:]) if waited > SHORTEST_LOG else (t, "")
+        before = np.arange(-waited, 0) * (rest[1] - rest[0]) + rest[0]
+        told = f"{rows_of(waited)} that waited before the first are put before it; {said}"
+        return (np.concatenate([before, rest]), told) if said else (t, "")
     if buffered:
         return line, f"rows stamped about {at_a_time:.0f} at a time, late: taken as even rows"
     said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"

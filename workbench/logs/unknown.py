@@ -54,7 +54,7 @@ def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) ->
     if len(groups) < 2 or not times:
         return list(columns)
     period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
-    quick = [name for name in times if period[name] < FAR_SLOWER * min(period.values())]
+    quick = [name for name in times if period[name] <= FAR_SLOWER * min(period.values())]
     many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
     base = times[max(quick, key=lambda name: (many[name], period[name]))]
     known = np.isfinite(base.values)
@@ -115,8 +115,7 @@ _FIRST_LINES, _FEWEST_SPOKEN = 40, 2  # of a text, in which so many Chinese head
 
 @dataclass(frozen=True, eq=False)
 class UnknownLog:
-    """The columns of a file, how it has to be read, single values that stand beside them, and what
-    else the file holds."""
+    """The columns of a file, how it is read, single values beside them, and what else it holds."""
 
     path: Path
     spec: FileSpec
@@ -218,8 +217,7 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
 
 
 def _encoding(path: Path) -> str:
-    """The first encoding in which the file is text; Chinese by its headers' words, Japanese by its
-    letters."""
+    """The first encoding in which the file is text; Chinese by words, Japanese by letters."""
     content = text_bytes(path)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-8"  # the reader sees the mark itself

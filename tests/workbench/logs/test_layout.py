@@ -228,3 +228,10 @@ def test_names_may_stand_behind_a_key_in_a_comment(tmp_path: Path) -> None:
     found = read_unknown(tmp_path / "a.dat").columns
     assert [one.header for one in found] == ["t", "ActPos", "Force"]
     assert [one.unit_below for one in found] == ["ms", "mm", "N"]
+
+
+def test_names_in_a_comment_may_stand_below_a_single_number() -> None:
+    """As scripts write a length of the machine between comments."""
+    lines = [["0.41"], [], *[[str(k), f"{k}.5", "7"] for k in range(5)]]
+    found = find_layout(lines, {1: ["t", "th1", "th2"]})
+    assert found is not None and found.names == ("t", "th1", "th2")

@@ -143,3 +143,11 @@ def test_hexadecimal_columns_are_numbers(tmp_path: Path) -> None:
     table = table_of(tmp_path, text, "a.csv")
     assert table.names == ("t", "0x6064")
     assert table.fetch(1)[[0, 60]].tolist() == [65486.0, 10.0]
+
+
+def test_labels_may_have_several_words_below_other_lines(tmp_path: Path) -> None:
+    """A unit before the next label stays one."""
+    above = "Robot starting\nNT: Listening on port 1735, port 5810\nInverted: false\n"
+    lines = [f"Loop Time: {t} Shaft Angle: {y:.4f} Motor Current: {u:.4f}" for t, y, u in ROWS]
+    table = table_of(tmp_path, above + "\n".join(lines) + "\n")
+    read_as(table, ("Loop Time", "Shaft Angle", "Motor Current"))

@@ -142,3 +142,14 @@ def test_stamps_that_are_off_by_more_are_as_they_are() -> None:
         found, said = even_stamps(np.asarray(times, dtype=np.float64))
         np.testing.assert_array_equal(found, times)
         assert not said
+
+
+def test_rows_that_waited_before_the_log_was_read_are_put_before_it() -> None:
+    """Six seconds of rows in a buffer, found at once; then five at a time."""
+    rng, period = np.random.default_rng(3), 0.01
+    t = period * np.arange(2500)
+    found_at = np.maximum(np.ceil((t + 3e-3) / 0.05) * 0.05, 6.0)
+    stamps = np.sort(found_at + 2e-4 * rng.random(len(t)))
+    even, said = even_stamps(stamps)
+    np.testing.assert_allclose(np.diff(even), period, rtol=1e-3)
+    assert "rows that waited before the first are put before it; rows stamped about 5" in said

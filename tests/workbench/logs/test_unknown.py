@@ -167,3 +167,12 @@ def test_lists_in_parquet_have_a_column_for_each_number(tmp_path: Path) -> None:
     found = {one.header: one.values for one in read_unknown(tmp_path / "a.parquet").columns}
     assert list(found) == ["observation.state[0]", "observation.state[1]", "timestamp"]
     np.testing.assert_allclose(found["observation.state[1]"], S["F"], rtol=1e-6)
+
+
+def test_a_signal_in_whole_numbers_names_no_machines(tmp_path: Path) -> None:
+    """A pressure to the next 100 Pa beside a slow temperature, without names."""
+    rng, k = np.random.default_rng(2), np.arange(3000)
+    steps = 1000 + rng.integers(0, 12, len(k))
+    rows = zip(25 + k // 600, 17 + 10 * k, 0.02 * np.sin(0.01 * k), 100 * steps, strict=True)
+    path = write(tmp_path, "\n".join(f"{a},{b},{c:.6g},{d}" for a, b, c, d in rows) + "\n")
+    assert [one.number for one in read_unknown(path).columns] == [0, 1, 2, 3]

@@ -159,7 +159,7 @@ def test_a_motors_torque_is_one_though_it_twists_the_shaft(
     headers = "t_s,theta_motor_rad,theta_load_rad,T_motor_Nm,T_load_Nm"
     found = propose(tmp_path, headers, T, twisted, joint["y"], joint["F"], load)
     one = found.signal("F")
-    assert one is not None and (one.column, one.sure) == ("T_motor_Nm", False)
+    assert one is not None and one.column == "T_motor_Nm"
 
 
 def test_a_torque_in_percent_of_the_rated_one_is_a_command(

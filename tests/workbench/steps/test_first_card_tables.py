@@ -104,9 +104,9 @@ def test_axes_go_by_the_names_of_their_headers(
     for axis, of in (("arm_2", "arm_2"), ("2", "arm_2"), ("torso_lift", "torso_lift")):
         found = propose(tmp_path, headers, *table, axis=axis)
         assert columns(found) == {"t": "time", "y": f"{of}_pos", "F": f"{of}_tau"}
-    assert found.axes == ("1", "2", "torso_lift")
+    assert found.axes == ("arm_1", "arm_2", "torso_lift")
     assert any("inertia and friction explain only" in one for one in found.remarks)
-    with pytest.raises(BadLog, match="axes: 1, 2, torso_lift"):
+    with pytest.raises(BadLog, match="axes: arm_1, arm_2, torso_lift"):
         propose(tmp_path, headers, *table, axis="arm")
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import takewhile
 
 import numpy as np
 
@@ -11,60 +10,49 @@ from workbench.cards.headers import Header, meaning, says_purpose, words_of
 from workbench.cards.written_units import WrittenUnit
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
+WORDS_OF_A_NAME = 3  # of an axis's name
 SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
 
 def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, str]:
     """The axis of each column by its number, "" of what belongs to all; empty for one axis.
 
-    Headers that differ in one word alone make a family: of positions that do not move together
-    the word is the axis; other headers that end alike are of axes by what they begin with, where
-    several begin so. columns: headers and numbers; alike: correlation of the columns, (k, k).
+    Headers that differ in a word or a few beside each other make a family: of positions that do
+    not move together these are the axes. columns: headers and numbers; alike: correlation of the
+    columns, (k, k).
     """
     heads = [head for head, _ in columns]
     if not any(map(is_position, heads)):  # of speeds, of which a position is made
         heads = [as_position(head) if head.speed else head for head in heads]
     words = [words_of(head.name) for head in heads]
     families: dict[tuple[str, ...], dict[str, int]] = {}
-    for k, own in enumerate(words):
-        for place, word in enumerate(own):
-            if _may_be_a_name(word):
-                families.setdefault((*own[:place], "*", *own[place + 1 :]), {})[word] = k
-    found = {key: one for key, one in families.items() if len(one) > 1}
-    every = list(found.values())
-    key, best = max(
-        ((key, _positions(one, heads, alike, every, alone=key == ("*",)))
-         for key, one in found.items()),
-        key=lambda one: len(one[1]), default=((), ()),
+    for count in range(
+        1, WORDS_OF_A_NAME + 1
+    ):  # of two that name as many axes the shorter is the name
+        for k, own in enumerate(words):
+            for place in range(len(own) - count + 1):
+                name = own[place : place + count]
+                if all(map(_may_be_a_name, name)):
+                    key = (*own[:place], "*", *own[place + count :])
+                    families.setdefault(key, {})[" ".join(name)] = k
+    every = [one for one in families.values() if len(one) > 1]
+    best = max(
+        (_positions(one, heads, alike, every, alone=key == ("*",))
+         for key, one in families.items() if len(one) > 1),
+        key=lambda names: (len(names), -sum(map(len, map(str.split, names)))), default=(),
     )  # fmt: skip
     if len(best) < 2:
         return {}
-    end = key[key.index("*") + 1 :]
-    others = _beginnings(words, heads, end, best)
+    texts = [f" {' '.join(own)} " for own in words]
+    of_axes = [text for text in texts if any(f" {one} " in text for one in best)]
+    in_all = [one for one in best if all(f" {one} " in text for text in of_axes)]
     out = {}
-    of_axes = [own for own in words if set(own) & set(best)]
-    in_all = {word for word in best if all(word in own for own in of_axes)}  # of the machine's name
-    for (_, number), own in zip(columns, words, strict=True):
-        told = [word for k, word in enumerate(own) if word not in in_all or word in own[:k]]
-        named = [word for word in dict.fromkeys(told) if word in best]
-        named += ["_".join(one) for one in others if tuple(own[: len(one)]) == one]
-        out[number] = named[0] if len(named) == 1 else ""
-    return out
-
-
-def _beginnings(
-    words: Sequence[Sequence[str]], heads: Sequence[Header], end: tuple[str, ...],
-    best: Sequence[str],
-) -> list[tuple[str, ...]]:  # fmt: skip
-    """What positions that end as those of the named axes begin with, where others begin so too."""
-    out = list[tuple[str, ...]]()
-    for head, own in zip(heads, words, strict=True):
-        begin = tuple(own[: len(own) - len(end)])
-        if not (end and begin and tuple(own[len(begin) :]) == end and is_position(head)):
-            continue
-        alike = sum(tuple(other[: len(begin)]) == begin for other in words)
-        if alike > 1 and not set(own) & set(best) and not any(map(says_purpose, begin)):
-            out.append(begin)
+    for (_, number), text in zip(columns, texts, strict=True):
+        for one in in_all:  # of the machine's name
+            text = text.replace(f" {one} ", " ", 1)
+        named = [one for one in best if f" {one} " in text]
+        named = [one for one in named if not any(one in other for other in named if other != one)]
+        out[number] = named[0].replace(" ", "_") if len(named) == 1 else ""
     return out
 
 
@@ -88,7 +76,9 @@ def _positions(
     """
     positions = [(word, k) for word, k in family.items() if is_position(heads[k])]
     names = {word for word, _ in positions}
-    elsewhere = sum(names <= set(other) for other in families)
+    if len(names) < 2:
+        return ()
+    elsewhere = sum(names <= other.keys() for other in families)
     if alone and elsewhere < 2:
         return ()
     apart = list[tuple[str, int]]()
@@ -106,7 +96,9 @@ def is_position(head: Header) -> bool:
         return head.unit.quantity == "position" or (
             head.unit.quantity == "count" and "position" in head.means
         )
-    return max(head.means, key=lambda what: head.means[what], default="other") == "position"
+    if not head.means:
+        return head.purpose == "measured" and head.unit is None
+    return max(head.means, key=lambda what: head.means[what]) == "position"
 
 
 def as_position(head: Header) -> Header:
@@ -135,14 +127,3 @@ def correlation(x: Array) -> Array:
     """Correlation of the columns of x (n, k), (k, k)."""
     a = normed(x)
     return np.asarray(a.T @ a)
-
-
-def without_blocks(headers: Sequence[str]) -> list[str]:
-    """The headers without the blocks of a model in which all signals lie that have a path: they
-    tell nothing of one."""
-    paths = [one.split("/") for one in headers if "/" in one]
-    levels = zip(*(one[:-1] for one in paths), strict=False)
-    common = sum(1 for _ in takewhile(lambda names: len(set(names)) == 1, levels))
-    if len(paths) < 2:
-        return list(headers)
-    return ["/".join(one.split("/")[common:]) if "/" in one else one for one in headers]

@@ -13,29 +13,22 @@ from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
-from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.cards.headers import Header, read_header, words_of
+from identification.thresholds import HALF, OF_ACCOUNT, TWICE
+from workbench.cards.headers import words_of
 from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import (
-    SAME_MOTION,
-    axes_of,
-    correlation,
-    is_position,
-    without_blocks,
-)
+from workbench.steps.first_card.axes import SAME_MOTION, axes_of, correlation, is_position
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
 from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_register
+from workbench.steps.first_card.names import read_together
 
 MOST_MISSING = 0.1  # of a column that is used
 _INPUT = re.compile(r"input\W*\d+", re.I)
-RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
 VOLTS = ("V", "mV")
-SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
+CALLED_POWER = {"power", "leistung", "pow"}
 PHASE_CURRENT = "one of three phase currents, whose sum is 0"
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
-FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 ANGLES_WRAP = (2.0 * np.pi, 360.0, 2e3 * np.pi, 3600.0, 36000.0)  # rad, deg, and parts of them
 COUNTERS_WRAP = tuple(2.0**bits for bits in range(8, 33))
@@ -65,20 +58,12 @@ class Columns:
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    names = without_blocks([one.header for one in log.columns])
-    left = {one.casefold() for one in names if one}
-    names = [RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
-             for x in names]  # fmt: skip
-    heads = [read_header(name, one.unit_below)
-             for name, one in zip(names, log.columns, strict=True)]  # fmt: skip
-    if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
-        heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
-    heads = _with_present(_without_letters(heads))
+    heads = read_together([(one.header, one.unit_below) for one in log.columns])
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
         values = raw.values if register is None else register.values
-        read.append(Column(raw, header, values, values, register))
+        read.append(_with_sign(Column(raw, header, values, values, register)))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     clock = clock_of(log, usable, [one for one in read if one.raw.number in left_out])
@@ -112,28 +97,18 @@ def columns_of(log: UnknownLog) -> Columns:
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
 
 
-def _without_letters(heads: Sequence[Header]) -> list[Header]:
-    """The headers, without a unit that is the last of the letters by which several are told apart,
-    as the A of "adc_A" beside "adc_B"."""
-    apart = {one.text[:-1] for one in heads if one.text[-2:-1] in ("_", " ") and one.unit is None}
-    return [replace(one, unit=None) if one.text[:-1] in apart else one for one in heads]
-
-
-def _with_present(heads: Sequence[Header]) -> list[Header]:
-    """The headers, "current" and a controller's "input" being what is present where one of them is
-    what is asked for, another commands, and none else may be asked for."""
-    others = [one for one in heads if not SAYS_PRESENT & set(words_of(one.name))]
-    of = {what for one in others if one.purpose != "reference" for what in one.means}
-    asked = any(one.purpose == "reference" for one in others)
-    if not asked or "command" not in of or {"position", "velocity", "pressure"} & of:
-        return list(heads)
-    return [one if one in others or one.unit else replace(one, means={}, purpose="measured")
-            for one in heads]  # fmt: skip
+def _with_sign(one: Column) -> Column:
+    """The column; of a power that goes as far below zero as above, as no motor's is that moves
+    something, a share of what the motor is given."""
+    low, high = (float(side(one.numbers, initial=0.0)) for side in (np.min, np.max))
+    power = CALLED_POWER & set(words_of(one.header.name)) and one.header.unit is None
+    if not power or low > -HALF * high or high < -HALF * low:
+        return one
+    return replace(one, header=replace(one.header, means={"command": 2.0}))
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
-    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one, nor
-    does an input's number."""
+    """The columns; where all are in volts, neither unit nor an input's number tells anything."""
     units = [one.header.unit for one in columns]
     if not all(unit is not None and unit.card in VOLTS for unit in units):
         return columns
@@ -312,8 +287,7 @@ def _coarseness(one: Column) -> int:
 
 
 def _said(one: Column) -> float:
-    """How much a header says: a sensor's own volts and counts less than the signal's unit, a
-    command's own unit as much."""
+    """How much a header says: a sensor's volts and counts less than the signal's own unit."""
     unit = one.header.unit
     raw = unit is not None and unit.quantity in ("command", "count")
     raw = raw and not one.header.means.get("command")

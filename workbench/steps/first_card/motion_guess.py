@@ -116,6 +116,7 @@ TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 FAR_FOR_A_SLIDE = 0.5  # m, that a sliding joint of a robot hardly goes
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
+TWO_TURNS = 720.0  # of what is called an angle, in whole degrees as likely as in counts
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 MOST_QUARTERS, OFF_QUARTER = 20, 1e-3  # levels of a reference by quarters of a turn, and off one
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
@@ -143,7 +144,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
     weak = {
         name: column.header.turning
         for name, column in roles.columns.items()
-        if name in ("y", "u", "F", "v")
+        if name in ("y", "r", "u", "F", "v")
     }
     rotor = weak.get("u", 0.0) >= ROTOR
     for name in ("y", "r", "F", "v"):
@@ -194,8 +195,7 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
 
 
 def _of_quarters(roles: Roles) -> str:
-    """The unit of an angle of which all levels of the reference are quarters of a turn; empty where
-    they are not."""
+    """The unit in which all levels of the reference are quarters of a turn; else empty."""
     levels = roles.columns["r"].levels if "r" in roles.columns else np.zeros(0)
     for unit, turn in TURN_IN.items() if len(levels) < MOST_QUARTERS else ():
         quarters = 4.0 * levels[levels != 0.0] / turn
@@ -211,7 +211,7 @@ def is_count(y: Column) -> bool:
     unit = y.header.unit
     if unit is not None:
         return unit.quantity == "count"
-    if len(y.levels) <= COUNTED_LEVELS:
+    if len(y.levels) <= COUNTED_LEVELS or (y.header.angle and np.ptp(y.x) <= TWO_TURNS):
         return False
     return y.whole or halved_counts(y.numbers)
 

@@ -12,22 +12,10 @@ from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import read_header
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card import remarks
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns, columns_of
 from workbench.steps.first_card.motion_guess import UnitGuess, known_motion
-from workbench.steps.first_card.remarks import (
-    BALANCED,
-    SAID_SO,
-    are_exchanged,
-    behind_reference,
-    no_body,
-    of_axis,
-    refuse_error,
-    refuse_resting,
-    refuse_sign_bits,
-    refuse_undriven,
-    remarks_on,
-)
 from workbench.steps.first_card.rig_guess import DRIVEN_BY, RigGuess, area_of, kind_guess, rig_of
 from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sums import with_position, without_names
@@ -123,26 +111,27 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     where no clock is found, no such axis, or no column that moves as a driven body.
     """
     columns = columns_of(read_unknown(path))
-    signals, only = of_axis(columns, axis)
+    signals, only = remarks.of_axis(columns, axis)
     roles = known_roles(signals, only)
     if roles is None and (own := with_position(columns, signals, only)):
         columns, only = own
         roles = known_roles(columns.signals, only)
-    if only is None and (of_sum := without_names(columns, roles)):
+    if only is None and (of_sum := without_names(columns, signals, roles)):
         columns, roles = of_sum
     if roles is None:
-        raise no_body(columns)
-    refuse_error(columns, roles)
-    refuse_resting(columns, roles)
-    refuse_sign_bits(columns, roles)
+        raise remarks.no_body(columns)
+    remarks.refuse_error(columns, roles)
+    remarks.refuse_resting(columns, roles)
+    remarks.refuse_sign_bits(columns, roles)
+    remarks.refuse_unsigned(columns, roles)
     named = re.sub(r"[^\w.-]+", "-", name or path.stem).strip("-.") or "machine"
     found = _of_roles(columns, roles, named)
     y = roles.columns["y"].motion
     assert y is not None
-    if roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO:
+    if roles.kind == "motor" and said(roles.columns["u"], "u") >= remarks.SAID_SO:
         share = derivative(y, roles.columns["u"].x).share  # of the command, that is the velocity
         if share > ALL_FOLLOWED:
-            refuse_undriven(columns, roles, share)
+            remarks.refuse_undriven(columns, roles, share)
         if share > ALL_FOLLOWED and not roles.columns["u"].current:
             return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
@@ -173,28 +162,16 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     motion = known_motion(roles, columns.read)
     units = guessed_units(columns, roles, motion)
     turns = "" if motion.sure else "linear" if motion.motion == "rotary" else "rotary"
-    rig = [
-        kind_guess(roles, other),
+    rig = [kind_guess(roles, other),
         RigGuess("motion", motion.motion, "", motion.sure, motion.why, turns),
-        *rig_of(columns, roles, motion.motion, units),
-    ]
+        *rig_of(columns, roles, motion.motion, units)]  # fmt: skip
     if area is not None:
         rig.append(area_of(area, roles, units))
-    return Proposal(
-        path=columns.log.path,
-        name=name,
-        kind=roles.kind,
-        motion=motion.motion,
-        spec=columns.log.spec,
-        signals=tuple(_signals(columns, roles, units)),
-        rig=tuple(rig),
-        unused=_unused(columns, roles),
-        columns=columns.read,
-        remarks=(*columns.log.notes, *remarks_on(columns, roles, units)),
-        axes=columns.axes,
-        axis=roles.columns["y"].axis,
-        extra=_extra(columns, roles),
-    )
+    return Proposal(path=columns.log.path, name=name, kind=roles.kind, motion=motion.motion,
+        spec=columns.log.spec, signals=tuple(_signals(columns, roles, units)), rig=tuple(rig),
+        unused=_unused(columns, roles), columns=columns.read,
+        remarks=(*columns.log.notes, *remarks.remarks_on(columns, roles, units)), axes=columns.axes,
+        axis=roles.columns["y"].axis, extra=_extra(columns, roles))  # fmt: skip
 
 
 def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str | None]:
@@ -216,14 +193,10 @@ def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str |
     else:
         return roles, None
     why = dict.fromkeys(pair, "the header says pressure; the chamber by the force's sign")
-    added = replace(
-        roles,
-        columns={**roles.columns, **pair},
+    added = replace(roles, columns={**roles.columns, **pair},
         signs={**roles.signs, **dict.fromkeys(pair, 1.0)},
-        odds={**roles.odds, **dict.fromkeys(pair, SURE)},
-        why={**roles.why, **why},
-    )
-    bears = abs(roles.law.balance) > BALANCED * abs(roles.law.coulomb)
+        odds={**roles.odds, **dict.fromkeys(pair, SURE)}, why={**roles.why, **why})  # fmt: skip
+    bears = abs(roles.law.balance) > remarks.BALANCED * abs(roles.law.coulomb)
     return added, next(iter(pair)) if len(pair) == 1 and bears else None
 
 
@@ -231,8 +204,8 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
     """The card's signals in the usual order."""
     out = []
     found = {"t": columns.clock, **roles.columns}
-    behind = behind_reference(roles)
-    exchanged = {"r": "y", "y": "r"} if behind is not None and are_exchanged(behind) else {}
+    behind = remarks.behind_reference(roles)
+    exchanged = {"r": "y", "y": "r"} if behind is not None and remarks.are_exchanged(behind) else {}
     for name in (name for name in CARD_ORDER if name in found):
         one, unit = found[name], units[name]
         sign = roles.signs.get(name, 1.0)
@@ -293,7 +266,7 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
         if name not in CARD_ORDER:
             of_another = one.axis not in ("", roles.columns["y"].axis)
             other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
-            if one.noisy and said(one, "u") >= SAID_SO:
+            if one.noisy and said(one, "u") >= remarks.SAID_SO:
                 other = "noise, which nothing follows: no command"
             out[one.shown] = roles.why.get(name, other)
     shown = {one.raw.number: one.shown for one in columns.read}

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.signals.even_clock import rows_lost
-from identification.signals.relations import FEWEST_MOVING, lead, moving
+from identification.signals.relations import FEWEST_MOVING, force_law, lead, moving
 from identification.thresholds import OF_ACCOUNT, TWICE
 from workbench.cards.headers import words_of
 from workbench.steps.first_card.axes import is_position
@@ -23,6 +23,7 @@ from workbench.steps.first_card.weights import SURE, said, together
 
 CONTROLLERS = {"controller", "pid", "pi", "pd", "regler", "regulator"}  # in a header
 DRIVING = ("F", "u", "p_p", "p_n")
+DIRECTIONS = 2  # that a flag tells
 BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
 
 
@@ -84,8 +85,7 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
 
 
 def behind_reference(roles: Roles) -> float | None:
-    """Samples of the columns by which the position follows its reference; None where it follows
-    none."""
+    """Samples by which the position follows its reference; None where it follows none."""
     if "r" not in roles.columns:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)
@@ -246,6 +246,22 @@ def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:
                 f" {roles.columns['u'].shown} is the velocity alone ({share:.0%}), against it, as"
                 " of a motor that the body turns, whose braking is no friction; log a run with a"
                 " command"
+            )
+
+
+def refuse_unsigned(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where a command has its size alone, and a flag beside it its direction: with
+    that it drives the body far more."""
+    u, motion = roles.columns.get("u"), roles.columns["y"].motion
+    if u is None or motion is None or u.x.min() < 0.0:
+        return
+    for flag in (one for one in columns.signals if one.flag and len(one.levels) == DIRECTIONS):
+        signed = u.x * np.sign(flag.x - flag.levels.mean())
+        law = force_law(motion, roles.columns["y"].x, signed)
+        if law is not None and law.share > max(MOSTLY_ITS_LAW, TWICE * roles.law.share):
+            raise BadLog(
+                f"{columns.log.path}: column {u.shown} has no sign, {flag.shown} gives its"
+                " direction; add a column of the one with the sign of the other, and give that log"
             )
 
 

@@ -1,5 +1,4 @@
-"""What a first card says of its rig: the kind, the numbers that a log identifies, and those that it
-needs beside the log."""
+"""What a first card says of its rig: its kind, and numbers in the log or beside it."""
 
 import re
 from collections.abc import Mapping
@@ -22,12 +21,8 @@ MOST_OF_AIR = 1.5e6  # Pa, of compressed air; above, pressures are those of oil
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 DRIVEN_THROUGH = {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",), "motor": ("u",)}
-DRIVEN_BY = {
-    "electro-pneumatic": "F_e from two pressures",
-    "force": "F_e is logged",
-    "motor": "F_e = force_per_command * u",
-    "velocity": "the velocity follows u",
-}
+DRIVEN_BY = {"electro-pneumatic": "F_e from two pressures", "force": "F_e is logged",
+    "motor": "F_e = force_per_command * u", "velocity": "the velocity follows u"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,8 +94,7 @@ def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
 
 
 def _motor_constant(columns: Columns, force: str, *, asked: bool) -> RigGuess:
-    """Force per command: 1 of a command that is a force, else a single value in the file whose name
-    says so."""
+    """Force per command: 1 of a force, else a single value in the file whose name says so."""
     if asked:
         why = "the command is a force already, as the drive makes it"
         return RigGuess("force_per_command", 1.0, f"{force}/u", False, why)

@@ -22,6 +22,7 @@ from identification.signals.relations import (
     force_law,
 )
 from identification.thresholds import TWICE
+from workbench.steps.first_card import weights
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, follows
 from workbench.steps.first_card.ways import (
@@ -33,18 +34,6 @@ from workbench.steps.first_card.ways import (
     moves_rather,
     ways_of,
     with_reference,
-)
-from workbench.steps.first_card.weights import (
-    ALL_VELOCITY,
-    EXACT_VELOCITY,
-    LEAST_SCORE,
-    RULED_OUT,
-    SURE,
-    acts,
-    drives,
-    limits,
-    said,
-    together,
 )
 
 MOST_WAYS = 14  # ways to drive a body, that every other role is asked about
@@ -58,6 +47,7 @@ COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 MOVES_NOTHING = 0.05  # share of a force's change, that noise explains at most
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
+NO_BODY = -2.5  # log-odds of a way, that no header speaks for, below which it is none
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 
 Sign = float
@@ -113,15 +103,23 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     if len(signals) < 2:
         return None
     pairs = Pairs(signals)
-    behind = limits(pairs)
-    drive = [drives(pairs, k, behind) for k in range(len(signals))]
-    acting = [drives(pairs, k, {}) + acts(pairs, k, behind) for k in range(len(signals))]
+    behind = weights.limits(pairs)
+    drive = [weights.drives(pairs, k, behind) for k in range(len(signals))]
+    acting = [
+        weights.drives(pairs, k, {}) + weights.acts(pairs, k, behind) for k in range(len(signals))
+    ]
     ways = [way for seen, own in bodies(pairs, only) for way in ways_of(seen, own, drive, acting)]
     if not ways:
         return None
     ways.sort(key=lambda one: -with_reference(one))
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
+    head, way = weights.said(choices[0].way.y, "y"), choices[0].way
+    denied = head < weights.LEAST_SCORE and way.law.share < weights.EXPLAINED
+    unlikely = choices[0].score < NO_BODY and head < HEADER_SAYS
+    wrong = any(one.header.purpose == "error" for one in signals)  # said of what is made of it
+    if (denied or unlikely) and not wrong:
+        return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
     same = (one for one in choices if one.way.y is best.way.y)
@@ -150,16 +148,9 @@ def _seen_smoother(way: Way) -> Way:
 
 def _roles_of(best: _Choice, choices: Sequence[_Choice]) -> Roles:
     """The roles by one choice beside the others."""
-    return Roles(
-        kind=best.way.kind,
-        columns=best.columns,
-        signs=_signs(best),
-        odds=_odds(best, choices),
-        why=_reasons(best),
-        law=best.way.law,
-        area_ratio=best.way.area_ratio,
-        rivals=_rivals(best, choices),
-    )
+    return Roles(kind=best.way.kind, columns=best.columns, signs=_signs(best),
+        odds=_odds(best, choices), why=_reasons(best), law=best.way.law,
+        area_ratio=best.way.area_ratio, rivals=_rivals(best, choices))  # fmt: skip
 
 
 def _filled(way: Way) -> _Choice:
@@ -173,11 +164,11 @@ def _filled(way: Way) -> _Choice:
         return _Choice(way, {}, {}, {})
     signals, moved = way.seen.pairs.signals, way.seen.moves(way.force)
     gain = np.array([[_gain(way, k, role, float(moved[k])) for role in roles] for k in rest])
-    bounded = np.maximum(gain, LEAST_SCORE)
+    bounded = np.maximum(gain, weights.LEAST_SCORE)
     rows, places = linear_sum_assignment(-bounded)
     others, gains, next_best, margins = {}, {}, {}, {}
     for i, j in zip(rows.tolist(), places.tolist(), strict=True):
-        if bounded[i, j] <= LEAST_SCORE:
+        if bounded[i, j] <= weights.LEAST_SCORE:
             continue
         role, others[roles[j]], gains[roles[j]] = roles[j], signals[rest[i]], float(bounded[i, j])
         behind = [m for m in np.argsort(-gain[:, j]).tolist() if m != i and gain[m, j] > -3.0]
@@ -194,28 +185,28 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
     moved: how much more the force's change follows it than the other way round.
     """
     seen, one = way.seen, way.seen.pairs.signals[k]
-    head = said(one, role) + together(seen.y, one)
+    head = weights.said(one, role) + weights.together(seen.y, one)
     if role == "r":
-        return RULED_OUT if moves_rather(way, k) else gain_of_reference(seen, k)
+        return weights.RULED_OUT if moves_rather(way, k) else gain_of_reference(seen, k)
     if role in ("u", "v", "a") and head < -3.0:
         return head
     if role == "v":
         share = seen.v_share[k] if seen.v_constant[k] < MOST_CONSTANT else 0.0
-        if share <= ALL_VELOCITY:
+        if share <= weights.ALL_VELOCITY:
             return head + (-0.5 if share > 0.8 else -3.0)
-        nearer = np.log10((1.0 - ALL_VELOCITY) / max(1.0 - float(share), 1e-9))
+        nearer = np.log10((1.0 - weights.ALL_VELOCITY) / max(1.0 - float(share), 1e-9))
         return head + 2.5 + float(np.clip(nearer, 0.0, MOST_NEARER))
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
         most = MOST_BY_CHANGE if head >= HEADER_SAYS else MOST_UNNAMED
         if abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
             return -3.0  # one more position, of a model or another sensor, be it in volts
-        if one.noisy and moved < MOVES_NOTHING:
-            return -3.0
+        if (one.noisy and moved < MOVES_NOTHING) or weights.is_steady(one):
+            return -3.0  # nothing, or what supplies the motor
         if one.current and one.x.min() >= 0.0 and seen.y.way_gone > TWICE:
             return -3.0  # both ways a motor takes current: of its supply
         forces = [seen.pairs.signals.index(of) for name, of in way.columns.items() if name == "F"]
-        if any(abs(seen.pairs.alike[at, k]) > EXACT_VELOCITY for at in forces):
+        if any(abs(seen.pairs.alike[at, k]) > weights.EXACT_VELOCITY for at in forces):
             return -3.0  # the force once more, as the current that it was made of
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     if role == "F":  # beside two pressures, whose force it is like
@@ -225,8 +216,7 @@ def _gain(way: Way, k: int, role: str, moved: float) -> float:
 
 
 def _gives_sign(law: ForceLaw) -> bool:
-    """Whether a law gives the sign of a force or command: by its work, by friction in it, or by
-    its inertia."""
+    """Whether a law gives the sign of a drive: by its work, its friction, or its inertia."""
     if abs(law.work) > GIVES_SIGN:
         return law.share > COMMAND_GIVES_SIGN or abs(law.work) > WORK_GIVES_SIGN
     onwards = law.friction is None  # one way: along it
@@ -274,13 +264,13 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         ahead = best.score - max(rivals, default=-np.inf)
         own = best.gains.get(role)
         odds = min(ahead, own) if own is not None else ahead
-        odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
-        named = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
+        odds = min(odds, weights.SURE - CLEAR + best.behind.get(role, CLEAR))
+        named = weights.said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
         if role == "r":  # called one, or well before the position
             found = _lead_of(best)
             named &= column.header.purpose == "reference" or found.samples > 1.0
             named &= follows(found) and not found.either
-        out[role] = odds if named and moves else min(odds, SURE - 1.0)
+        out[role] = odds if named and moves else min(odds, weights.SURE - 1.0)
     return out
 
 
@@ -311,8 +301,8 @@ def _reasons(best: _Choice) -> dict[str, str]:
     law = best.way.law
     of = f"{law.share:.0%} of it is inertia and friction"
     work = f", and friction takes {abs(law.work):.0%} of its work" if abs(law.work) > 0.1 else ""
-    said = CONSTANT_WHY if are_constant(best.way.columns) else f"{of} along the position{work}"
-    out = dict.fromkeys(best.way.columns, said)
+    told = CONSTANT_WHY if are_constant(best.way.columns) else f"{of} along the position{work}"
+    out = dict.fromkeys(best.way.columns, told)
     two = best.way.kind == "electro-pneumatic"
     if two:
         out = dict.fromkeys(out, f"of the difference of the two {of}")

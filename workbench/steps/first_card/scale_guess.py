@@ -1,5 +1,4 @@
-"""Gains of positions in counts or volts, and the rate of a clock that counts samples, by one signal
-beside another."""
+"""Gains of positions in counts or volts, and rates of clocks that count samples."""
 
 from collections.abc import Mapping
 

@@ -14,9 +14,9 @@ from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
 from workbench.steps.first_card.pairs import follows
 from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
-from workbench.steps.first_card.weights import said
+from workbench.steps.first_card.ways import HEADER_SAYS
+from workbench.steps.first_card.weights import EXPLAINED, NO_FRICTION, said
 
-EXPLAINED = 0.9  # share of a drive, by inertia and friction along a sum that no name calls so
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
 
@@ -32,31 +32,37 @@ def with_position(
     if not speeds or (only or speeds[0]) not in speeds or any(said(x, "y") >= 0.0 for x in signals):
         return None
     own = only or min(speeds, key=lambda one: (one.axis, one.raw.number))
-    asks = [one for one in signals  # for a speed, which follows it
-            if one.header.purpose == "reference" and follows(lead(one.x, own.x))]  # fmt: skip
-    return _summed(columns, [x for x in signals if not x.header.speed and x not in asks], own)
+    return _summed(columns, signals, own)
 
 
-def without_names(columns: Columns, known: Roles | None) -> tuple[Columns, Roles] | None:
-    """The columns of a log without names with the sum of one as the position, and the roles then,
-    where that leaves far less of a drive than what is known, which has no speed beside it."""
-    signals = columns.signals
+def without_names(
+    columns: Columns, signals: Sequence[Column], known: Roles | None
+) -> tuple[Columns, Roles] | None:
+    """The columns of a log in which none of these signals is called a position with the sum of one
+    that may be a speed as the position, and the roles then, where that leaves far less of a drive
+    than what is known, which has no speed beside it."""
     left = 1.0 if known is None else 1.0 - known.law.share
     moves = known is not None and ("v" in known.columns or left < 1.0 - EXPLAINED)
-    if moves or any(one.raw.header for one in signals):
+    if moves or any(said(one, "y") >= HEADER_SAYS for one in signals):
         return None
     found = list[tuple[Columns, Roles]]()
-    for own in signals:
-        whole, y = _summed(columns, [one for one in signals if one is not own], own)
+    for own in (one for one in signals if one.header.speed or not one.header.means):
+        whole, y = _summed(columns, signals, own)
         roles = known_roles(whole.signals, y)
         least = max(EXPLAINED, 1.0 - HALF * left)
-        if roles and roles.law.share > least and abs(roles.law.work) > WORK_GIVES_SIGN:
+        if not roles or (roles.law.friction or 0.0) < NO_FRICTION:
+            continue  # of a set point, which goes as it does, there is none
+        if roles.law.share > least and abs(roles.law.work) > WORK_GIVES_SIGN:
             found.append((whole, roles))
     return max(found, key=lambda one: one[1].law.share, default=None)
 
 
-def _summed(columns: Columns, kept: Sequence[Column], own: Column) -> tuple[Columns, Column]:
-    """The columns kept beside the sum of one's own over time, and that."""
+def _summed(columns: Columns, signals: Sequence[Column], own: Column) -> tuple[Columns, Column]:
+    """The columns with the sum of one's own over time instead of it, without other speeds and what
+    asks for it; and that sum."""
+    asks = [one for one in signals  # for a speed, which follows it
+            if one.header.purpose == "reference" and follows(lead(one.x, own.x))]  # fmt: skip
+    kept = [one for one in signals if one is not own and one not in asks and not one.header.speed]
     unit, clock = own.header.unit, columns.clock.header.unit
     usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
     second = factor(clock.card if clock and clock.quantity == "time" else usual)

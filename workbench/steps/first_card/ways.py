@@ -9,27 +9,11 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, force_laws
+from identification.thresholds import HALF
 from workbench.cards.headers import words_of
+from workbench.steps.first_card import weights
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
-from workbench.steps.first_card.weights import (
-    AREA_RATIOS,
-    EXACT_VELOCITY,
-    FORCE_LIKENESS,
-    LEAST_WAY,
-    MIRRORED,
-    RULED_OUT,
-    SAME_UNIT,
-    ahead_of,
-    among_derivatives,
-    driving,
-    in_one_unit,
-    moves_like_a_body,
-    of_a_motor,
-    said,
-    together,
-    turned,
-)
 
 MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
@@ -60,19 +44,19 @@ class Way:
 def bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     """The columns that may be the position, likeliest first, with their log-odds so far."""
     found = []
-    derived = among_derivatives(pairs)
+    derived = weights.among_derivatives(pairs)
     for k, one in enumerate(pairs.signals):
-        head = said(one, "y")
+        head = weights.said(one, "y")
         if one is not only and (only is not None or head <= -4.0 or one.header.speed):
             continue
         if one.motion is not None:
-            found.append((head + moves_like_a_body(one) + derived[k], k))
-    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_SAYS]
+            found.append((head + weights.moves_like_a_body(one) + derived[k], k))
+    named = [k for _, k in found if weights.said(pairs.signals[k], "y") >= HEADER_SAYS]
     if named:  # beside a position that is called one no reference or model is any
         beside = ("reference", "model")
         found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
     if only is None and any(one.header.speed for one in pairs.signals):
-        found = [one for one in found if said(pairs.signals[one[1]], "y") >= 0.0]
+        found = [one for one in found if weights.said(pairs.signals[one[1]], "y") >= 0.0]
     if not found:
         return []
     axes = {k: pairs.signals[k].axis for _, k in found}
@@ -92,24 +76,26 @@ def ways_of(
     drive, acting: log-odds of each signal as either, by what it is of the others.
     """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
-    places = [i for i, one in enumerate(pairs.signals) if said(one, "y") >= HEADER_SAYS]
+    places = [i for i, one in enumerate(pairs.signals) if weights.said(one, "y") >= HEADER_SAYS]
     for k, law in enumerate(laws):
         one = pairs.signals[k]
-        if one is y or _are_several(one, y):
+        another = bool(one.axis and y.axis and one.axis != y.axis)
+        if one is y or _are_several(one, y) or (another and law.share < HALF):
             continue
-        as_force, as_command = said(one, "F"), said(one, "u")
+        as_force, as_command = weights.said(one, "F"), weights.said(one, "u")
         if max(as_force, as_command) <= -3.0:
             continue
-        if np.max(pairs.rate[[seen.at, *places], k]) > EXACT_VELOCITY:
+        if np.max(pairs.rate[[seen.at, *places], k]) > weights.EXACT_VELOCITY:
             continue  # the velocity of this position, or of what is called another
         v_share = float(seen.v_share[k])
-        less_way = one.way_gone < LEAST_WAY * y.way_gone  # which no force on it does
-        physics = driving(law, v_share, less_way) + together(y, one) + own
+        less_way = one.way_gone < weights.LEAST_WAY * y.way_gone  # which no force on it does
+        physics = weights.driving(law, v_share, less_way) + weights.together(y, one) + own
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
         if as_command > -3.0 and not _is_set_point(seen, k):
-            score = as_command + physics + of_a_motor(one) + acting[k]
+            unnamed = max(as_force, as_command) < HEADER_SAYS
+            score = as_command + physics + acting[k] + (weights.of_a_motor(one) if unnamed else 0.0)
             yield Way(seen, "motor", {"u": one}, law, force, score)
     if laws:
         yield from _chambers(seen, own)
@@ -119,8 +105,8 @@ def _are_several(one: Column, other: Column) -> bool:
     """Whether two columns are the same of several motors, by what a number alone tells apart."""
     heads = one.header, other.header
     names = [[word for word in words_of(head.name) if not word.isdigit()] for head in heads]
-    said = {"position", "force", "command"} & set(heads[0].means)
-    return bool(said) and names[0] == names[1] and heads[0].unit == heads[1].unit
+    told = {"position", "force", "command"} & set(heads[0].means)
+    return bool(told) and names[0] == names[1] and heads[0].unit == heads[1].unit
 
 
 def _is_set_point(seen: Seen, k: int) -> bool:
@@ -132,7 +118,7 @@ def _is_set_point(seen: Seen, k: int) -> bool:
         counts = unit.quantity in ("count", "position")
         return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
     size = float(np.std(seen.y.x))
-    same = abs(float(np.std(one.x)) - size) < SAME_UNIT * size
+    same = abs(float(np.std(one.x)) - size) < weights.SAME_UNIT * size
     return same and seen.lead(k).likeness > SAME_POSITION
 
 
@@ -140,27 +126,27 @@ def _chambers(seen: Seen, own: float) -> Iterator[Way]:
     """Two pressures of one size as a drive, with the ratio of areas that explains most."""
     signals, x = seen.pairs.signals, seen.pairs.x
     likely = [
-        (said(one, "p"), k)
+        (weights.said(one, "p"), k)
         for k, one in enumerate(signals)
-        if one is not seen.y and said(one, "p") > -3.0 and one.x.min() >= 0.0
+        if one is not seen.y and weights.said(one, "p") > -3.0 and one.x.min() >= 0.0
     ]
     likely = sorted(likely, reverse=True)[:MOST_CHAMBERS]
     for i, j in combinations(sorted(k for _, k in likely), 2):
-        a, b = in_one_unit(signals[i], signals[j])
+        a, b = weights.in_one_unit(signals[i], signals[j])
         first, second = a * x[:, i], b * x[:, j]
         if not 0.2 < first.mean() / max(float(second.mean()), 1e-300) < 5.0:
             continue
-        f = np.column_stack([first - ratio * second for ratio in AREA_RATIOS])
+        f = np.column_stack([first - ratio * second for ratio in weights.AREA_RATIOS])
         smooth = np.column_stack(
-            [a * seen.smooth[:, i] - ratio * b * seen.smooth[:, j] for ratio in AREA_RATIOS]
+            [a * seen.smooth[:, i] - ratio * b * seen.smooth[:, j] for ratio in weights.AREA_RATIOS]
         )
         laws = force_laws(seen.motion, seen.y.x, f, smooth)
         at = int(np.argmax([law.share for law in laws]))
-        law, ratio = laws[at], AREA_RATIOS[at]
-        way = driving(turned(law), float(seen.v_share[i]), False) - 1.0
-        way += MIRRORED if _mirrored(seen.laws[i], seen.laws[j]) else 0.0
-        way += 0.5 * (said(signals[i], "p") + said(signals[j], "p"))
-        way += together(seen.y, signals[i]) + together(signals[i], signals[j])
+        law, ratio = laws[at], weights.AREA_RATIOS[at]
+        way = weights.driving(weights.turned(law), float(seen.v_share[i]), False) - 1.0
+        way += weights.MIRRORED if _mirrored(seen.laws[i], seen.laws[j]) else 0.0
+        way += 0.5 * (weights.said(signals[i], "p") + weights.said(signals[j], "p"))
+        way += weights.together(seen.y, signals[i]) + weights.together(signals[i], signals[j])
         pair = (signals[i], signals[j]) if law.way > 0 else (signals[j], signals[i])
         yield Way(
             seen, "electro-pneumatic", dict(zip(("p_p", "p_n"), pair, strict=True)), law,
@@ -173,7 +159,7 @@ def _mirrored(one: ForceLaw, other: ForceLaw) -> bool:
 
     Of two chambers the one is filled as the other is emptied; a force beside a pressure is no such.
     """
-    alike = min(one.share, other.share) > FORCE_LIKENESS
+    alike = min(one.share, other.share) > weights.FORCE_LIKENESS
     return alike and one.way * other.way < 0.0
 
 
@@ -188,7 +174,7 @@ def with_reference(way: Way) -> float:
 def moves_rather(way: Way, k: int) -> bool:
     """Whether what drives the body drives another column far more exactly: then that is the
     position, and the body here a copy of it, late or by a model."""
-    other = way.seen.pairs.bodies.get(k)
+    other = None if way.y.header.purpose == "measured" else way.seen.pairs.bodies.get(k)
     if other is None or len(way.columns) != 1 or not other.laws:
         return False
     (drive,) = way.columns.values()
@@ -201,9 +187,9 @@ def gain_of_reference(seen: Seen, k: int) -> float:
     if k not in seen.as_reference:
         one = seen.pairs.signals[k]
         asks = "command" in one.header.means and _is_set_point(seen, k)
-        head = max(0.0 if asks else -np.inf, said(one, "r"))
-        if together(seen.y, one) < 0.0 and one.header.purpose != "reference":
-            head = RULED_OUT  # another axis's position, which goes with this one
-        more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
+        head = max(0.0 if asks else -np.inf, weights.said(one, "r"))
+        if weights.together(seen.y, one) < 0.0 and one.header.purpose != "reference":
+            head = weights.RULED_OUT  # another axis's position, which goes with this one
+        more = weights.ahead_of(seen, k) + weights.together(seen.y, one) if head >= -3.0 else 0.0
         seen.as_reference[k] = head + more
     return seen.as_reference[k]

@@ -10,23 +10,16 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.signals.relations import ForceLaw
+from identification.thresholds import OF_ACCOUNT
 from workbench.cards.units import conversion
 from workbench.cards.written_units import Quantity
 from workbench.steps.first_card.column import Column, halved_counts
-from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.pairs import SURELY_TURNED, Pairs, Seen
 
-ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
-    "time": (),
-    "position": ("y", "r"),
-    "velocity": ("v",),
-    "acceleration": ("a",),
-    "force": ("F",),
-    "pressure": ("p",),
-    "command": ("u",),
-    "temperature": ("temperature",),
-    "count": (),
-    "other": (),
-}
+ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {"time": (), "position": ("y", "r"),
+    "velocity": ("v",), "acceleration": ("a",), "force": ("F",), "pressure": ("p",),
+    "command": ("u",), "temperature": ("temperature",), "count": (), "other": ()}  # fmt: skip
+EXPLAINED = 0.9  # share of a drive by its law along what no header calls a position
 SURE = 3.0  # log-odds from which a role is called sure
 BY_UNIT, AGAINST_UNIT = 4.0, -6.0
 LEAST_SCORE = 0.0  # of a role beside none at all
@@ -48,6 +41,7 @@ SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their hea
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
+ALL_FRICTION, NO_INERTIA, A_FRICTION = 0.99, 1e-3, 2.5  # shares, and for what a model says of it
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
 STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
@@ -59,6 +53,7 @@ OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (1.5, 4.5)  # a decade by which a reference is nearer to the position
 A_DECADE_LEFT, MOST_LEFT = 2.5, 5.0  # a decade by which less than a tenth of a force is unexplained
 TURNED_WITH_IT = ("work", "balance", "coulomb", "m", "inertia")  # by the sign of a force
+CALLED_ALIKE = 0.6  # likeness to the position, that its reference has at least
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -94,7 +89,8 @@ def _by_purpose(one: Column, role: str) -> float:
         own = {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0, "u": -1.0}
         return own.get(role, 0.0)
     if purpose == "measured":
-        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
+        commands = 0.5 if means else -1.0  # what is given to a motor is hardly measured
+        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": commands}.get(role, 0.0)
     if purpose == "demand":  # what is measured beside it acts
         return -2.0 if role == "u" else 0.0
     if purpose == "filtered":
@@ -188,10 +184,14 @@ def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
     """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
     x = pairs.signals[k].x
-    steady = abs(float(x.mean())) > STEADY * float(x.std())
     one_way = -3.0 if x.min() * x.max() > 0.0 else 0.0
     place = BEFORE_LIMIT if k in behind else ACTS if k in behind.values() else 0.0
-    return one_way + place - (3.0 if steady and one_way else 0.0)
+    return one_way + place - (3.0 if is_steady(pairs.signals[k]) else 0.0)
+
+
+def is_steady(one: Column) -> bool:
+    """Whether a column stays far from zero, as a supply does."""
+    return bool(one.x.min() * one.x.max() > 0.0 and abs(one.x.mean()) > STEADY * one.x.std())
 
 
 def turned(law: ForceLaw) -> ForceLaw:
@@ -210,7 +210,9 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     score += float(np.clip(-A_DECADE_LEFT * np.log10(max(1.0 - law.share, 1e-9)) - A_DECADE_LEFT,
                            0.0, MOST_LEFT))  # fmt: skip
     if law.friction is None:
-        return score - 2.0
+        return score - 2.0 + (A_VELOCITY if v_share > ALL_VELOCITY else 0.0)
+    if law.share > ALL_FRICTION and abs(law.inertia) < NO_INERTIA:
+        score -= A_FRICTION
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
     decades = float(np.log10(max(law.friction, 1e-9) / USUAL_FRICTION))
     score += float(np.clip(A_DECADE_OF_FRICTION * decades, LEAST_OF_FRICTION, A_DECADE_OF_FRICTION))
@@ -231,12 +233,13 @@ def ahead_of(seen: Seen, k: int) -> float:
     if abs(seen.pairs.alike[seen.at, k]) < LEAST_ALIKE:
         return -3.0
     found = seen.lead(k)
-    if found.likeness < 0.6:
-        return -3.0
+    called = one.header.purpose == "reference"
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
+    if found.likeness < CALLED_ALIKE or (like < SURELY_TURNED and not called):
+        return -3.0
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
-    if found.samples <= 0.3 and one.header.purpose != "reference":
-        return RULED_OUT  # another sensor of the position
+    if not called and (found.samples <= 0.3 or _of_place_alone(one.x, y.x)):
+        return RULED_OUT  # another sensor of the position, or a height of the arm
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
@@ -249,6 +252,14 @@ def ahead_of(seen: Seen, k: int) -> float:
     if any(pair in of for of in seen.pairs.errors.values()):
         score += MAKES_AN_ERROR
     return score + _named_for(seen, k)
+
+
+def _of_place_alone(x: Array, y: Array) -> bool:
+    """Whether what a line leaves of x (n,) along a position is a bent function of the position, as
+    a robot's hand is of a joint: what follows is late, each way at another place."""
+    z = (y - y.mean()) / np.std(y)
+    line, bent = (float(np.var(x - np.polyval(np.polyfit(z, x, n), z))) for n in (1, 5))
+    return bent < OF_ACCOUNT * line
 
 
 def _alike_then(y: Array, r: Array, ahead: int) -> float:

@@ -1,5 +1,4 @@
-"""A proposal as the text of a card, each line with what is sure of it and why; and what reading its
-log by it shows."""
+"""A proposal as the text of a card, each line with what is sure of it, and why."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
