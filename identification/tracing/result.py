@@ -129,7 +129,7 @@ class MissingForce:
 class FreeCurve:
     """An effect's part of an equation against a signal, free of its law and by its law.
 
-    at (k,): middles of the pieces in the signal's unit, within `period` of it where the law repeats;
+    at (k,): middles of the pieces in the signal's unit, within `period` of it where a law repeats;
     free, sd (k,): mean of what the model without the effect leaves there and the deviation of that
     mean; law (k,): mean of what the effect gives: friction against the motion, a driving force [N],
     or a rate of the force [N/s].

@@ -52,8 +52,8 @@ def written_unit(text: str) -> WrittenUnit | None:
         return _NANOMETRE if found == "nm" else _NEWTON_METRE
     if found in ("mpa", "MPa", "MPA"):  # no log is in millipascal
         return _UNITS["mpa"]
-    if found == "mN":
-        return _UNITS["mn"]
+    if found in ("mN", "MN"):
+        return replace(_UNITS["mn"], card=found)
     if found.startswith("% "):  # of what: "% of rated torque"
         return _UNITS["%"]
     if scaled := _SCALED.fullmatch(found):  # "0.1 rpm"

@@ -105,6 +105,14 @@ def test_every_spelling_gives_a_unit_that_cards_know(text: str) -> None:
     assert conversion(found.card, None) is not None
 
 
+def test_case_tells_meganewtons_from_millinewtons() -> None:
+    found = {text: written_unit(text) for text in ("MN", "mN", "mn")}
+    assert {text: unit and unit.card for text, unit in found.items()} == {
+        "MN": "MN", "mN": "mN", "mn": "mN",
+    }  # fmt: skip
+    assert conversion("MN", "N").factor == pytest.approx(1e6)
+
+
 def test_what_is_no_unit_is_none() -> None:
     assert written_unit("valve") is None
     assert written_unit("") is None
