@@ -110,7 +110,8 @@ def test_case_tells_meganewtons_from_millinewtons() -> None:
     assert {text: unit and unit.card for text, unit in found.items()} == {
         "MN": "MN", "mN": "mN", "mn": "mN",
     }  # fmt: skip
-    assert conversion("MN", "N").factor == pytest.approx(1e6)
+    scale = conversion("MN", "N")
+    assert scale is not None and scale.factor == pytest.approx(1e6)
 
 
 def test_what_is_no_unit_is_none() -> None:
