@@ -20,6 +20,10 @@ SHARES_OF_DURATION = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
 RESTS = (0.1, 0.2, 0.4, 0.8, 1.5, 3.0, 8.0)  # of the median rest
 TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
+# Of a position at the end of the travel, by which a bent scale is off; powers of the position to
+# which a coefficient belongs, by its unit
+BENDS = (-0.03, -0.01, -0.003, 0.0, 0.003, 0.01, 0.03)
+PER_POSITION = {"1/m": 1, "1/rad": 1, "1/m**2": 2, "1/rad**2": 2}
 REPEATS, PENDULUM = 1.5, 0.4  # periods on the travel at least, and of gravity where it turns
 ALONG = 0.5  # the same, of friction along the stroke
 SHARPEST = 0.02  # s, shortest passage of one period that the windows still show
@@ -58,6 +62,8 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[MotionLog]) -> Array:
         found = float(np.quantile(np.abs(one.signals["u"]), 0.7)) * np.array(SPEEDS)
     elif p.name == "n":
         found = np.array(POWERS)
+    elif p.unit in PER_POSITION:
+        found = np.array(BENDS) / max(float(np.max(np.abs(y))), 1e-12) ** PER_POSITION[p.unit]
     elif p.low < 0 < p.high:
         found = p.typical * np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])
     else:
