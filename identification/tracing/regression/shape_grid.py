@@ -22,7 +22,7 @@ TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
 # Of a position at the end of the travel, by which a bent scale is off; powers of the position to
 # which a coefficient belongs, by its unit
-BENDS = (-0.03, -0.01, -0.003, 0.0, 0.003, 0.01, 0.03)
+BENDS = (-0.1, -0.03, -0.01, -0.003, 0.0, 0.003, 0.01, 0.03, 0.1)
 PER_POSITION = {"1/m": 1, "1/rad": 1, "1/m**2": 2, "1/rad**2": 2}
 REPEATS, PENDULUM = 1.5, 0.4  # periods on the travel at least, and of gravity where it turns
 ALONG = 0.5  # the same, of friction along the stroke
