@@ -27,7 +27,7 @@ Kernel = Callable[..., float]
 # A number and numbers, as the kernels' eleven arguments are annotated.
 R = float
 Rs = Sequence[float]
-Role = Literal["period", "place", "width", "known"]
+Role = Literal["period", "place", "width", "known", "bend"]
 MAX_PARAMS = 8
 MAX_SIGNALS = 4
 AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not identify
@@ -38,8 +38,8 @@ class Param:
     """One parameter: unit, bounds, a typical value, and whether the effect is linear in it.
 
     `default` is what a recipe may leave out. Bounds in SI. role: what it is along the stroke, where
-    a search has to know: a length over which it repeats, a place, the width of a place, or known
-    from the machine's geometry and not sought.
+    a search has to know: a length over which it repeats, a place, the width of a place, known from
+    the machine's geometry and not sought, or how a scale of the position bends.
     """
 
     name: str

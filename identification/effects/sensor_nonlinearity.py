@@ -15,8 +15,8 @@ EFFECT = Effect(
     source="Fraden, Handbook of Modern Sensors, Springer 2016, nonlinearity error",
     acts="sensor",
     params=(
-        Param("a", "1/m", -1e2, 1e2, 0.1, "bend of the scale", True, 0.0),
-        Param("b", "1/m**2", -1e4, 1e4, 1.0, "s-shape of the scale", True, 0.0),
+        Param("a", "1/m", -1e2, 1e2, 0.1, "bend of the scale", True, 0.0, "bend"),
+        Param("b", "1/m**2", -1e4, 1e4, 1.0, "s-shape of the scale", True, 0.0, "bend"),
     ),
     value=value,
     depends_on=("y",),

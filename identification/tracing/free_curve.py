@@ -24,7 +24,7 @@ def free_curves(choice: Choice) -> tuple[FreeCurve, ...]:
 
 
 def _curve_of(candidate: EffectCandidate, choice: Choice) -> FreeCurve | None:
-    effect, period = candidate.effect, candidate.values.get("period")
+    effect, period = candidate.effect, candidate.values.get(candidate.effect.named("period") or "")
     for equation in (MECHANICAL, ACTUATOR):
         if equation not in choice.base:
             continue

@@ -27,7 +27,7 @@ from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, row_fit, with_sizes
 from identification.estimation.regression.weighted_rows import stacked
 from identification.thresholds import PENALTY
-from identification.tracing.regression.shape_grid import PER_POSITION, shape_grid
+from identification.tracing.regression.shape_grid import shape_grid
 
 REFINED = 30  # evaluations of the refinement for each parameter
 SUBSTITUTIONS = 4  # of substitution where a contribution depends on the friction itself
@@ -165,7 +165,7 @@ def shaped(
 def bounds_of(p: Param, tried: Array) -> tuple[float, float]:
     """Where a parameter is refined: between the first values tried, one with a default anywhere,
     unless it is known or bends a scale."""
-    if p.default is not None and p.role != "known" and p.unit not in PER_POSITION:
+    if p.default is not None and p.role not in ("known", "bend"):
         return p.low, p.high
     return float(np.min(tried)), float(np.max(tried))
 

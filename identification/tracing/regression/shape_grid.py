@@ -62,8 +62,10 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[MotionLog]) -> Array:
         found = float(np.quantile(np.abs(one.signals["u"]), 0.7)) * np.array(SPEEDS)
     elif p.name == "n":
         found = np.array(POWERS)
-    elif p.unit in PER_POSITION:
-        found = np.array(BENDS) / max(float(np.max(np.abs(y))), 1e-12) ** PER_POSITION[p.unit]
+    elif p.role == "bend":
+        found = np.array(BENDS) / max(float(np.max(np.abs(y))), 1e-12) ** PER_POSITION.get(
+            p.unit, 1
+        )
     elif p.low < 0 < p.high:
         found = p.typical * np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])
     else:
