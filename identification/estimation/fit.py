@@ -124,9 +124,10 @@ def fit_beside(
             fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
         except UserError:
             raise refused from None
-    if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
-        with suppress(NotIdentifiable):
-            fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
+    else:
+        if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
+            with suppress(NotIdentifiable):
+                fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
     if shows and not (fit.adequate or beside.orders or halt.reached()):

@@ -60,9 +60,12 @@ def channel_table(path: Path, channels: Sequence[Channel], spec: FileSpec) -> Ta
             raise BadLog(f"{path}: no group {spec.rows!r}{nearest(spec.rows, groups)}")
     if not channels:
         raise BadLog(f"{path}: holds no channel of numbers; give another file")
-    return Table(tuple(channel.name for channel in channels),
-        lambda number: channels[number].fetch()[spec.skip_rows :], 1 + spec.skip_rows,
-        groups=tuple(channel.group for channel in channels))  # fmt: skip
+    return Table(
+        tuple(channel.name for channel in channels),
+        lambda number: channels[number].fetch()[spec.skip_rows :],
+        1 + spec.skip_rows,
+        groups=tuple(channel.group for channel in channels),
+    )
 
 
 _WAVEFORM_CLOCK = "time"

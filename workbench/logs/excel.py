@@ -22,7 +22,8 @@ _ROWS_READ = 200  # rows in which the header is looked for
 
 
 def read_excel(path: Path, spec: FileSpec) -> Table:
-    """The sheet `spec.rows`, by default the first with a table, below whatever stands above it."""
+    """The sheet `spec.rows`, by default the first with a table; its header below whatever stands
+    above it."""
     refuse_larger(path, _BOOK_BYTES, "a workbook", BadLog)
     library = optional("python_calamine", "excel", path)
     _refuse_unpacked(path)
@@ -37,8 +38,15 @@ def read_excel(path: Path, spec: FileSpec) -> Table:
     if first >= len(rows):
         raise BadLog(f"{path}: sheet {wanted!r} has no rows of data; name the right one in [file]")
     names = list(found.names or map(str, range(len(rows[first]))))
-    return Table(tuple(names), lambda number: _column(rows[first:], number), first + 1,
-        bool(found.names), found.groups, units=found.units, remarks=remarks)  # fmt: skip
+    return Table(
+        tuple(names),
+        lambda number: _column(rows[first:], number),
+        first + 1,
+        bool(found.names),
+        found.groups,
+        units=found.units,
+        remarks=remarks,
+    )
 
 
 def _sheet(

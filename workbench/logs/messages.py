@@ -292,9 +292,11 @@ def read_bag(path: Path, spec: FileSpec) -> Table:
     return found
 
 
-_FORMATS = {**{"bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i"},
+_FORMATS = {
+    **{"bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i"},
     **{"uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d"},
-    **{"byte": "b", "char": "B"}}  # fmt: skip
+    **{"byte": "b", "char": "B"},
+}
 _MOMENTS = {"time": "II", "duration": "ii"}
 _FIELD = re.compile(r"([\w/]+)(?:\[(\d*)\])?\s+(\w+)\s*")
 _DEFINITION = re.compile(r"^=+\s*\nMSG:\s*([\w/]+)\s*$", re.MULTILINE)

@@ -63,7 +63,8 @@ def _seen(text: str) -> list[str]:
 
 
 def _in_columns(text: str) -> str:
-    """The text with a column for each signal where a few long lines have one each."""
+    """The text with a column for each signal where a few long lines have one each, its name first
+    or none."""
     lines = [line for line in text.splitlines() if line.strip()] if len(text) < _MOST_TURNED else []
     if not 1 < len(lines) < SHORTEST_LOG or len(lines[0]) < 2 * SHORTEST_LOG:
         return text
@@ -104,7 +105,8 @@ def _without_thousands(text: str) -> str:
 
 
 def _without_monitor(text: str) -> str:
-    """The text without a serial monitor's times, a column where the machine has no clock."""
+    """The text without the time at which a serial monitor got each line; with it as a column where
+    the machine has no clock."""
     lines = _seen(text)
     if sum(bool(_GOT_AT.match(line)) for line in lines) <= len(lines) / 2:
         return text
@@ -115,7 +117,8 @@ def _without_monitor(text: str) -> str:
 
 
 def _has_clock(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether a column goes up from line to line: the machine's own time."""
+    """Whether a column goes up from each line to the next: the machine's own time, beside which
+    that of the monitor is late."""
     for cells in zip(*rows, strict=False):
         numbers = [found["number"] for one in cells if (found := _CELL.fullmatch(one))]
         x = [float(one) for one in numbers]

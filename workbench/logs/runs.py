@@ -244,7 +244,8 @@ def _refuse_absurd(values: Array, name: str, path: Path, first_row: int) -> None
 
 
 def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
-    """The signals at the length of `t`: single values spread, a row more or less cut off."""
+    """The signals at the length of `t`, single values spread, a row more or less of one cut off;
+    others raise BadLog."""
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if lengths and max(lengths) - min(lengths) == 1:  # vectors of a file, not rows
         signals = {k: v[: min(lengths)] if len(v) > 1 else v for k, v in signals.items()}

@@ -207,9 +207,12 @@ def _download(entry: FileEntry, card: Card) -> Path:
 
     pooch.get_logger().setLevel("WARNING")
     try:
-        found = pooch.retrieve(url=entry.url,
-            known_hash=f"sha256:{entry.sha256}" if entry.sha256 else None, fname=entry.name,
-            path=pooch.os_cache("servo-workbench") / card.name)  # fmt: skip
+        found = pooch.retrieve(
+            url=entry.url,
+            known_hash=f"sha256:{entry.sha256}" if entry.sha256 else None,
+            fname=entry.name,
+            path=pooch.os_cache("servo-workbench") / card.name,
+        )
     except ValueError as error:
         text = " ".join(str(error).split())[:120]
         raise BadLog(f"{entry.name}: what {entry.url} sends is not the card's ({text})") from error

@@ -79,10 +79,13 @@ class Table:
     def beside(self, name: str, value: float, unit: str) -> "Table":
         """The table with a single value as one more column."""
         count, fetch = len(self.names), self.fetch
-        return replace(self, names=(*self.names, name),
+        return replace(
+            self,
+            names=(*self.names, name),
             fetch=lambda k: np.array([value]) if k == count else fetch(k),
             groups=(*self.groups, "") if self.groups else (),
-            units=(*(self.units or ("",) * count), unit))  # fmt: skip
+            units=(*(self.units or ("",) * count), unit),
+        )
 
     def full_names(self) -> tuple[str, ...]:
         """The names with their groups, where there are groups."""
@@ -106,7 +109,8 @@ class Table:
 
 
 def of_vectors(names: Sequence[str], read: Callable[[str], RawColumn], spec: FileSpec) -> Table:
-    """A table of vectors that are read by name; a scalar stays one value."""
+    """A table of vectors that are read by name; a scalar stays one value, which the caller may
+    spread."""
 
     def fetch(number: int) -> RawColumn:
         values = np.ravel(read(names[number]))
@@ -116,7 +120,8 @@ def of_vectors(names: Sequence[str], read: Callable[[str], RawColumn], spec: Fil
 
 
 def of_array(path: Path, values: RawColumn, spec: FileSpec) -> Table:
-    """A table of an array's named fields, or of a matrix: a column, or long row, a signal."""
+    """A table of an array's named fields, or of a matrix: a column a signal; one of a few long rows
+    has a row a signal."""
     refuse_long(path, max(values.shape, default=0))
     if values.dtype.names:
         return of_vectors(values.dtype.names, values.__getitem__, spec)

@@ -46,9 +46,11 @@ HDF5_MAGIC = b"\x89HDF"
 """How HDF5 begins, from byte 512 on where MATLAB wrote it."""
 
 _OLE = b"\xd0\xcf\x11\xe0"
-_PACKED = {b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
+_PACKED = {
+    b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
     b"\xfd7zXZ": "compressed by xz; unpack it (unxz) and give the file in it",
-    _OLE: "an old Excel workbook; save its sheet as CSV"}  # fmt: skip
+    _OLE: "an old Excel workbook; save its sheet as CSV",
+}
 _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
     "parquet": (b"PAR1",),
     "mat": (b"MATLAB",),
@@ -149,10 +151,20 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
 def read_table(path: Path, spec: FileSpec) -> Table:
     """The table in the file; raises BadLog where it is missing, empty, damaged or of no format."""
     form = checked_format(path, spec)
-    readers: Mapping[str, Callable[[Path, FileSpec], Table]] = {"csv": read_text_table,
-        "parquet": _read_parquet, "mat": _read_mat, "hdf5": _read_hdf5, "json": _read_json,
-        "tdms": read_tdms, "mdf": read_mdf, "mcap": read_mcap, "ulog": read_ulog,
-        "excel": read_excel, "npy": read_numpy, "rosbag": read_bag}  # fmt: skip
+    readers: Mapping[str, Callable[[Path, FileSpec], Table]] = {
+        "csv": read_text_table,
+        "parquet": _read_parquet,
+        "mat": _read_mat,
+        "hdf5": _read_hdf5,
+        "json": _read_json,
+        "tdms": read_tdms,
+        "mdf": read_mdf,
+        "mcap": read_mcap,
+        "ulog": read_ulog,
+        "excel": read_excel,
+        "npy": read_numpy,
+        "rosbag": read_bag,
+    }
 
     def guarded(read: Callable[[], Value]) -> Value:
         try:

@@ -267,12 +267,16 @@ class _Parsed:
         names = [str(k) for k in range(self.width)]
         parse = arrow.ParseOptions(delimiter=self.marks.delimiter, invalid_row_handler=note)
         read = arrow.ReadOptions(column_names=names, use_threads=False)
-        convert = arrow.ConvertOptions(column_types=dict.fromkeys(wanted, kind),
-            decimal_point=self.marks.decimal, include_columns=wanted)  # fmt: skip
+        convert = arrow.ConvertOptions(
+            column_types=dict.fromkeys(wanted, kind),
+            decimal_point=self.marks.decimal,
+            include_columns=wanted,
+        )
         return arrow.read_csv(pa.BufferReader(self.content), read, parse, convert)
 
     def refused(self, path: Path, first_row: int, rows: int) -> str:
-        """What is said of rows left out; raises BadLog where they are too many."""
+        """What is said of rows left out; raises BadLog where they are too many for a message of the
+        logger or a row cut off."""
         if not self.wrong:
             return ""
         (row, fields, text), count = self.wrong[0], len(self.wrong)

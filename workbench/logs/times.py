@@ -138,8 +138,12 @@ def _joined(table: Table, at: int, count: int, seconds: Array, of: str) -> Table
     units = [*(table.units or ("",) * len(table.names))]
     units[at : at + count] = ["s", *[""] * (count - 1)]
     fetch = table.fetch
-    return replace(table, fetch=lambda k: own[k] if k in own else fetch(k), units=tuple(units),
-        remarks=(*table.remarks, said))  # fmt: skip
+    return replace(
+        table,
+        fetch=lambda k: own[k] if k in own else fetch(k),
+        units=tuple(units),
+        remarks=(*table.remarks, said),
+    )
 
 
 def _is_empty(value: object) -> bool:
@@ -152,7 +156,8 @@ def _spans(raw: RawColumn) -> Array:
 
 
 def _moment(value: Any) -> tuple[date | None, float, float] | None:
-    """Day, if any, its seconds, and those that the zone is ahead of UTC; None of no time."""
+    """Day, if any, seconds of it, and by how many the time zone is ahead of UTC; None where the
+    cell is no time."""
     match value:
         case datetime():
             east = value.utcoffset() or timedelta()

@@ -217,7 +217,8 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
 
 
 def _encoding(path: Path) -> str:
-    """The first encoding in which the file is text; Chinese by words, Japanese by letters."""
+    """The first encoding in which the file is text; Chinese by its headers' words, Japanese by its
+    letters."""
     content = text_bytes(path)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-8"  # the reader sees the mark itself

@@ -54,7 +54,8 @@ def ticks(one: Column) -> bool:
 
 
 def is_second(one: Column, clock: Column) -> bool:
-    """Whether a column is one more clock, or counts rows or ticks, be it unevenly."""
+    """Whether a column is one more clock, or counts rows or ticks, be it as unevenly as the rows
+    come."""
     means = one.header.means
     going = ticks(one)
     if np.array_equal(one.values, clock.values) or (going and {"time", "count"} & set(means)):
@@ -133,7 +134,8 @@ def _of_steps(columns: Sequence[Column], steady: Sequence[Column]) -> Column | N
 
 
 def _are_steps(x: Array) -> bool:
-    """Whether values (n,) may be times from row to row: above 0, about their middle."""
+    """Whether values (n,) may be times from row to row: above 0, few far from their middle, about
+    which they go up and down."""
     if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
         return False
     up, down = (np.sum(sign * np.diff(x) > 0.0) for sign in (1.0, -1.0))

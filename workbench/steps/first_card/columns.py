@@ -108,7 +108,8 @@ def _with_sign(one: Column) -> Column:
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
-    """The columns; where all are in volts, neither unit nor an input's number tells anything."""
+    """The columns; where all are in volts, as those of a scope, the unit tells nothing of one, nor
+    does an input's number."""
     units = [one.header.unit for one in columns]
     if not all(unit is not None and unit.card in VOLTS for unit in units):
         return columns
@@ -287,7 +288,8 @@ def _coarseness(one: Column) -> int:
 
 
 def _said(one: Column) -> float:
-    """How much a header says: a sensor's volts and counts less than the signal's own unit."""
+    """How much a header says: a sensor's own volts and counts less than the signal's unit, a
+    command's own unit as much."""
     unit = one.header.unit
     raw = unit is not None and unit.quantity in ("command", "count")
     raw = raw and not one.header.means.get("command")

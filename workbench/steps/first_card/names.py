@@ -25,14 +25,18 @@ def read_together(named: Sequence[tuple[str, str]]) -> list[Header]:
     texts = [one for one, _ in named]
     names = [_PER.sub("_", _ARGUMENT.sub("()", one)) for one in _without_blocks(texts)]
     left = {one.casefold() for one in names if one}
-    names = [RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
-             for x in names]  # fmt: skip
+    names = [
+        RIGHT.sub("right", x) if RIGHT.sub("l", x).casefold() in left - {x.casefold()} else x
+        for x in names
+    ]
     heads = [
         _of_one_drive(read_header(one, own)) for one, (_, own) in zip(names, named, strict=True)
     ]
     whole = map(read_header, texts)  # what all share tells of the machine
-    heads = [replace(own, turning=max(own.turning, one.turning), angle=own.angle or one.angle)
-             for own, one in zip(heads, whole, strict=True)]  # fmt: skip
+    heads = [
+        replace(own, turning=max(own.turning, one.turning), angle=own.angle or one.angle)
+        for own, one in zip(heads, whole, strict=True)
+    ]
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
     return _with_present(_without_letters(_without_machine(heads)))
@@ -76,8 +80,10 @@ def _without_machine(heads: Sequence[Header]) -> list[Header]:
     if len(others) < FEWEST_ALIKE or not all(map(_LETTER.match, filter(None, rest))) or not rest:
         return list(heads)
     own = map(read_header, rest)
-    return [replace(one, means=part.means, purpose=part.purpose)
-            for one, part in zip(heads, own, strict=True)]  # fmt: skip
+    return [
+        replace(one, means=part.means, purpose=part.purpose)
+        for one, part in zip(heads, own, strict=True)
+    ]
 
 
 def _without_letters(heads: Sequence[Header]) -> list[Header]:
@@ -95,5 +101,7 @@ def _with_present(heads: Sequence[Header]) -> list[Header]:
     asked = any(one.purpose == "reference" for one in others)
     if not asked or "command" not in of or {"position", "velocity", "pressure"} & of:
         return list(heads)
-    return [one if one in others or one.unit else replace(one, means={}, purpose="measured")
-            for one in heads]  # fmt: skip
+    return [
+        one if one in others or one.unit else replace(one, means={}, purpose="measured")
+        for one in heads
+    ]

@@ -162,16 +162,28 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     motion = known_motion(roles, columns.read)
     units = guessed_units(columns, roles, motion)
     turns = "" if motion.sure else "linear" if motion.motion == "rotary" else "rotary"
-    rig = [kind_guess(roles, other),
+    rig = [
+        kind_guess(roles, other),
         RigGuess("motion", motion.motion, "", motion.sure, motion.why, turns),
-        *rig_of(columns, roles, motion.motion, units)]  # fmt: skip
+        *rig_of(columns, roles, motion.motion, units),
+    ]
     if area is not None:
         rig.append(area_of(area, roles, units))
-    return Proposal(path=columns.log.path, name=name, kind=roles.kind, motion=motion.motion,
-        spec=columns.log.spec, signals=tuple(_signals(columns, roles, units)), rig=tuple(rig),
-        unused=_unused(columns, roles), columns=columns.read,
-        remarks=(*columns.log.notes, *remarks.remarks_on(columns, roles, units)), axes=columns.axes,
-        axis=roles.columns["y"].axis, extra=_extra(columns, roles))  # fmt: skip
+    return Proposal(
+        path=columns.log.path,
+        name=name,
+        kind=roles.kind,
+        motion=motion.motion,
+        spec=columns.log.spec,
+        signals=tuple(_signals(columns, roles, units)),
+        rig=tuple(rig),
+        unused=_unused(columns, roles),
+        columns=columns.read,
+        remarks=(*columns.log.notes, *remarks.remarks_on(columns, roles, units)),
+        axes=columns.axes,
+        axis=roles.columns["y"].axis,
+        extra=_extra(columns, roles),
+    )
 
 
 def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str | None]:
@@ -193,9 +205,13 @@ def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str |
     else:
         return roles, None
     why = dict.fromkeys(pair, "the header says pressure; the chamber by the force's sign")
-    added = replace(roles, columns={**roles.columns, **pair},
+    added = replace(
+        roles,
+        columns={**roles.columns, **pair},
         signs={**roles.signs, **dict.fromkeys(pair, 1.0)},
-        odds={**roles.odds, **dict.fromkeys(pair, SURE)}, why={**roles.why, **why})  # fmt: skip
+        odds={**roles.odds, **dict.fromkeys(pair, SURE)},
+        why={**roles.why, **why},
+    )
     bears = abs(roles.law.balance) > remarks.BALANCED * abs(roles.law.coulomb)
     return added, next(iter(pair)) if len(pair) == 1 and bears else None
 

@@ -21,8 +21,12 @@ MOST_OF_AIR = 1.5e6  # Pa, of compressed air; above, pressures are those of oil
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 DRIVEN_THROUGH = {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",), "motor": ("u",)}
-DRIVEN_BY = {"electro-pneumatic": "F_e from two pressures", "force": "F_e is logged",
-    "motor": "F_e = force_per_command * u", "velocity": "the velocity follows u"}  # fmt: skip
+DRIVEN_BY = {
+    "electro-pneumatic": "F_e from two pressures",
+    "force": "F_e is logged",
+    "motor": "F_e = force_per_command * u",
+    "velocity": "the velocity follows u",
+}
 
 
 @dataclass(frozen=True)

@@ -148,9 +148,16 @@ def _seen_smoother(way: Way) -> Way:
 
 def _roles_of(best: _Choice, choices: Sequence[_Choice]) -> Roles:
     """The roles by one choice beside the others."""
-    return Roles(kind=best.way.kind, columns=best.columns, signs=_signs(best),
-        odds=_odds(best, choices), why=_reasons(best), law=best.way.law,
-        area_ratio=best.way.area_ratio, rivals=_rivals(best, choices))  # fmt: skip
+    return Roles(
+        kind=best.way.kind,
+        columns=best.columns,
+        signs=_signs(best),
+        odds=_odds(best, choices),
+        why=_reasons(best),
+        law=best.way.law,
+        area_ratio=best.way.area_ratio,
+        rivals=_rivals(best, choices),
+    )
 
 
 def _filled(way: Way) -> _Choice:

@@ -1,4 +1,5 @@
-"""Gains of positions in counts or volts, and rates of clocks that count samples."""
+"""Gains of positions in counts or volts, and the rate of a clock that counts samples, by one signal
+beside another."""
 
 from collections.abc import Mapping
 

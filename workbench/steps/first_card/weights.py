@@ -16,9 +16,18 @@ from workbench.cards.written_units import Quantity
 from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.pairs import SURELY_TURNED, Pairs, Seen
 
-ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {"time": (), "position": ("y", "r"),
-    "velocity": ("v",), "acceleration": ("a",), "force": ("F",), "pressure": ("p",),
-    "command": ("u",), "temperature": ("temperature",), "count": (), "other": ()}  # fmt: skip
+ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
+    "time": (),
+    "position": ("y", "r"),
+    "velocity": ("v",),
+    "acceleration": ("a",),
+    "force": ("F",),
+    "pressure": ("p",),
+    "command": ("u",),
+    "temperature": ("temperature",),
+    "count": (),
+    "other": (),
+}
 EXPLAINED = 0.9  # share of a drive by its law along what no header calls a position
 SURE = 3.0  # log-odds from which a role is called sure
 BY_UNIT, AGAINST_UNIT = 4.0, -6.0

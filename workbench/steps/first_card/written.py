@@ -1,4 +1,5 @@
-"""A proposal as the text of a card, each line with what is sure of it, and why."""
+"""A proposal as the text of a card, each line with what is sure of it and why; and what reading its
+log by it shows."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
