@@ -24,7 +24,6 @@ from identification.simulation.inverse_dynamics import of_body
 from workbench.documents.model import Model, used
 from workbench.steps.predict import force_by_model, predict, refuse_missing
 
-ROUNDS = 8  # of friction by load, each with the force of the last
 MOST = 1e6  # times the signal, beyond which a prediction runs away
 STEEPEST = 20.0  # command per command that a dead zone asks for
 REACH, POINTS = 3.0, 4001  # of the grid of commands, in largest commands
@@ -81,11 +80,8 @@ def _needs(model: Model, record: Record, read: Log | None) -> Array:
     body = of_body(log, plant)
     how, most = Smoothing(), MOST * float(np.max(np.abs(log["F"])))
     a = differentiate(body["y"], body.h).a
-    by_load = any("F" in one.effect.depends_on for one in plant.effects)
-    force = np.zeros(len(log))
-    for _ in range(ROUNDS if by_load else 1):
-        force = force_by_model(model, body.with_signals(F=force), how)
-        force = np.clip(np.nan_to_num(force, nan=most), -most, most)
+    force = force_by_model(model, body.with_signals(F=np.zeros(len(log))), how)
+    force = np.clip(np.nan_to_num(force, nan=most), -most, most)
     t = record.t if read is None else record.t - record.t[0] + log["t"][0]
     return np.interp(t, log["t"], force - plant.friction.m * a)
 

@@ -68,8 +68,8 @@ WHY_NOT = {
     " log the body driven by a force, from rest",
 }
 FALLS_WHY = (
-    "found {:.3g} {}: friction falls with speed, which viscous friction does not; 'workbench trace'"
-    " searches for the cause"
+    "found {:.3g} {}: friction falls with speed, which viscous friction does not, so the Coulomb"
+    " level is that at the speeds logged; 'workbench trace' searches for the cause"
 )
 
 
@@ -90,18 +90,18 @@ def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str)
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
     squares = [(left / part.sd) ** 2 for left, part in zip(fit.residuals, rows, strict=True)]
-    center = np.zeros(5)
-    center[list(fit.used)] = fit.theta
+    center, logged = np.zeros(5), fit.at_logged_speeds(stacked(rows))
+    center[list(fit.used)] = logged.theta
     nine = _assumed(center, recorded, stacked(rows))
     friction = Karnopp.from_array(nine)
-    found = _estimates(fit, nine, rows, recorded)
+    found = _estimates(logged, nine, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
     made = KarnoppFit(
         friction=friction,
         actuator=motor_of(recorded.rig),
         estimates=found,
         free=names,
-        covariance=fit.covariance,
+        covariance=logged.covariance,
         drive="command" if recorded.by_motor else "force",
         noise_y=noise_y,
         noise_F=noise_F,
@@ -277,15 +277,11 @@ def _sliding(fastest: float, recorded: RecordedLogs) -> Events:
 
 
 def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
-    """Slopes below 0 with which friction falls with speed: they predict a motion, but would drive a
-    body that is simulated."""
-    units = units_of(recorded.rig.motion)
-    found = zip((FIVE[i] for i in fit.used), fit.theta.tolist(), strict=True)
-    return {
-        name: reported_estimate(slope, units[name], fit.sd[name])
-        for name, slope in found
-        if name in VISCOUS_NAMES and slope < 0.0
-    }
+    """Slopes below 0 with which friction falls with speed, and its levels at rest beside them: they
+    predict a motion, but would drive a body that is simulated."""
+    units, sizes = units_of(recorded.rig.motion), dict(zip(fit.used, fit.theta, strict=True))
+    names = [(FIVE[i], float(sizes[i])) for both in fit.falling for i in both]
+    return {name: reported_estimate(x, units[name], fit.sd[name]) for name, x in names}
 
 
 def _reasoned(

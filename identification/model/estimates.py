@@ -78,7 +78,8 @@ class KarnoppFit:
     was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
     left: share and root mean square [N] of the force that the equation of motion leaves, where it
     was fitted alone; falling: slopes below 0 [N s/m] with which friction falls with speed there, as
-    F_vp and F_vn, which predict a motion and are not simulated.
+    F_vp and F_vn, and its levels at rest beside them [N], as F_cp and F_cn, which predict a motion
+    and are not simulated.
     """
 
     friction: Karnopp

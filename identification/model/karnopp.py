@@ -8,7 +8,7 @@ from identification.arrays import Array
 from identification.errors import BadModel
 
 NAMES = ("m", "F_cp", "F_cn", "F_vp", "F_vn", "dv_p", "dv_n", "F_sp", "F_sn")
-VISCOUS_NAMES = ("F_vp", "F_vn")
+COULOMB_NAMES, VISCOUS_NAMES = ("F_cp", "F_cn"), ("F_vp", "F_vn")
 NEGATIVE = frozenset({"dv_n", "F_sn"})
 UNITS = {
     "m": "kg",

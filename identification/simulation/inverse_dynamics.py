@@ -16,6 +16,8 @@ from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
 
 REVERSALS = 2  # substitutions by which a transducer's reading is inverted
+# Of a force on which its own friction depends: at most, and of the largest what is near enough
+MOST_SUBSTITUTIONS, CONVERGED = 20, 1e-9
 
 
 def force_needed(
@@ -24,17 +26,38 @@ def force_needed(
     """Force that the motion needs [N], (n,): as `inverse_model.force_predicted`, with effects.
 
     Friction of the effects is signed by the direction and their forces are taken off; inside the
-    stick band it is the applied force within the limits, which is no prediction. falling: slopes
-    [N s/m] with which friction falls with speed, down to 0.
+    stick band it is the applied force within the limits, which is no prediction. Friction that
+    depends on the applied force is that of the force needed: the measured one would predict itself.
+    falling: slopes [N s/m] with which friction falls with speed, down to 0. Source: of the
+    substitutions, Aitken, Proc. R. Soc. Edinburgh 46 (1926) 289.
     """
     if not (plant.effects or any(falling)):
         return force_predicted(log, plant.friction, how)
+    force = np.asarray(log["F"])
+    by_load = any(one.effect.place.rubs and "F" in one.effect.depends_on for one in plant.effects)
+    if not by_load:
+        return _opposed(log, force, plant, how, falling)
+    for _ in range(MOST_SUBSTITUTIONS):
+        once = _opposed(log, force, plant, how, falling)
+        first = once - force
+        second = _opposed(log, once, plant, how, falling) - once
+        bend = second - first  # from each to the next it is nearer by the same share
+        force = once + np.where(bend != 0.0, -first * second / np.where(bend, bend, 1.0), second)
+        if float(np.max(np.abs(second))) <= CONVERGED * float(np.max(np.abs(force))):
+            break
+    return force
+
+
+def _opposed(
+    log: Log, force: Array, plant: Plant, how: Smoothing, falling: tuple[float, float]
+) -> Array:
+    """As `force_needed`, of friction as this applied force makes it [N], (n,)."""
     p = plant.friction
     motion = differentiate(log["y"], log.h, how.cutoff, how.method)
     v = motion.v
     d = np.where(v >= p.dv_p, 1.0, np.where(v <= p.dv_n, -1.0, 0.0))
     blank = np.zeros(len(log))
-    signals = {"F": log["F"], "u": blank, **log.signals, "y": motion.y, "v": v, "d": d}
+    signals = {"u": blank, **log.signals, "F": force, "y": motion.y, "v": v, "d": d}
     pushed = _sum(plant, lambda place: place.drives, signals, log.h)
     slip = _sum(plant, lambda place: place.rubs, signals, log.h)
     stick = _sum(plant, lambda place: place.holds, signals, log.h)

@@ -83,13 +83,14 @@ def test_a_rig_that_leads_the_body_is_fitted_on_its_force(data: Path, tmp_path: 
     model = read(out / "model.json")
     friction = model["friction"]
     assert isinstance(friction, dict)
-    # One way friction falls with speed, the other way it is the mean over the strokes.
-    assert 11.0 < friction["F_cp"]["value"] < 15.0
+    # One way friction falls with speed; either way it is the mean over the strokes.
+    assert 6.0 < friction["F_cp"]["value"] < 9.0
     assert 4.0 < friction["F_cn"]["value"] < 6.0
     assert friction["F_vp"]["value"] is None
     assert friction["F_vp"]["assumed"] == 0.0
     falling = model["falling"]
     assert isinstance(falling, dict) and falling["F_vp"]["value"] < -300.0
+    assert 11.0 < falling["F_cp"]["value"] < 15.0  # at rest
     assert "falls with speed" in friction["F_vp"]["reason"]
     assert "constant friction predicts as much" in friction["F_vn"]["reason"]
 

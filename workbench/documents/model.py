@@ -12,7 +12,7 @@ from identification.effects._library import Library, built_in
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
-from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
+from identification.model.karnopp import COULOMB_NAMES, NAMES, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, MATERIAL
@@ -23,6 +23,7 @@ from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through
 from workbench.documents.drive import PRESENT_LOOP, Present
 from workbench.documents.reading import PLACEHOLDER, as_number
 
+FALLING_NAMES = (*COULOMB_NAMES, *VISCOUS_NAMES)
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 
 
@@ -222,8 +223,8 @@ class Model:
     the one that the machine has now; identifiability: what the logs could identify before a fit,
     empty where not asked; lag: of the motion behind the force's column [s], None where none shows;
     resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`);
-    falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed: of a motion
-    that is predicted, never of one that is simulated.
+    falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed, and its level
+    at rest beside each (F_cp, F_cn [N]): of a motion that is predicted, never of one simulated.
     library: where the effects' equations are. read: what to say of its file, a
     line for each value in another unit than ours.
     """
@@ -265,8 +266,8 @@ class Model:
             if name not in self.friction:
                 raise BadModel(f"[friction] has no {name!r}; add it with a value, or null")
         for name in self.falling:
-            if name not in VISCOUS_NAMES:
-                raise BadModel(f"[falling] unknown key {name!r}{nearest(name, VISCOUS_NAMES)}")
+            if name not in FALLING_NAMES:
+                raise BadModel(f"[falling] unknown key {name!r}{nearest(name, FALLING_NAMES)}")
         effects = {f"effects.{key}": found for key, found in self.effects.items()}
         drive, falling = self.actuator or {}, self.falling
         tables = {"friction": self.friction, "actuator": drive, "falling": falling, **effects}

@@ -19,6 +19,7 @@ from identification.arx.residual_tests import residual_tests
 from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
+from identification.estimation.imposed_motion import is_unexplained
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
@@ -55,6 +56,7 @@ FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
+NONE_IDENTIFIABLE = "none of the nine parameters is identifiable"
 PART_OF_FORCE = "a linear actuator explains only a part of the force; the value is a regression's"
 
 
@@ -84,9 +86,7 @@ def identify(
     )
     friction = [fit.estimates[n].value for n in NAMES if n in fit.estimates]
     if fit.surroundings.none and all(value is None for value in friction):
-        reasons = {n: fit.estimates[n].reason for n in ("m", "F_cp") if n in fit.estimates}
-        first = "; ".join(f"{n}: {reason}" for n, reason in reasons.items())
-        raise NotIdentifiable(f"none of the nine parameters is identifiable: {first}")
+        fit = _for_prediction(fit)
     plant, reason = arx_or_reason(logs, options)
     model = Model(
         card=card,
@@ -114,6 +114,17 @@ def identify(
     of_model = [of_one_instant(log, model) for log in logs]
     known = with_own_logs(active_model(model, ""), of_model, alone)
     return replace(model, own_logs=known.own_logs), fit
+
+
+def _for_prediction(fit: KarnoppFit) -> KarnoppFit:
+    """A fit of which no parameter is identifiable, said to be of use for prediction alone; raises
+    NotIdentifiable where it leaves most of the force, so that it predicts nothing either."""
+    reasons = {n: fit.estimates[n].reason for n in ("m", "F_cp") if n in fit.estimates}
+    first = "; ".join(f"{n}: {reason}" for n, reason in reasons.items())
+    if fit.left is None or is_unexplained(fit.left[0]):
+        raise NotIdentifiable(f"{NONE_IDENTIFIABLE}: {first}")
+    remark = f"{NONE_IDENTIFIABLE}; the model predicts the force of motion like this, and no more"
+    return replace(fit, remarks=(remark, *fit.remarks))
 
 
 def surrounding_effects(around: Surroundings, rig: Rig) -> Mapping[str, Mapping[str, Estimate]]:

@@ -304,8 +304,11 @@ def seen_moving(model: Model, log: Log) -> Plant:
 
 def force_by_model(model: Model, log: Log, how: Smoothing) -> Array:
     """Force that the model needs for a motion that was measured [N], (n,)."""
-    up, down = (used(model.falling[k]) if k in model.falling else 0.0 for k in VISCOUS_NAMES)
-    return force_needed(log, seen_moving(model, log), how, (up, down))
+    plant, found = seen_moving(model, log), {k: used(one) for k, one in model.falling.items()}
+    at_rest = {name: x for name, x in found.items() if name not in VISCOUS_NAMES}
+    plant = replace(plant, friction=replace(plant.friction, **at_rest))
+    up, down = (found.get(name, 0.0) for name in VISCOUS_NAMES)
+    return force_needed(log, plant, how, (up, down))
 
 
 def with_applied_force(log: Log, rig: Rig) -> Log:

@@ -26,7 +26,7 @@ from identification.signals.weak_form import WeakWindows
 from identification.thresholds import HALF, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
-LEVEL_COLUMNS = (1, 2)
+LEVEL_COLUMNS, VISCOUS_COLUMNS = (1, 2), (3, 4)
 FRICTION_COLUMNS = ((1, 2), (1, 2, 3), (1, 2, 4), (3, 4), (1, 2, 3, 4))
 COLUMN_SETS = tuple(
     sorted(((*mass, *friction) for friction in FRICTION_COLUMNS for mass in ((), (0,))), key=len)
@@ -45,6 +45,31 @@ class ForceFit:
     rms: float
     relative: float
     share: float
+
+    def at_logged_speeds(self, rows: Rows) -> "ForceFit":
+        """The fit whose levels, where friction falls with speed, are those at the mean speed of
+        these rows, as unsure as it varies over them.
+
+        Beside a slope below 0, which no body is simulated with, the coefficient is a level at rest
+        that no row has shown. First-order propagation of errors; ours.
+        """
+        theta, change = self.theta.copy(), np.eye(len(self.used))
+        varies = np.zeros(len(self.used))
+        for level, slope in self.falling:
+            i, k = self.used.index(level), self.used.index(slope)
+            speeds = np.abs(rows.X[rows.X[:, slope] != 0.0, slope])
+            change[i, k] = float(np.mean(speeds))
+            theta[i] += self.theta[k] * change[i, k]
+            varies[i] = self.theta[k] * float(np.std(speeds))
+        covariance = change @ self.covariance @ change.T + np.diag(varies**2)
+        return replace(self, theta=theta, covariance=covariance)
+
+    @property
+    def falling(self) -> list[tuple[int, int]]:
+        """Columns of level and slope of the directions in which friction falls with speed."""
+        sizes = dict(zip(self.used, self.theta.tolist(), strict=True))
+        ways = zip(LEVEL_COLUMNS, VISCOUS_COLUMNS, strict=True)
+        return [(i, k) for i, k in ways if i in sizes and sizes.get(k, 0.0) < 0.0]
 
     @property
     def sd(self) -> dict[str, float]:
@@ -109,13 +134,13 @@ def fewest_terms(data: Sequence[Rows], late: Lateness | None = None) -> ForceFit
     fits = [one for one in every if _may_be(one) and (1 in one.used or rubs)]
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
-    levels = np.isin(best.used, LEVEL_COLUMNS)
+    levels, logged = np.isin(best.used, LEVEL_COLUMNS), best.at_logged_speeds(rows)
     beside = np.zeros(len(best.used))
-    for fuller in (one for one in every if set(one.used) > set(best.used)):
+    for fuller in (one.at_logged_speeds(rows) for one in every if set(one.used) > set(best.used)):
         at = [fuller.used.index(column) for column in best.used]
         theta, square = fuller.theta[at], np.diag(fuller.covariance)[at]
         separate = NORMAL_95 * np.sqrt(square) <= HALF * np.abs(theta)
-        wider = (theta - best.theta) ** 2 + np.maximum(square - np.diag(best.covariance), 0.0)
+        wider = (theta - logged.theta) ** 2 + np.maximum(square - np.diag(logged.covariance), 0.0)
         beside = np.where(separate, np.maximum(beside, wider), beside)
     covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
     return replace(best, covariance=covariance, share=every[-1].share)

@@ -37,9 +37,9 @@ class LaggedRows:
         square = np.sum(self.force[kept], axis=0) - np.sum(c * theta, axis=0)
         return np.maximum(square, 1e-300), theta / size[:, np.newaxis]
 
-    def least(self, used: Sequence[int]) -> float:
-        """Square left at the best lag, of all blocks and these columns."""
-        return float(np.min(self.left(self.every, used)[0]))
+    def least(self, used: Sequence[int], kept: BoolArray | None = None) -> float:
+        """Square left at the best lag, of these blocks, by default all, and columns."""
+        return float(np.min(self.left(self.every if kept is None else kept, used)[0]))
 
     @property
     def blocks(self) -> IntArray:

@@ -254,7 +254,8 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     )  # fmt: skip
     other = replace(run, adequate=False, name="equation", estimates=every)
     recorded: Any = SimpleNamespace(plain=[log], logs=())
-    monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
+    found_left = LeftOfEquation(left, 1.0, 100.0)
+    monkeypatch.setattr(run_or_equation, "left_by", lambda *_, followed: found_left)
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)
     found: Any = run_or_equation.on_the_floor(run, recorded)
     assert (found.name, found.adequate) == (by, adequate)
@@ -267,5 +268,8 @@ def test_a_band_that_takes_the_sliding_does_not_hide_what_a_plant_leaves() -> No
     wide = left_by(swollen, by_force)
     assert own is not None and own.by_plant < 2.0 * own.by_equation
     assert wide is not None and wide.by_plant > 3.0 * wide.by_equation
-    # A run by the command is followed as a whole, with its stops.
-    assert left_by(swollen, recorded_logs([made(3)], Rig("motor", force_per_command=K_A))) is None
+    # A motor's that is followed is so with its stops; another's band says nothing.
+    motor = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
+    assert left_by(swollen, motor, followed=True) is None
+    lost = left_by(swollen, motor)
+    assert lost is not None and lost.by_plant > 3.0 * lost.by_equation

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.log import Log
 from identification.model.estimates import Drive, Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
 from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.cards.card import load_card
@@ -66,6 +68,25 @@ def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
     steep = replace(falls, falling={"F_vp": Estimate(-1e3, "N s/m", 1.0, -1002.0, -998.0)})
     inertia = log["y"][up] * -9.0
     assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives
+    level = {**falls.falling, "F_cp": Estimate(18.0, "N", 0.1, 17.8, 18.2)}  # at rest
+    more = force_by_model(replace(falls, falling=level), log, how) - force_by_model(falls, log, how)
+    assert more[up] == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.9])
+def test_friction_by_load_is_predicted_from_the_motion_alone(mu: float) -> None:
+    """By the measured force it would predict itself; by the force needed, F = S + d mu |F|."""
+    log = swing()
+    v, a = 0.3 * np.cos(3.0 * log["t"]), -0.9 * np.sin(3.0 * log["t"])
+    d = np.sign(v)
+    needed = a + d * np.where(d > 0.0, 12.0, 15.0) + np.where(d > 0.0, 30.0, 20.0) * v
+    force = np.where(needed * d > 0.0, needed / (1.0 - mu), needed / (1.0 + mu))
+    by_load = built_in()["load_dependent_friction"].acting({"mu": mu, "asymmetry": 0.0})
+    narrow = Plant(replace(WIDE, dv_p=1e-3, dv_n=-1e-3), None, (by_load,))
+    quick = (np.abs(v) > 0.05) & (np.arange(len(v)) > 50) & (np.arange(len(v)) < len(v) - 50)
+    for logged in (np.zeros(len(log)), force):
+        found = force_needed(log.with_signals(F=logged), narrow, Smoothing())
+        np.testing.assert_allclose(found[quick], force[quick], rtol=5e-3)
 
 
 def late_model(command_period: float | None = None, drive: Drive = "force") -> Model:

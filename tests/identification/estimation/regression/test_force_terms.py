@@ -32,6 +32,25 @@ def test_a_level_well_below_none_is_no_viscous_friction_alone() -> None:
     assert fewest_terms(sliding_rows(-0.05, 0.065, 1e-4)).used != VISCOUS
 
 
+def test_friction_that_falls_with_speed_has_its_level_where_it_was_logged() -> None:
+    """Strokes at 6 to 15 mm/s, 10 N up at their mean speed and less the faster: the level at rest,
+    24 N, is in no row, and a body was simulated with it."""
+    rng, n = np.random.default_rng(3), 400
+    v = rng.uniform(6e-3, 15e-3, n) * np.where(np.arange(n) % 2, 1.0, -1.0)
+    up = v > 0.0
+    X = np.column_stack([np.zeros(n), 1.0 * up, -1.0 * ~up, v * up, v * ~up])
+    force = np.where(up, 10.0 - 1.3e3 * (v - 10.5e-3), -6.0) + 0.1 * rng.standard_normal(n)
+    rows = Rows(force, X, np.full(n, 0.1), np.arange(n) // 40, np.abs(v), FIVE)
+    found = fewest_terms([rows])
+    assert found.used == (1, 2, 3) and found.falling == [(1, 3)]
+    assert found.theta[0] == pytest.approx(23.6, abs=0.3)
+    logged = found.at_logged_speeds(rows)
+    assert logged.theta[0] == pytest.approx(float(np.mean(force[up])), abs=0.01)
+    # As unsure as it varies over the strokes: by 3.4 N, one sigma.
+    assert logged.sd["F_cp"] == pytest.approx(1.3e3 * np.std(v[up]), rel=0.05)
+    assert (logged.theta[1], logged.sd["F_cn"]) == (found.theta[1], found.sd["F_cn"])
+
+
 @pytest.mark.parametrize("lag", [-5e-4, 0.0, 5e-4])
 def test_a_force_that_acts_within_its_sample_is_no_damping(lag: float) -> None:
     """Sines of a body of 0.02 kg, its force seen by half a millisecond early or late: m w^2 lag is
