@@ -136,10 +136,15 @@ def is_unexplained(share: float) -> bool:
 
 def without_estimates(fit: KarnoppFit, share: float) -> KarnoppFit:
     """The fit with none of the nine reported: its model leaves this share of the force."""
-    reason = (
+    return withheld(
+        fit,
         f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
-        " larger than friction acts (`workbench trace` searches for it), so no estimate is valid"
+        " larger than friction acts (`workbench trace` searches for it), so no estimate is valid",
     )
+
+
+def withheld(fit: KarnoppFit, reason: str) -> KarnoppFit:
+    """The fit with none of the nine reported, for this reason."""
     values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
     none = {name: fit.estimates[name].withheld(reason, x) for name, x in values.items()}
     return replace(fit, estimates={**fit.estimates, **none})

@@ -22,6 +22,7 @@ from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
     is_unexplained,
+    withheld,
     without_estimates,
 )
 from identification.estimation.prediction_error import prediction_error_fit
@@ -53,6 +54,10 @@ STEPS_WHY = (
 FLOOR_WHY = (
     "the free run does not follow the logs, which biases mass and friction; stick limits and band"
     " are not identifiable"
+)
+PREDICTS_WHY = (
+    "neither the run nor the equation of motion follows these logs to the noise; the latter predicts"
+    " their force"
 )
 LIKELIEST = "sliding friction of largest likelihood"
 LIKELIEST_WHY = MinorRemark(
@@ -121,7 +126,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     R. Stat. Soc. B 36 (1974) 111; the comparison is ours."""
     if fit.effects:
         return likeliest(fit, recorded)
-    left = left_by(fit.friction, recorded, followed=fit.adequate)
+    left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
@@ -129,7 +134,10 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if surer or _identified(fit) < len(FIVE):
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
         if left is None and other is not None and is_no_run(other.chi_square):
-            other = None  # of few rows, of which far more than noise is left
+            # Of few rows, or beside a band that takes the sliding, it leaves far more than noise.
+            if not (fit.adequate or _identified(fit)):
+                return withheld(other, PREDICTS_WHY)
+            other = None
         if other is not None and (surer or _identified(other) > _identified(fit)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             other = replace(other, adequate=fit.adequate)
@@ -201,7 +209,7 @@ def _bends(plant: Plant, fit: KarnoppFit, recorded: RecordedLogs) -> bool:
     with the body where it seems to be noise."""
     if plant.effects:
         return False
-    now, was = (left_by(p, recorded, followed=True) for p in (plant.friction, fit.friction))
+    now, was = (left_by(p, recorded) for p in (plant.friction, fit.friction))
     return now is not None and was is not None and now.by_plant > WORSE * was.by_plant
 
 
@@ -212,20 +220,19 @@ def by_equation_if_surer(p: Karnopp, recorded: RecordedLogs) -> KarnoppFit | Non
     return None if fit is None or left is None else _unless_unexplained(fit, left)
 
 
-def left_by(p: Karnopp, recorded: RecordedLogs, *, followed: bool = False) -> LeftOfEquation | None:
+def left_by(p: Karnopp, recorded: RecordedLogs) -> LeftOfEquation | None:
     """What a plant of this friction, and the equation itself, leave of the force while sliding.
 
     None where too little slides. Of rows faster than the plant's band, in which it says something
-    else of friction; where hardly any are, of all, since the band of a run that is not followed, or
-    that begins anew in every window by the measured force, may take the sliding; but of an
-    actuator's command, or a motor's that is followed, none. Source: cross-validation, Stone (1974).
+    else of friction; where hardly any are, of all of a body driven by the measured force, whose run
+    begins anew in every window, so that a band may take the sliding and still be followed. Source:
+    cross-validation, Stone (1974).
     """
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
     made = rows_and_windows(recorded.logs, theta)
     fast = np.concatenate([one.outside(p) for one in made])
     if np.count_nonzero(fast) < FEWEST_COMPARED:
-        of_run = recorded.by_command or (recorded.by_motor and followed)
-        if of_run or len(fast) < FEWEST_COMPARED:
+        if recorded.drive == "command" or len(fast) < FEWEST_COMPARED:
             return None
         fast = np.ones(len(fast), dtype=np.bool_)
     rows = stacked([one.rows for one in made]).at(fast)

@@ -129,8 +129,8 @@ def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction(
     assert "falls with speed" in str(up.reason)
     assert down.value is None and "constant friction predicts as much" in str(down.reason)
     assert fit.falling["F_cp"].value == pytest.approx(9.0, rel=0.02)  # at rest
-    logged = fit.estimates["F_cp"]
-    assert logged.value is not None and 6.0 < logged.value < 8.5  # at the speeds of the log
+    logged = fit.estimates["F_cp"]  # at speeds from 0 to 0.6 m/s, over which it falls to 2 N
+    assert logged.value is None and logged.assumed == pytest.approx(5.9, rel=0.05)
     assert fit.estimates["F_cn"].value == pytest.approx(5.0, rel=0.02)
     assert fit.friction.F_vp == 0.0  # what drives a body is not simulated
 
