@@ -115,7 +115,6 @@ WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a wh
 TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 FAR_FOR_A_SLIDE = 0.5  # m, that a sliding joint of a robot hardly goes
-EFFORTS = {"effort", "efforts", "eff"}  # words of ROS for the force or torque in a joint
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 TWO_TURNS = 720.0  # of what is called an angle, in whole degrees as likely as in counts
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
@@ -180,9 +179,8 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
     names = {word for one in beside for word in words_of(one.header.name)}
-    of_joint = EFFORTS & names and any(one.header.speed for one in beside)
-    if of_joint and np.ptp(y.x) > FAR_FOR_A_SLIDE:
-        why = "position, velocity and effort are those of a robot's joints, which mostly turn"
+    if {"effort", "efforts", "eff"} & names and np.ptp(y.x) > FAR_FOR_A_SLIDE:
+        why = "position and effort are those of a robot's joints, which mostly turn"
         return MotionGuess("rotary", why, False, rotor)
     if y.header.unit is None and (quarters := _of_quarters(roles)):
         why = f"its reference goes by quarters of a turn in {quarters}"

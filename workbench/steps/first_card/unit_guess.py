@@ -58,7 +58,6 @@ SHORTEST_TICK, LONGEST_DAY = 1.0, 1e-3  # steps of a clock of ticks, and of one 
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
-OF_PARTS = 1.5  # log-probability that a clock in parts of a second has fractions of these
 SHARES = ("pwm", "duty", "tastgrad")  # words of a share
 MOST_AMPERES = 100.0  # of a current in whole numbers
 NEARLY_ALL_OF_IT, ALL_OF_IT = 95.0, 100.0  # the whole, in %
@@ -148,8 +147,6 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
     """Units of clock, position, force and velocity that go together best."""
     turns = "" if motion.motion == "linear" else " rotary"
     usual = {"t": USUAL["t"], "y": USUAL[f"y{turns}"]}
-    if np.any(columns.clock.raw.values % 1.0):  # parts of a second are counted in whole ones
-        usual["t"] = {unit: own - OF_PARTS * (unit != "s") for unit, own in usual["t"].items()}
     for name in ("F", "v"):
         usual[name] = USUAL[f"{name}{turns}"] if name in roles.columns else {"": 0.0}
     open_of = {k: {given[k].unit: 0.0} if k in given else of for k, of in usual.items()}

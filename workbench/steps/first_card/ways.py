@@ -87,7 +87,8 @@ def ways_of(
             continue
         named = max(as_force, as_command) >= HEADER_SAYS
         of = [seen.at, *places] if named else range(len(laws))
-        if np.max(pairs.rate[of, k]) > weights.EXACT_VELOCITY:
+        inertia = law.share > weights.EXACT_VELOCITY and (law.friction or 1.0) < weights.NO_FRICTION
+        if np.max(pairs.rate[of, k]) > weights.EXACT_VELOCITY or (inertia and not named):
             continue  # the velocity of a position, or what nobody calls a drive is of whatever
         v_share = float(seen.v_share[k])
         less_way = one.way_gone < weights.LEAST_WAY * y.way_gone  # which no force on it does

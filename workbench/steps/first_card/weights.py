@@ -48,7 +48,7 @@ FORCE_LIKENESS = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
 SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
-ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
+ACTS, BEFORE_LIMIT = 1.5, -12.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR = -6.0  # for a drive that is an error
@@ -174,8 +174,7 @@ def of_a_motor(one: Column) -> float:
 
 def limits(pairs: Pairs) -> dict[int, int]:
     """Commands before a limiter or a sum: what comes out of it, each by its place."""
-    named = [max(said(one, "u"), said(one, "F")) for one in pairs.signals]
-    likely = [(own, k) for k, own in enumerate(named) if not pairs.signals[k].flag]
+    likely = [(max(said(one, "u"), said(one, "F")), k) for k, one in enumerate(pairs.signals)]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
 
@@ -249,8 +248,6 @@ def ahead_of(seen: Seen, k: int) -> float:
     if not called and (found.samples <= 0.3 or _of_place_alone(one.x, y.x)):
         return RULED_OUT  # another sensor of the position, or a height of the arm
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
-    if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
-        score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
     rough = one.noise / max(float(np.std(one.x)), 1e-300)
