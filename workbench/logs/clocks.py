@@ -140,8 +140,8 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
             (clocks if rises else values).append((k, x))
     if not clocks or not values:
         return None
-    called = [read_header(table.names[k]).means.get("time", 0.0) for k, _ in clocks]
-    clock, t = clocks[int(np.argmax(called))]
+    of_time = [read_header(table.names[k]).means.get("time", 0.0) for k, _ in clocks]
+    clock, t = clocks[int(np.argmax(of_time))]
     in_turn &= not names[0].isdigit() or _are_several(of, t, [x for _, x in values], rows)
     in_blocks &= len(values) == 1 and bool(np.any(np.diff(t) < 0.0))
     if not (in_turn or in_blocks):

@@ -133,11 +133,15 @@ def test_rows_in_turn_go_by_what_is_called_their_time(
     joint: dict[str, Array], tmp_path: Path
 ) -> None:
     """And not by the number of the loop before it."""
-    n = 2 * len(T)
-    twice = [np.repeat(one, 2) for one in (np.arange(len(T)), T, joint["y"], joint["F"])]
-    found = propose(tmp_path, "loop,time_sec,leg,pos,tau", twice[0], twice[1],
-                    [("L", "R")[k % 2] for k in range(n)],
-                    twice[2] * np.where(np.arange(n) % 2, -0.5, 1.0), twice[3])  # fmt: skip
+
+    def twice(x: Array) -> Array:
+        return np.asarray(np.repeat(x, 2), dtype=np.float64)
+
+    sides = ["L", "R"] * len(T)
+    y = twice(joint["y"]) * np.tile([1.0, -0.5], len(T))
+    loop = twice(np.asarray(np.arange(len(T)), dtype=np.float64))
+    found = propose(tmp_path, "loop,time_sec,leg,pos,tau", loop, twice(T), sides, y,
+                    twice(joint["F"]))  # fmt: skip
     t = found.signal("t")
     assert t is not None and (t.shown, t.unit) == ("'time_sec'", "s")
 
