@@ -219,6 +219,7 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
     found: dict[Quantity, float] = {}
     long = [one for one in words if len(one) > 1]
     spoken = len(words) > 1 and any(_MEASURED & set(meaning(x)) for x in long if x not in _PLACES)
+    spoken |= len(long) > 1 and len(words[0]) == 1  # "x_" before a name of several words
     for word in long if spoken else words:
         if word in _SHORT_WORDS:
             for quantity, weight in _SHORT_WORDS[word].items():

@@ -60,9 +60,8 @@ def as_table(text: str) -> str:
 def _without_tag(text: str) -> str:
     """The text without the word with which a logger begins each row: "TRACE 0,1.2"."""
     tags = {found[1] if (found := _TAG.match(line)) else "" for line in _seen(text)}
-    if len(tags) != 1 or not (tag := tags.pop()):
-        return text
-    return _TAG.sub(lambda one: "" if one[1] == tag else one[0], text)
+    one_tag = len(tags) == 1 and "" not in tags
+    return _TAG.sub(lambda one: "" if one[1] in tags else one[0], text) if one_tag else text
 
 
 def _seen(text: str) -> list[str]:

@@ -137,8 +137,8 @@ def _moves(law: ForceLaw) -> bool:
 
 def _is_named(way: Way) -> bool:
     """Whether a header says of what drives the body that it does so, or there is none."""
-    every = way.columns.items()
-    return any(weights.said(one, k[0]) >= HEADER_SAYS or not one.raw.header for k, one in every)
+    own = [weights.said(x, k[0]) if x.raw.header else np.inf for k, x in way.columns.items()]
+    return max(own) >= HEADER_SAYS
 
 
 def _seen_smoother(way: Way) -> Way:

@@ -83,7 +83,8 @@ def ways_of(
         if one is y or _are_several(one, y) or (another and law.share < HALF):
             continue
         as_force, as_command = weights.said(one, "F"), weights.said(one, "u")
-        if max(as_force, as_command) < -HEADER_SAYS:
+        least = -3.0 if one.header.unit else -HEADER_SAYS
+        if max(as_force, as_command) < least:
             continue
         named = max(as_force, as_command) >= HEADER_SAYS
         of = [seen.at, *places] if named else range(len(laws))
@@ -96,7 +97,7 @@ def ways_of(
         force = law.way * seen.smooth[:, k]
         if as_force >= -HEADER_SAYS:
             yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
-        if as_command >= -HEADER_SAYS and not _is_set_point(seen, k):
+        if as_command >= least and not _is_set_point(seen, k):
             score = as_command + physics + acting[k] + (0.0 if named else weights.of_a_motor(one))
             yield Way(seen, "motor", {"u": one}, law, force, score)
     if laws:

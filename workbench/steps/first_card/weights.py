@@ -48,7 +48,7 @@ FORCE_LIKENESS = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
 SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
-ACTS, BEFORE_LIMIT = 1.5, -12.0  # for a command behind a limiter, and before it
+ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR = -6.0  # for a drive that is an error
@@ -237,8 +237,8 @@ def ahead_of(seen: Seen, k: int) -> float:
     """Log-odds that a column is the position's reference: alike, ahead of it, without noise."""
     y, one = seen.y, seen.pairs.signals[k]
     if abs(seen.pairs.alike[seen.at, k]) < LEAST_ALIKE:
-        of_it = one.header.unit or one.header.means.get("position", 0.0) >= SURE
-        return -3.0 if of_it else RULED_OUT  # a target of what the log has not
+        own = one.header.unit or one.header.means.get("position", 0.0) >= SURE
+        return -3.0 if own else RULED_OUT  # a target of what the log has not
     found = seen.lead(k)
     called = one.header.purpose == "reference"
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
