@@ -83,6 +83,8 @@ _GREEK = str.maketrans({"θ": "theta", "φ": "phi", "ω": "omega", "τ": "tau", 
                         "β": "beta", "ψ": "psi"})  # fmt: skip
 _PARTS = re.compile(r"/|(?<=\w)[\"']?\.(?=[^\W\d])")  # of a path, and of a variable in a structure
 _PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
+_MEASURED = {"position", "velocity", "force", "pressure"}  # of these a letter beside is an index
+_PLACES = {"joint", "gelenk", "motor"}  # words of what a quantity is of
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
 
@@ -106,8 +108,6 @@ def _read(text: str, unit_below: str) -> Header:
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
     words = _unambiguous(words_of(name))
-    if _INDEX.search(plain):  # of a robot's state, and no status
-        words = ["joint" if one == "state" else one for one in words]
     means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
@@ -143,7 +143,8 @@ def _unambiguous(words: list[str]) -> list[str]:
 def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     """Name, unit, and whether the unit is doubtful."""
     found = written_unit(text) if len(text) > 1 and text != "min" else None
-    if found and found.quantity in ("velocity", "time"):  # "rpm", "millis"
+    turns = found is not None and found.rotary and len(text) >= _SPOKEN
+    if found and (turns or found.quantity in ("velocity", "time")):  # "radian", "rpm", "millis"
         return text, found, False
     if _INDEX.search(text):  # "position[1]" of an array
         return text, None, False
@@ -216,7 +217,10 @@ def meaning(word: str) -> Mapping[Quantity, float]:
 def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
     """Weight of each quantity that the words mean, by the longest part that each contains."""
     found: dict[Quantity, float] = {}
-    for word in words:
+    long = [one for one in words if len(one) > 1]
+    spoken = len(words) > 1 and any(_MEASURED & set(meaning(x)) for x in long if x not in _PLACES)
+    spoken |= len(long) > 1 and len(words[0]) == 1  # "x_" before a name of several words
+    for word in long if spoken else words:
         if word in _SHORT_WORDS:
             for quantity, weight in _SHORT_WORDS[word].items():
                 found[quantity] = max(found.get(quantity, 0.0), weight)
@@ -267,7 +271,7 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
              and not (len(one) == 1 and (letters or one in named))]  # fmt: skip
     if _holds(whole, "reference") or short:
         return "reference"
-    if any(one.startswith("command") for one in words) and "position" in means:
+    if any(one.startswith("command") for one in words) and {"position", "velocity"} & set(means):
         return "reference"
     if said or any(one in _EXACT["measured"] for one in words):
         return "measured"

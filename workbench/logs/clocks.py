@@ -15,7 +15,7 @@ from identification.errors import BadLog
 from identification.remarks import MinorRemark
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP, at_times
-from identification.thresholds import HALF, TWICE
+from identification.thresholds import HALF, OF_ACCOUNT, TWICE
 from workbench.cards.headers import read_header
 from workbench.logs.layout import is_number
 from workbench.logs.table import RawColumn, Table, number_of
@@ -140,7 +140,8 @@ def _by_name(table: Table, at: int, names: Sequence[str], of: NDArray[Any]) -> T
             (clocks if rises else values).append((k, x))
     if not clocks or not values:
         return None
-    (clock, t), *_ = clocks
+    of_time = [read_header(table.names[k]).means.get("time", 0.0) for k, _ in clocks]
+    clock, t = clocks[int(np.argmax(of_time))]
     in_turn &= not names[0].isdigit() or _are_several(of, t, [x for _, x in values], rows)
     in_blocks &= len(values) == 1 and bool(np.any(np.diff(t) < 0.0))
     if not (in_turn or in_blocks):
@@ -166,12 +167,13 @@ def _are_several(
     of: NDArray[Any], t: Array, values: Sequence[Array], rows: Sequence[NDArray[Any]]
 ) -> bool:
     """Whether rows that numbers tell apart (n,) are of several machines, and the number no signal:
-    a value goes by far less from one of them to the next of its own; or the numbers come round
-    always alike, at times that repeat."""
+    a value goes by far less from one of them to the next of its own, and is not told by the number
+    alone; or the numbers come round always alike, at times that repeat."""
     several = len(np.unique(of))
     for x in values:
         own = np.concatenate([np.abs(np.diff(x[at])) for at in rows] or [np.abs(np.diff(x))])
-        if np.nanmean(own) < HALF * np.nanmean(np.abs(np.diff(x))):
+        apart = sum(np.nanvar(x[at]) for at in rows) > OF_ACCOUNT**2 * len(rows) * np.nanvar(x)
+        if apart and np.nanmean(own) < HALF * np.nanmean(np.abs(np.diff(x))):
             return True
     return bool(np.all(of[several:] == of[:-several]) and np.any(np.diff(t) <= 0.0))
 

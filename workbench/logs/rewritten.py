@@ -29,6 +29,7 @@ _CELL = re.compile(
     r"(?P<label>[^\d\s:=][^:=]*[:=])?\s*"
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\s,;]*)?"
 )
+_TAG = re.compile(r"^([^\W\d]\w*:?)[ \t]+(?=[^\s,;|]+[ \t]*[,;|])", re.MULTILINE)
 _NEXT_LABEL = re.compile(r"(?<=\S)[ \t]+(?=[^\W\d][^\s:=,;|]*[ \t]*[:=][ \t]*[+-]?\.?\d)")
 _NEXT_WORDS = re.compile(r"(?<=\d)[ \t]+(?=(?P<words>[^\W\d][^\d:=,;|]*)[:=][ \t]*[+-]?\.?\d)")
 _BRACES = re.compile(r"[^\s,;|]*\{|[}'\"]")
@@ -53,7 +54,14 @@ def as_table(text: str) -> str:
         return _of_documents(text)
     if len(_NAME_ABOVE.findall(text)) > 1:
         return _of_variables(text)
-    return _labelled(_parted(_flat(text)))
+    return _labelled(_parted(_flat(_without_tag(text))))
+
+
+def _without_tag(text: str) -> str:
+    """The text without the word with which a logger begins each row: "TRACE 0,1.2"."""
+    tags = {found[1] if (found := _TAG.match(line)) else "" for line in _seen(text)}
+    one_tag = len(tags) == 1 and "" not in tags
+    return _TAG.sub(lambda one: "" if one[1] in tags else one[0], text) if one_tag else text
 
 
 def _seen(text: str) -> list[str]:

@@ -79,6 +79,24 @@ def test_a_name_with_an_index_has_no_unit(text: str) -> None:
     assert read_header(text).unit is None
 
 
+@pytest.mark.parametrize(
+    ("text", "means", "purpose"),
+    [("tau_p", {"force"}, ""), ("vel_x", {"velocity"}, ""), ("torque_z", {"force"}, ""),
+     ("motor_q", {"position"}, ""), ("velocityCommanded", {"velocity"}, "reference"),
+     ("pos_state", {"position"}, ""), ("tau_state", {"force", "position"}, "")],
+)  # fmt: skip
+def test_a_letter_beside_what_is_spoken_of_is_an_index(
+    text: str, means: set[Quantity], purpose: str
+) -> None:
+    found = read_header(text)
+    assert (set(found.means), found.purpose) == (means, purpose)
+
+
+def test_a_unit_may_be_all_of_a_header() -> None:
+    angle = read_header("radian").unit
+    assert angle is not None and angle.card == "rad"
+
+
 def test_a_letter_behind_a_name_is_a_doubtful_unit() -> None:
     found = read_header("y_m")
     assert found.unit is not None and found.unit.card == "m"

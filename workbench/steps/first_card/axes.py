@@ -93,9 +93,8 @@ def is_position(head: Header) -> bool:
     if head.purpose in ("reference", "error", "model"):
         return False
     if head.unit is not None:
-        return head.unit.quantity == "position" or (
-            head.unit.quantity == "count" and "position" in head.means
-        )
+        counts = head.unit.quantity == "count" and (not head.means or "position" in head.means)
+        return counts or head.unit.quantity == "position"
     if not head.means:
         return head.purpose == "measured" and head.unit is None
     return max(head.means, key=lambda what: head.means[what]) == "position"

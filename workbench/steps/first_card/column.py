@@ -95,7 +95,7 @@ MOST_ROWS_READ = 10_000
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOSTLY_NOISE = 0.8  # of a signal's spread, that its white noise is
 CURRENTS = ("current", "strom", "電流", "电流", "courant", "corrente", " iq ", " i q ", " isq ",
-            " ia ", " i a ", " amp", " cur ")  # fmt: skip
+            " ia ", " i a ", " amp", " cur ", " curr ")  # fmt: skip
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
 
 

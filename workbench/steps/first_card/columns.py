@@ -15,6 +15,7 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.thresholds import HALF, OF_ACCOUNT, TWICE
 from workbench.cards.headers import words_of
+from workbench.cards.written_units import Quantity
 from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import SAME_MOTION, axes_of, correlation, is_position
@@ -99,12 +100,14 @@ def columns_of(log: UnknownLog) -> Columns:
 
 def _with_sign(one: Column) -> Column:
     """The column; of a power that goes as far below zero as above, as no motor's is that moves
-    something, a share of what the motor is given."""
+    something, a share of what the motor is given; of a p that does, as no pressure, a position."""
     low, high = (float(side(one.numbers, initial=0.0)) for side in (np.min, np.max))
-    power = CALLED_POWER & set(words_of(one.header.name)) and one.header.unit is None
-    if not power or low > -HALF * high or high < -HALF * low:
+    power = CALLED_POWER & set(words_of(one.header.name))
+    pressure = set(one.header.means) == {"pressure"}
+    if low > -HALF * high or high < -HALF * low or one.header.unit or not (power or pressure):
         return one
-    return replace(one, header=replace(one.header, means={"command": 2.0}))
+    means: dict[Quantity, float] = {"command": 2.0} if power else {"position": 1.0}
+    return replace(one, header=replace(one.header, means=means))
 
 
 def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
@@ -184,6 +187,11 @@ def _unusable(one: Column) -> str:
         return f"{np.mean(~finite):.0%} of its values are missing"
     if np.ptp(one.values[finite]) == 0.0:
         return f"is always {one.values[finite][0] + 0.0:g}"
+    steps = np.diff(one.values[finite])
+    unit, means = one.header.unit, one.header.means
+    events = unit.quantity == "count" if unit else not {"time", "position"} & set(means)
+    if events and one.whole and np.all((steps == 0.0) | (steps == 1.0)) and np.any(steps == 0.0):
+        return "counts something: from row to row it stays, or goes up by one"
     return ""
 
 

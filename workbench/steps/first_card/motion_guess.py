@@ -179,8 +179,8 @@ def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:
             what = "a torque" if force else "the speed of a turn"
             return MotionGuess("rotary", f"{one.shown} beside it is {what}", False)
     names = {word for one in beside for word in words_of(one.header.name)}
-    if {"effort", "velocity"} <= names and np.ptp(y.x) > FAR_FOR_A_SLIDE:
-        why = "position, velocity and effort are those of a robot's joints, which mostly turn"
+    if {"effort", "efforts", "eff"} & names and np.ptp(y.x) > FAR_FOR_A_SLIDE:
+        why = "position and effort are those of a robot's joints, which mostly turn"
         return MotionGuess("rotary", why, False, rotor)
     if y.header.unit is None and (quarters := _of_quarters(roles)):
         why = f"its reference goes by quarters of a turn in {quarters}"

@@ -12,7 +12,7 @@ RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no referenc
 SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
 FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_ALIKE = 3  # headers that begin alike, from which that is the machine's name
-_CURRENTS = ("current", "strom", "courant", "corrente", "cur", "amps")
+_CURRENTS = ("current", "strom", "courant", "corrente", "cur", "curr", "amps")
 _ARGUMENT = re.compile(r"\s*\([tkn]\)$")  # of a signal as a function of time: "u(t)"
 _PER = re.compile(r"(?<=[a-z])_per_(?=[a-z]+$)", re.I)  # "deg_per_sec"
 _NM = re.compile(r"(?<=[\W_])nm(?=\W*$)")  # as names in small letters have it

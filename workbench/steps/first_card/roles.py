@@ -117,8 +117,9 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     head, way = weights.said(choices[0].way.y, "y"), choices[0].way
     denied = head < weights.LEAST_SCORE and way.law.share < weights.EXPLAINED
     unlikely = choices[0].score < NO_BODY and head < HEADER_SAYS
+    idle = not (_moves(way.law) or _is_named(way) or are_constant(way.columns))
     wrong = any(one.header.purpose == "error" for one in signals)  # said of what is made of it
-    if (denied or unlikely) and not wrong:
+    if idle or ((denied or unlikely) and not wrong):
         return None
     choices[0] = replace(choices[0], way=_seen_smoother(choices[0].way))
     best = choices[0]
@@ -127,6 +128,17 @@ def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles 
     rest = None if other is None else _roles_of(other, [one for one in choices if one is not best])
     ahead = np.inf if other is None else best.score - other.score
     return replace(_roles_of(best, choices), other=rest, ahead=ahead)
+
+
+def _moves(law: ForceLaw) -> bool:
+    """Whether what drives a body moves it at all, by this law."""
+    return law.share > HARDLY_ITS_LAW or abs(law.work) > WORK_GIVES_SIGN
+
+
+def _is_named(way: Way) -> bool:
+    """Whether a header says of what drives the body that it does so, or there is none."""
+    own = [weights.said(x, k[0]) if x.raw.header else np.inf for k, x in way.columns.items()]
+    return max(own) >= HEADER_SAYS
 
 
 def _seen_smoother(way: Way) -> Way:
@@ -263,9 +275,7 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
     is driven, or a reference that nothing follows.
     """
     out = {}
-    law = best.way.law
-    moves = law.share > HARDLY_ITS_LAW or abs(law.work) > WORK_GIVES_SIGN
-    moves = moves and not are_constant(best.way.columns)
+    moves = _moves(best.way.law) and not are_constant(best.way.columns)
     for role, column in best.columns.items():
         rivals = [one.score for one in choices if one.columns.get(role) is not column]
         ahead = best.score - max(rivals, default=-np.inf)

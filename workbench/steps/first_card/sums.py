@@ -42,7 +42,8 @@ def without_names(
     that may be a speed as the position, and the roles then, where that leaves far less of a drive
     than what is known, which has no speed beside it."""
     left = 1.0 if known is None else 1.0 - known.law.share
-    moves = known is not None and ("v" in known.columns or left < 1.0 - EXPLAINED)
+    nameless = left < 1.0 - EXPLAINED and not signals[0].raw.header
+    moves = known is not None and ("v" in known.columns or nameless)
     if moves or any(said(one, "y") >= HEADER_SAYS for one in signals):
         return None
     found = list[tuple[Columns, Roles]]()
@@ -60,8 +61,8 @@ def without_names(
 def _summed(columns: Columns, signals: Sequence[Column], own: Column) -> tuple[Columns, Column]:
     """The columns with the sum of one's own over time instead of it, without other speeds and what
     asks for it; and that sum."""
-    asks = [one for one in signals  # for a speed, which follows it
-            if one.header.purpose == "reference" and follows(lead(one.x, own.x))]  # fmt: skip
+    asked = [one for one in signals if one.header.purpose == "reference"]
+    asks = [x for x in asked if "force" not in x.header.means and follows(lead(x.x, own.x))]
     kept = [one for one in signals if one is not own and one not in asks and not one.header.speed]
     unit, clock = own.header.unit, columns.clock.header.unit
     usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")

@@ -83,19 +83,22 @@ def ways_of(
         if one is y or _are_several(one, y) or (another and law.share < HALF):
             continue
         as_force, as_command = weights.said(one, "F"), weights.said(one, "u")
-        if max(as_force, as_command) <= -3.0:
+        least = -3.0 if one.header.unit else -HEADER_SAYS
+        if max(as_force, as_command) < least:
             continue
-        if np.max(pairs.rate[[seen.at, *places], k]) > weights.EXACT_VELOCITY:
-            continue  # the velocity of this position, or of what is called another
+        named = max(as_force, as_command) >= HEADER_SAYS
+        of = [seen.at, *places] if named else range(len(laws))
+        inertia = law.share > weights.EXACT_VELOCITY and (law.friction or 1.0) < weights.NO_FRICTION
+        if np.max(pairs.rate[of, k]) > weights.EXACT_VELOCITY or (inertia and not named):
+            continue  # the velocity of a position, or what nobody calls a drive is of whatever
         v_share = float(seen.v_share[k])
         less_way = one.way_gone < weights.LEAST_WAY * y.way_gone  # which no force on it does
         physics = weights.driving(law, v_share, less_way) + weights.together(y, one) + own
         force = law.way * seen.smooth[:, k]
-        if as_force > -3.0:
+        if as_force >= -HEADER_SAYS:
             yield Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
-        if as_command > -3.0 and not _is_set_point(seen, k):
-            unnamed = max(as_force, as_command) < HEADER_SAYS
-            score = as_command + physics + acting[k] + (weights.of_a_motor(one) if unnamed else 0.0)
+        if as_command >= least and not _is_set_point(seen, k):
+            score = as_command + physics + acting[k] + (0.0 if named else weights.of_a_motor(one))
             yield Way(seen, "motor", {"u": one}, law, force, score)
     if laws:
         yield from _chambers(seen, own)
@@ -171,6 +174,14 @@ def with_reference(way: Way) -> float:
     return way.score + max([0.0, *gains])
 
 
+def _asks_for_speed(seen: Seen, k: int) -> bool:
+    """Whether the speed of the position follows a column, and the position itself less so."""
+    alike = np.abs(seen.pairs.alike[k])
+    speeds = seen.pairs.rate[seen.at] > weights.ALL_VELOCITY
+    speeds[k] = False
+    return bool(np.max(alike[speeds], initial=0.0) > max(alike[seen.at], weights.CALLED_ALIKE))
+
+
 def moves_rather(way: Way, k: int) -> bool:
     """Whether what drives the body drives another column far more exactly: then that is the
     position, and the body here a copy of it, late or by a model."""
@@ -188,7 +199,8 @@ def gain_of_reference(seen: Seen, k: int) -> float:
         one = seen.pairs.signals[k]
         asks = "command" in one.header.means and _is_set_point(seen, k)
         head = max(0.0 if asks else -np.inf, weights.said(one, "r"))
-        if weights.together(seen.y, one) < 0.0 and one.header.purpose != "reference":
+        other = weights.together(seen.y, one) < 0.0 and one.header.purpose != "reference"
+        if other or _asks_for_speed(seen, k):
             head = weights.RULED_OUT  # another axis's position, which goes with this one
         more = weights.ahead_of(seen, k) + weights.together(seen.y, one) if head >= -3.0 else 0.0
         seen.as_reference[k] = head + more

@@ -13,7 +13,7 @@ from identification.signals.relations import ForceLaw
 from identification.thresholds import OF_ACCOUNT
 from workbench.cards.units import conversion
 from workbench.cards.written_units import Quantity
-from workbench.steps.first_card.column import Column, halved_counts
+from workbench.steps.first_card.column import FEW_LEVELS, Column, halved_counts
 from workbench.steps.first_card.pairs import SURELY_TURNED, Pairs, Seen
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
@@ -50,13 +50,13 @@ SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their hea
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
-ALL_FRICTION, NO_INERTIA, A_FRICTION = 0.99, 1e-3, 2.5  # shares, and for what a model says of it
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
-AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
+AN_ERROR = -6.0  # for a drive that is an error
 STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
 OF_A_COPY = -5.0  # for a reference that is filtered from a position, or filtered to one
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
+OF_FEW_LEVELS = -5.0  # for a force that takes a few values, as what a controller adds for friction
 FLAG_AS_REFERENCE = -3.0
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (1.5, 4.5)  # a decade by which a reference is nearer to the position
@@ -84,6 +84,8 @@ def said(one: Column, role: str) -> float:
     total += _by_purpose(one, role)
     if one.bits is not None:
         total += {"F": -6.0, "u": 1.0}.get(role, 0.0)
+    if len(one.levels) <= FEW_LEVELS and role == "F":
+        total += OF_FEW_LEVELS
     if one.flag:
         driven = role == "u" and "command" in head.means
         total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else RULED_OUT
@@ -172,22 +174,19 @@ def of_a_motor(one: Column) -> float:
 
 def limits(pairs: Pairs) -> dict[int, int]:
     """Commands before a limiter or a sum: what comes out of it, each by its place."""
-    likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
+    likely = [(max(said(one, "u"), said(one, "F")), k) for k, one in enumerate(pairs.signals)]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
 
 
 def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
-    """Log-odds of what drives a body, and is not called so, by what it is of other signals: no
-    error, no velocity, and not what stands before a limiter (behind: what comes out, for each)."""
-    head = pairs.signals[k].header
+    """Log-odds of what drives a body by what it is of others: what stands before no limiter or sum
+    (behind: what comes out, for each), and, where nothing calls it a drive, is no error."""
+    head, before = pairs.signals[k].header, BEFORE_LIMIT if k in behind else 0.0
     drive = head.unit is not None and head.unit.quantity in ("force", "command")
     if drive or max(head.means.get("force", 0.0), head.means.get("command", 0.0)) >= BY_UNIT / 2:
-        return 0.0
-    bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
-    rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
-    error = (AN_ERROR if k in pairs.errors else 0.0) + (BEFORE_LIMIT if k in behind else 0.0)
-    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY else 0.0)
+        return before
+    return before + (AN_ERROR if k in pairs.errors else 0.0)
 
 
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
@@ -220,8 +219,6 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
                            0.0, MOST_LEFT))  # fmt: skip
     if law.friction is None:
         return score - 2.0 + (A_VELOCITY if v_share > ALL_VELOCITY else 0.0)
-    if law.share > ALL_FRICTION and abs(law.inertia) < NO_INERTIA:
-        score -= A_FRICTION
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
     decades = float(np.log10(max(law.friction, 1e-9) / USUAL_FRICTION))
     score += float(np.clip(A_DECADE_OF_FRICTION * decades, LEAST_OF_FRICTION, A_DECADE_OF_FRICTION))
@@ -240,7 +237,8 @@ def ahead_of(seen: Seen, k: int) -> float:
     """Log-odds that a column is the position's reference: alike, ahead of it, without noise."""
     y, one = seen.y, seen.pairs.signals[k]
     if abs(seen.pairs.alike[seen.at, k]) < LEAST_ALIKE:
-        return -3.0
+        own = one.header.unit or one.header.means.get("position", 0.0) >= SURE
+        return -3.0 if own else RULED_OUT  # a target of what the log has not
     found = seen.lead(k)
     called = one.header.purpose == "reference"
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
@@ -250,8 +248,6 @@ def ahead_of(seen: Seen, k: int) -> float:
     if not called and (found.samples <= 0.3 or _of_place_alone(one.x, y.x)):
         return RULED_OUT  # another sensor of the position, or a height of the arm
     score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
-    if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
-        score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
     rough = one.noise / max(float(np.std(one.x)), 1e-300)
