@@ -49,6 +49,7 @@ from identification.thresholds import (
     MATERIAL,
     OF_ACCOUNT,
     PENALTY,
+    TWICE,
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
@@ -244,7 +245,7 @@ def _beside_friction(found: LaggedRows) -> Sequence[int]:
         found.blocks, lambda kept: np.log(found.least(SPRING, kept) / found.least(GRAVITY, kept))
     )
     more = float(np.log(weight / spring))
-    if explains(plain, spring) and more > NORMAL_95 * float(spread_of_left_out(each)):
+    if explains(plain, spring) and more > TWICE * float(spread_of_left_out(each)):
         return SPRING
     if not explains(plain, weight):
         return PLAIN

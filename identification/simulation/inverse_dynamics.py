@@ -17,7 +17,7 @@ from identification.simulation.effect_table import effect_table, signal_table
 
 REVERSALS = 2  # substitutions by which a transducer's reading is inverted
 # Of a force on which its own friction depends: at most, and of the largest what is near enough
-MOST_SUBSTITUTIONS, CONVERGED = 20, 1e-9
+MOST_SUBSTITUTIONS, OF_LARGEST_FORCE = 20, 1e-9
 
 
 def force_needed(
@@ -43,7 +43,7 @@ def force_needed(
         second = _opposed(log, once, plant, how, falling) - once
         bend = second - first  # from each to the next it is nearer by the same share
         force = once + np.where(bend != 0.0, -first * second / np.where(bend, bend, 1.0), second)
-        if float(np.max(np.abs(second))) <= CONVERGED * float(np.max(np.abs(force))):
+        if float(np.max(np.abs(second))) <= OF_LARGEST_FORCE * float(np.max(np.abs(force))):
             break
     return force
 

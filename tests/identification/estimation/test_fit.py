@@ -13,6 +13,7 @@ from identification.errors import BadLog, NotIdentifiable
 from identification.estimation import fit as fitting
 from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
+from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.run_or_equation import LeftOfEquation, left_by
@@ -264,7 +265,7 @@ def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch)
     """What answers for a motor whose run is lost with so many of the five known, in a band that
     takes the sliding; its equation of motion leaves far more than noise too."""
     recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
-    equation = replace(run_or_equation.fit_imposed(recorded, "lost"), chi_square=1e3)
+    equation = replace(fit_imposed(recorded, "lost"), chi_square=1e3)
     none = Estimate(None, "N", reason="found 1, but the interval is wider")
     run = replace(
         equation, friction=replace(NINE, dv_p=10.0, dv_n=-10.0),
