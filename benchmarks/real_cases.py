@@ -14,8 +14,9 @@ from benchmarks.yardstick import Terms
 from workbench.cards.card import Card, load_card
 from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
 
-TABLE = Path(__file__).with_suffix(".toml").with_name("real.toml")
-Group = Literal["rig", "case"]
+TABLE = Path(__file__).with_name("real.toml")
+SPLITS = TABLE.with_name("real_splits.toml")
+Group = Literal["rig", "case", "split"]
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,13 @@ class Case:
     def home(self) -> Path:
         """The folder of its files."""
         data = Path(os.environ[DATA_VARIABLE])
-        return data / self.folder if self.group == "rig" else cases_folder()
+        return cases_folder() if self.group == "case" else data / self.folder
 
     @property
     def there(self) -> bool:
         """Whether its first file is."""
         folder = self.home
-        if self.group == "rig" and not self.folder:
+        if self.group != "case" and not self.folder:
             folder = folder / str(self.card)
         return (folder / self.train[0].file).is_file()
 
@@ -106,9 +107,13 @@ def cases_folder() -> Path:
 
 
 def every_case(table: Path = TABLE) -> tuple[Case, ...]:
-    """All of the table."""
-    with table.open("rb") as file:
-        return tuple(_case(entry) for entry in tomllib.load(file)["case"])
+    """All of the table, and the other splits of its rigs."""
+    cases = tomllib.loads(table.read_text("utf-8"))["case"]
+    named = {one["name"]: one for one in cases}
+    splits = tomllib.loads(SPLITS.read_text("utf-8"))["split"] if table == TABLE else []
+    looked = {"init": None, "doctor": None}  # at the rig's own
+    others = [{**named[one["of"]], **looked, **one, "group": "split"} for one in splits]
+    return tuple(_case(entry) for entry in (*cases, *others))
 
 
 def _case(entry: Mapping[str, Any]) -> Case:
@@ -171,7 +176,7 @@ def _card(case: Case, work: Path) -> Card | None:
 
 
 def _found(part: Part, case: Case, card: Card | None) -> Path:
-    if card is not None and case.group == "rig" and not case.folder:
+    if card is not None and case.group != "case" and not case.folder:
         return find_data(part.file, card)
     return case.home / part.file
 

@@ -141,3 +141,11 @@ def test_a_force_that_is_made_proves_nothing() -> None:
 def test_every_entry_of_the_table_is_read() -> None:
     names = [one.name for one in every_case(TABLE)]
     assert len(names) == len(set(names)) > 25
+
+
+def test_another_split_of_a_rig_has_its_card_and_files_of_its_own() -> None:
+    named = {one.name: one for one in every_case()}
+    split, rig = named["pk_one_log"], named["seals_PK_3bar"]
+    assert (split.group, split.card, split.imposed) == ("split", rig.card, rig.imposed)
+    assert split.train != rig.train
+    assert (split.right.must, split.right.verdicts) == ((), rig.right.verdicts)
