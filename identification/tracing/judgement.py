@@ -7,11 +7,11 @@ import numpy as np
 from identification.remarks import MinorRemark
 from identification.thresholds import ASTRAY
 from identification.tracing.free_curve import free_curves
-from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.held_out import AS_LARGE_AS_FRICTION, HeldOut
 from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import predicted
 from identification.tracing.probability import is_probable, probability
+from identification.tracing.recorded_rows import driven_only
 from identification.tracing.remaining_structure import strongest
 from identification.tracing.residuals import residuals_of, run_residual
 from identification.tracing.result import Dependence, Left, Trace
@@ -105,7 +105,7 @@ def _remarks(held: HeldOut, left: Dependence) -> Iterator[str]:
             f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"
             " outside, or another loop"
         )
-    if not model.imposed and driven_only(held.logs):
+    if driven_only(held.logs):
         motor = (
             " nor a dead zone of the command be distinguishable from friction"
             if held.plain.recorded.by_motor

@@ -19,7 +19,12 @@ from identification.estimation.structure_fit import (
 )
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
-from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
+from identification.tracing.recorded_rows import (
+    RecordedRows,
+    imposed_rows,
+    told_by_load,
+    told_by_speed,
+)
 
 REFINEMENT = "the refinement of the plain model to its end"
 
@@ -58,6 +63,7 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
         model = plain_structure(rows.recorded, rng)
         library, said = told_by_speed(library, rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
+    library = told_by_load(library, rows.logs)
     if halt.reached():
         halt.left_out(REFINEMENT)
     start = model.stage

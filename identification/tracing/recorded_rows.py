@@ -16,6 +16,7 @@ from identification.estimation.recorded_logs import (
     slower_remarks,
     with_clocks,
 )
+from identification.estimation.regression.effect_columns import by_load
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.inertia import speed_ratio
 from identification.log import Log, Rig
@@ -26,6 +27,7 @@ from identification.tracing.remaining_structure import FEWEST_ROWS
 
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 DEAD_ZONES = (0.2, 0.4, 0.6, 0.8)  # quantiles of the command's size
+BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 OF_SPEED = frozenset({"v", "reversal"})
 COMMAND_SAYS_LITTLE = (
     "the command explains little of the force, so effects between command and force were not tried"
@@ -119,6 +121,22 @@ def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library,
         f" {', '.join(of_speed)} not tried; add runs at other speeds"
     )
     return {key: effect for key, effect in library.items() if key not in of_speed}, (said,)
+
+
+def driven_only(logs: Sequence[MotionLog]) -> bool:
+    """Whether the force points along the motion in all sliding but a trace of it."""
+    against = [
+        (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
+    ]
+    return bool(np.mean(np.concatenate(against)) < BRAKES)
+
+
+def told_by_load(library: Library, logs: Sequence[MotionLog]) -> Library:
+    """The library without friction in proportion to the force, where this never opposes the motion:
+    there it is a scale of all the rest."""
+    if not driven_only(logs):
+        return library
+    return {key: effect for key, effect in library.items() if not by_load(effect)}
 
 
 def _enough(logs: Sequence[MotionLog]) -> None:

@@ -26,7 +26,6 @@ RIVALS_TRIED = 3  # rivals of an effect taken that are tried in its place
 MOST_TRIED = 40  # starts of one effect
 FORCE_LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
 REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
-BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +78,6 @@ def _beside(
 def rigid(first: Mapping[str, RowFit]) -> bool:
     """Whether the body is seen at rest and does not move there: on bristles it would."""
     return REST in first and mean_square(first[REST]) < RIGID_CONTACT
-
-
-def driven_only(logs: Sequence[MotionLog]) -> bool:
-    """Whether the force points along the motion in all sliding but a trace of it."""
-    against = [
-        (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
-    ]
-    return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
 def seen_in_run(effect: Effect) -> bool:

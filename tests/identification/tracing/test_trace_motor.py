@@ -21,7 +21,7 @@ from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.signals.differentiate import resolution
 from identification.thresholds import COMPLETE
-from identification.tracing.free_run.trial_structures import driven_only
+from identification.tracing.recorded_rows import driven_only, told_by_load
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -102,7 +102,12 @@ def test_a_force_that_never_brakes_is_said_so() -> None:
     one = seen(made(6))
     assert driven_only([one])
     braking = np.where(one.log["t"] % 1.0 < 0.1, -1.0, 1.0) * one.log["F"]
-    assert not driven_only([replace(one, log=one.log.with_signals(F=braking))])
+    brakes = replace(one, log=one.log.with_signals(F=braking))
+    assert not driven_only([brakes])
+    # Friction in proportion to a force that never brakes is a scale of all the rest.
+    by_load = {"load_dependent_friction"}
+    assert told_by_load(built_in(), [one]).keys() == built_in().keys() - by_load
+    assert told_by_load(built_in(), [brakes]) == built_in()
     assert any("hardly ever opposes" in line for line in traced(made(6)).remarks)
 
 
