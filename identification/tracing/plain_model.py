@@ -61,9 +61,8 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     if imposed:
         rows = imposed_rows(rows)
         model = plain_structure(rows.recorded, rng)
-        library, said = told_by_speed(library, rows.logs)
+        library, said = told_by_speed(told_by_load(library, rows.logs), rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
-    library = told_by_load(library, rows.logs)
     if halt.reached():
         halt.left_out(REFINEMENT)
     start = model.stage

@@ -132,8 +132,8 @@ def driven_only(logs: Sequence[MotionLog]) -> bool:
 
 
 def told_by_load(library: Library, logs: Sequence[MotionLog]) -> Library:
-    """The library without friction in proportion to the force, where this never opposes the motion:
-    there it is a scale of all the rest."""
+    """The library without friction in proportion to the force, where a rig moved the body and the
+    force never opposes the motion: there the force is friction, and this a scale of all of it."""
     if not driven_only(logs):
         return library
     return {key: effect for key, effect in library.items() if not by_load(effect)}
