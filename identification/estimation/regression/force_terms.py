@@ -69,7 +69,7 @@ class ForceFit:
         """Columns of level and slope of the directions in which friction falls with speed."""
         sizes = dict(zip(self.used, self.theta.tolist(), strict=True))
         ways = zip(LEVEL_COLUMNS, VISCOUS_COLUMNS, strict=True)
-        return [(i, k) for i, k in ways if i in sizes and sizes.get(k, 0.0) < 0.0]
+        return [(i, k) for i, k in ways if sizes.get(i, 0.0) > 0.0 > sizes.get(k, 0.0)]
 
     @property
     def sd(self) -> dict[str, float]:
