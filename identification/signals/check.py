@@ -74,6 +74,15 @@ def _check_moved(log: Log, rig: Rig, first_row: int) -> None:
         raise BadLog(_jumping(log, rig, found, first_row))
 
 
+def no_force(log: Log) -> BadLog:
+    """What to say of a log of which no applied force is known."""
+    return BadLog(
+        f"{log.name}: no applied force; give the card F or both pressures, or, of a motor,"
+        " force_per_command in [rig] (1 where it is not known: forces are then in units of the"
+        " command)"
+    )
+
+
 def check_driven(logs: Sequence[Log]) -> None:
     """Pass logs of one machine of which the applied force is known and changes, in a log or from
     one to the next.
@@ -83,10 +92,7 @@ def check_driven(logs: Sequence[Log]) -> None:
     """
     for log in logs:
         if "F" not in log:
-            raise BadLog(
-                f"{log.name}: no applied force; give the card F, both pressures, or"
-                " force_per_command with u"
-            )
+            raise no_force(log)
     if are_steps(logs):
         _check_steps(logs)
     for log in logs:

@@ -22,6 +22,7 @@ from identification.model.karnopp import VISCOUS_NAMES, Karnopp
 from identification.model.plant import Motor, Plant
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
+from identification.signals.check import no_force
 from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start, measured_states
@@ -317,9 +318,7 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
         return log
     force = applied_force(log, rig)
     if force is None:
-        raise BadLog(
-            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
-        )
+        raise no_force(log)
     return log.with_signals(F=force)
 
 
