@@ -164,7 +164,7 @@ def _traced(
     with halt.closing():
         told = judgement(held)
         told = _for_now(told, held, halt.not_tried) if halt.not_tried else told
-    return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
+    return replace(told, remarks=(doubt, *told.remarks)) if doubt else told
 
 
 def _slides(log: Log, rig: Rig) -> bool:
