@@ -140,7 +140,8 @@ def fewest_terms(data: Sequence[Rows], late: Lateness | None = None) -> ForceFit
         at = [fuller.used.index(column) for column in best.used]
         theta, square = fuller.theta[at], np.diag(fuller.covariance)[at]
         separate = NORMAL_95 * np.sqrt(square) <= HALF * np.abs(theta)
-        wider = (theta - logged.theta) ** 2 + np.maximum(square - np.diag(logged.covariance), 0.0)
+        off = np.maximum(theta, 0.0) - logged.theta  # no level is below 0
+        wider = off**2 + np.maximum(square - np.diag(logged.covariance), 0.0)
         beside = np.where(separate, np.maximum(beside, wider), beside)
     covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
     return replace(best, covariance=covariance, share=every[-1].share)

@@ -51,6 +51,19 @@ def test_friction_that_falls_with_speed_has_its_level_where_it_was_logged() -> N
     assert (logged.theta[1], logged.sd["F_cn"]) == (found.theta[1], found.sd["F_cn"])
 
 
+def test_a_level_that_viscous_friction_leaves_open_is_so_down_to_none() -> None:
+    """Strokes at 12 to 14 mm/s of about 14 N, steep over so little: beside F_v the level is -103 N,
+    to which the interval reached, and as far above."""
+    rng, n = np.random.default_rng(4), 400
+    v = rng.uniform(12e-3, 14e-3, n) * np.where(np.arange(n) % 2, 1.0, -1.0)
+    up = v > 0.0
+    X = np.column_stack([np.zeros(n), 1.0 * up, -1.0 * ~up, v * up, v * ~up])
+    force = np.sign(v) * (14.0 + 9e3 * (np.abs(v) - 13e-3)) + rng.standard_normal(n)
+    found = fewest_terms([Rows(force, X, np.full(n, 1.0), np.arange(n) // 40, np.abs(v), FIVE)])
+    assert found.used == (1, 2)
+    assert 14.0 < found.sd["F_cp"] < 20.0
+
+
 @pytest.mark.parametrize("lag", [-5e-4, 0.0, 5e-4])
 def test_a_force_that_acts_within_its_sample_is_no_damping(lag: float) -> None:
     """Sines of a body of 0.02 kg, its force seen by half a millisecond early or late: m w^2 lag is
