@@ -36,13 +36,13 @@ from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, active, stage, turn
 from identification.drift.drift_result import DriftTest
 from identification.drift.drift_test import drift_test
 from identification.drift.own_logs import with_own_logs
-from identification.drift.reference_model import COULOMB, ReferenceModel
+from identification.drift.reference_model import ReferenceModel
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
 from identification.estimation.fit import fit_plant
 from identification.log import Log
-from identification.model.karnopp import Karnopp
+from identification.model.karnopp import COULOMB_NAMES, Karnopp
 
 PARTS = ("stable", "jump", "slow", "structure", "length", "lacking", "unseen")
 OWN_MACHINES = {"lacking": "stage", "unseen": "rotary"}
@@ -120,7 +120,7 @@ def tested(
     outcome = Outcome(
         one, seed, what, number, found.verdict, names, found.found_by, found.chi_square,
         seconds, len(found.shifts),
-        max(found.could_have_seen.get(name, np.inf) for name in COULOMB),
+        max(found.could_have_seen.get(name, np.inf) for name in COULOMB_NAMES),
     )  # fmt: skip
     return outcome, found
 

@@ -106,11 +106,11 @@ def cases_folder() -> Path:
     return Path(os.environ[DATA_VARIABLE]).parent / "cases"
 
 
-def every_case(table: Path = TABLE) -> tuple[Case, ...]:
+def every_case() -> tuple[Case, ...]:
     """All of the table, and the other splits of its rigs."""
-    cases = tomllib.loads(table.read_text("utf-8"))["case"]
+    cases = tomllib.loads(TABLE.read_text("utf-8"))["case"]
     named = {one["name"]: one for one in cases}
-    splits = tomllib.loads(SPLITS.read_text("utf-8"))["split"] if table == TABLE else []
+    splits = tomllib.loads(SPLITS.read_text("utf-8"))["split"]
     looked = {"init": None, "doctor": None}  # at the rig's own
     others = [{**named[one["of"]], **looked, **one, "group": "split"} for one in splits]
     return tuple(_case(entry) for entry in (*cases, *others))

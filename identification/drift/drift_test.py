@@ -31,10 +31,11 @@ from identification.drift.mewma import (
 )
 from identification.drift.own_logs import own_misfit
 from identification.drift.practical_margin import Change
-from identification.drift.reference_model import COULOMB, ReferenceModel
+from identification.drift.reference_model import ReferenceModel
 from identification.drift.single_log import LogChange, detectable_together
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
+from identification.model.karnopp import COULOMB_NAMES
 from identification.thresholds import SEEN
 
 Z_95 = float(norm.isf(0.025))
@@ -216,7 +217,7 @@ def too_coarse(
     to be seen, or of a model with neither at least one parameter.
     """
     limit = settings.to_be_seen
-    asked = [name for name in COULOMB if name in model.names and name not in model.untold]
+    asked = [name for name in COULOMB_NAMES if name in model.names and name not in model.untold]
     if max([seen.get(name, np.inf) for name in asked] or [min(seen.values())]) <= limit:
         return ""
     said = ", ".join(

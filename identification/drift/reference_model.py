@@ -12,7 +12,6 @@ from identification.model.estimates import Drive
 from identification.model.karnopp import VISCOUS_NAMES
 from identification.model.plant import Plant, units_of
 
-COULOMB = ("F_cp", "F_cn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
 SMALL_BESIDE = 0.1  # of the largest friction force, or of an effect's typical parameter
 

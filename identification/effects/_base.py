@@ -117,6 +117,11 @@ class Effect:
         """What it means to act where it acts."""
         return PLACES[self.acts]
 
+    @property
+    def load_dependent(self) -> bool:
+        """Whether it is friction that depends on the applied force."""
+        return self.place.rubs and "F" in self.depends_on
+
     def named(self, role: Role) -> str | None:
         """Name of the parameter in this role, None where it has none."""
         return next((p.name for p in self.params if p.role == role), None)

@@ -10,7 +10,7 @@ from identification.effects._places import Place
 from identification.log import Log
 from identification.model.inverse_model import Smoothing, force_predicted
 from identification.model.plant import Motor, Plant
-from identification.signals.differentiate import differentiate
+from identification.signals.differentiate import Motion, differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
@@ -33,14 +33,13 @@ def force_needed(
     """
     if not (plant.effects or any(falling)):
         return force_predicted(log, plant.friction, how)
-    force = np.asarray(log["F"])
-    by_load = any(one.effect.place.rubs and "F" in one.effect.depends_on for one in plant.effects)
-    if not by_load:
-        return _opposed(log, force, plant, how, falling)
+    force, motion = np.asarray(log["F"]), differentiate(log["y"], log.h, how.cutoff, how.method)
+    if not any(one.effect.load_dependent for one in plant.effects):
+        return _opposed(log, force, plant, motion, falling)
     for _ in range(MOST_SUBSTITUTIONS):
-        once = _opposed(log, force, plant, how, falling)
+        once = _opposed(log, force, plant, motion, falling)
         first = once - force
-        second = _opposed(log, once, plant, how, falling) - once
+        second = _opposed(log, once, plant, motion, falling) - once
         bend = second - first  # from each to the next it is nearer by the same share
         force = once + np.where(bend != 0.0, -first * second / np.where(bend, bend, 1.0), second)
         if float(np.max(np.abs(second))) <= OF_LARGEST_FORCE * float(np.max(np.abs(force))):
@@ -49,12 +48,10 @@ def force_needed(
 
 
 def _opposed(
-    log: Log, force: Array, plant: Plant, how: Smoothing, falling: tuple[float, float]
+    log: Log, force: Array, plant: Plant, motion: Motion, falling: tuple[float, float]
 ) -> Array:
     """As `force_needed`, of friction as this applied force makes it [N], (n,)."""
-    p = plant.friction
-    motion = differentiate(log["y"], log.h, how.cutoff, how.method)
-    v = motion.v
+    p, v = plant.friction, motion.v
     d = np.where(v >= p.dv_p, 1.0, np.where(v <= p.dv_n, -1.0, 0.0))
     blank = np.zeros(len(log))
     signals = {"u": blank, **log.signals, "F": force, "y": motion.y, "v": v, "d": d}

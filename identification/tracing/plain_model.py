@@ -22,8 +22,8 @@ from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import (
     RecordedRows,
     imposed_rows,
-    told_by_load,
     told_by_speed,
+    without_load_dependent,
 )
 
 REFINEMENT = "the refinement of the plain model to its end"
@@ -61,7 +61,7 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     if imposed:
         rows = imposed_rows(rows)
         model = plain_structure(rows.recorded, rng)
-        library, said = told_by_speed(told_by_load(library, rows.logs), rows.logs)
+        library, said = told_by_speed(without_load_dependent(library, rows.logs), rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
     if halt.reached():
         halt.left_out(REFINEMENT)

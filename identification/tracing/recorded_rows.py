@@ -16,7 +16,6 @@ from identification.estimation.recorded_logs import (
     slower_remarks,
     with_clocks,
 )
-from identification.estimation.regression.effect_columns import by_load
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.inertia import speed_ratio
 from identification.log import Log, Rig
@@ -131,12 +130,12 @@ def driven_only(logs: Sequence[MotionLog]) -> bool:
     return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
-def told_by_load(library: Library, logs: Sequence[MotionLog]) -> Library:
+def without_load_dependent(library: Library, logs: Sequence[MotionLog]) -> Library:
     """The library without friction in proportion to the force, where a rig moved the body and the
     force never opposes the motion: there the force is friction, and this a scale of all of it."""
     if not driven_only(logs):
         return library
-    return {key: effect for key, effect in library.items() if not by_load(effect)}
+    return {key: effect for key, effect in library.items() if not effect.load_dependent}
 
 
 def _enough(logs: Sequence[MotionLog]) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.real_cases import TABLE, Case, Part, Right, Truth, every_case
+from benchmarks.real_cases import Case, Part, Right, Truth, every_case
 from benchmarks.real_judge import false_proof, intervals, questions
 from benchmarks.real_report import row, summary, worse
 from benchmarks.real_shares import command_for
@@ -139,7 +139,7 @@ def test_a_force_that_is_made_proves_nothing() -> None:
 
 
 def test_every_entry_of_the_table_is_read() -> None:
-    names = [one.name for one in every_case(TABLE)]
+    names = [one.name for one in every_case()]
     assert len(names) == len(set(names)) > 25
 
 

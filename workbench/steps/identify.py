@@ -119,9 +119,9 @@ def identify(
 def _for_prediction(fit: KarnoppFit) -> KarnoppFit:
     """A fit of which no parameter is identifiable, said to be of use for prediction alone; raises
     NotIdentifiable where it leaves most of the force, so that it predicts nothing either."""
-    reasons = {n: fit.estimates[n].reason for n in ("m", "F_cp") if n in fit.estimates}
-    first = "; ".join(f"{n}: {reason}" for n, reason in reasons.items())
     if fit.left is None or is_unexplained(fit.left[0]):
+        reasons = {n: fit.estimates[n].reason for n in ("m", "F_cp") if n in fit.estimates}
+        first = "; ".join(f"{n}: {reason}" for n, reason in reasons.items())
         raise NotIdentifiable(f"{NONE_IDENTIFIABLE}: {first}")
     remark = f"{NONE_IDENTIFIABLE}; the model predicts the force of motion like this, and no more"
     return replace(fit, remarks=(remark, *fit.remarks))

@@ -33,12 +33,8 @@ def equations_of(effect: Effect, by_command: bool, by_motor: bool) -> tuple[str,
 
 def in_columns(effect: Effect) -> bool:
     """Whether its linear parameters are columns of a regression."""
-    return effect.place.adds and not by_load(effect)
-
-
-def by_load(effect: Effect) -> bool:
-    """Whether it is friction that depends on the applied force, which is the regression's b."""
-    return effect.place.rubs and "F" in effect.depends_on
+    # The force is the regression's b.
+    return effect.place.adds and not effect.load_dependent
 
 
 def slow_motion(effect: Effect) -> bool:
@@ -57,7 +53,7 @@ def shape_params(effect: Effect) -> list[Param]:
         p
         for p in effect.params
         if not (p.linear and in_columns(effect))
-        and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
+        and not (p.name == "asymmetry" and (split(effect) or effect.load_dependent))
         and p.name not in AT_REST  # no equation of sliding identifies it
     ]
 

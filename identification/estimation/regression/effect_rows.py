@@ -13,7 +13,6 @@ from identification.estimation.regression.breakaway import breakaway_limits
 from identification.estimation.regression.effect_columns import (
     LEAST_LEFT_BY_LOAD,
     Values,
-    by_load,
     equations_of,
     needs_rounds,
     split,
@@ -196,7 +195,7 @@ def with_effect(
         return behind
     if split(effect):
         shape = {**shape, "asymmetry": 0.0}
-    if by_load(effect):
+    if effect.load_dependent:
         return _implicit(effect, shape, one, stage, rows)
     if effect.place.in_stops:
         own, fixed = _stiction(effect, shape, i, stage)

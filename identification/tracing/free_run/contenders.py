@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.effects._base import MAX_SIGNALS, Acting, Effect
 from identification.errors import UserError
-from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD, by_load
+from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit, descended, refit
 from identification.estimation.windowed_run.run_errors import judge, loss
@@ -45,7 +45,7 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
     for values in trial.values:
         try:
             acting = trial.effect.acting(values)
-            base = less_load(trial.base, acting) if by_load(trial.effect) else trial.base
+            base = less_load(trial.base, acting) if trial.effect.load_dependent else trial.base
             plants.append(replace(base, effects=(*base.effects, acting)))
         except UserError:
             continue
@@ -96,7 +96,7 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
         if on_bristle(plant):
             return _stops_searched(plant, setting)
         return descended(plant, setting.short, setting.drive).plant
-    if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
+    if seen_in_run(effect) and not effect.load_dependent:  # the plain band and limits stood for it
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
     return plant

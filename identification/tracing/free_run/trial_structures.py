@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect, Param
 from identification.estimation.regressed_plant import inside
-from identification.estimation.regression.effect_columns import by_load, slow_motion
+from identification.estimation.regression.effect_columns import slow_motion
 from identification.estimation.regression.equation_rows import REST, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.structure_fit import FittedStructure
@@ -88,7 +88,7 @@ def seen_in_run(effect: Effect) -> bool:
     """
     place = effect.place  # on signals, in place of sticking, at breakaway: in the run above all
     in_run = place.on_signals or place.at_rest
-    return in_run or by_load(effect) or slow_motion(effect)
+    return in_run or effect.load_dependent or slow_motion(effect)
 
 
 def grid(effect: Effect, base: Plant, logs: Sequence[MotionLog]) -> list[dict[str, float]]:

@@ -21,7 +21,7 @@ from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.signals.differentiate import resolution
 from identification.thresholds import COMPLETE
-from identification.tracing.recorded_rows import driven_only, told_by_load
+from identification.tracing.recorded_rows import driven_only, without_load_dependent
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -106,8 +106,8 @@ def test_a_force_that_never_brakes_is_said_so() -> None:
     assert not driven_only([brakes])
     # Friction in proportion to a force that never brakes is a scale of all the rest.
     by_load = {"load_dependent_friction"}
-    assert told_by_load(built_in(), [one]).keys() == built_in().keys() - by_load
-    assert told_by_load(built_in(), [brakes]) == built_in()
+    assert without_load_dependent(built_in(), [one]).keys() == built_in().keys() - by_load
+    assert without_load_dependent(built_in(), [brakes]) == built_in()
     assert any("hardly ever opposes" in line for line in traced(made(6)).remarks)
 
 

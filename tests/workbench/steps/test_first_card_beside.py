@@ -1,6 +1,5 @@
 """A first card by what columns are of each other: counters, sums, set points."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,27 +9,13 @@ from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
 from identification.errors import BadLog
-from workbench.steps.first_card.proposal import Proposal, proposed
-
-T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
-Cells = Sequence[float] | Sequence[str] | Array
+from tests.workbench.steps.first_card_columns import T, propose, roles
 
 
 @pytest.fixture(scope="module")
 def joint() -> dict[str, Array]:
     """The signals of a joint behind a limited loop, in SI."""
     return machine(np.random.default_rng(5), T, TABLES["choose"][0])
-
-
-def propose(folder: Path, headers: str, *columns: Cells) -> Proposal:
-    cells = [[one if isinstance(one, str) else f"{one:.9g}" for one in own] for own in columns]
-    path = folder / "run.csv"
-    path.write_text("\n".join([headers, *map(",".join, zip(*cells, strict=True))]), "utf-8")
-    return proposed(path)
-
-
-def roles(found: Proposal) -> dict[str, str | int]:
-    return {one.name: one.column for one in found.signals}
 
 
 def test_a_number_of_strokes_is_no_position(joint: dict[str, Array], tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """A first card by what headers say together, and by what the columns do where these say nothing."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +9,8 @@ from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
 from identification.errors import BadLog
+from tests.workbench.steps.first_card_columns import T, propose, roles
 from workbench.steps.first_card.names import read_together
-from workbench.steps.first_card.proposal import Proposal, proposed
-
-T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
-Cells = Sequence[float] | Sequence[str] | Array
 
 
 @pytest.fixture(scope="module")
@@ -27,17 +23,6 @@ def joint() -> dict[str, Array]:
 def other() -> dict[str, Array]:
     """Those of another joint."""
     return machine(np.random.default_rng(6), T, TABLES["choose"][0])
-
-
-def propose(folder: Path, headers: str, *columns: Cells) -> Proposal:
-    cells = [[one if isinstance(one, str) else f"{one:.9g}" for one in own] for own in columns]
-    path = folder / "run.csv"
-    path.write_text("\n".join([headers, *map(",".join, zip(*cells, strict=True))]), "utf-8")
-    return proposed(path)
-
-
-def roles(found: Proposal) -> dict[str, str | int]:
-    return {one.name: one.column for one in found.signals}
 
 
 def test_what_all_headers_begin_with_is_the_machines_name(
