@@ -156,7 +156,8 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    made = without_reversals(settled_rows(recorded.logs))
+    every = settled_rows(recorded.logs)
+    made = without_reversals(every)
     rows = [one.rows for one in made]
     up, down = ways_of(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:
@@ -166,7 +167,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
             " directions"
         )
     late = None if recorded.held else Lateness.of([one.windows for one in made], recorded.plain)
-    return fewest_terms(rows, late), rows
+    return fewest_terms(rows, late, stacked([one.rows for one in every])), rows
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
@@ -224,9 +225,11 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
     return replace(fit, estimates=found)
 
 
-def _slightest_mass(rows: Rows) -> float:
-    """A mass [kg] whose inertia is next to nothing of the force."""
-    force, a = (float(np.sqrt(np.mean(x**2))) for x in (rows.b, rows.X[:, 0]))
+def _slightest_mass(rows: Rows, h: float) -> float:
+    """A mass [kg] whose inertia is next to nothing of the force, even where the fastest motion of
+    the rows would reverse from one sample, h [s], to the next: at constant speed the windows' own
+    acceleration is next to none, by which a mass of many kg would be slight."""
+    force, a = float(np.sqrt(np.mean(rows.b**2))), 2.0 * usual_fastest(rows.speed) / h
     return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
 
 
@@ -234,7 +237,7 @@ def _assumed(center: Array, recorded: RecordedLogs, rows: Rows) -> Array:
     """All nine for simulation: the five of sliding of their signs, a band far below fast sliding,
     stick just above slip."""
     first = first_plant(recorded).friction
-    m = center[0] if center[0] > 0 else _slightest_mass(rows)
+    m = center[0] if center[0] > 0 else _slightest_mass(rows, recorded.plain[0].h)
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)

@@ -32,7 +32,13 @@ from identification.estimation.regression.motion_log import again
 from identification.log import Log
 from identification.model.plant import Plant
 from identification.signals.kalman import Chain, N, innovations, log_densities, smoothed
-from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
+from identification.simulation.inverse_dynamics import (
+    Along,
+    force_along,
+    of_body,
+    opposing_force,
+    with_motor_force,
+)
 from identification.thresholds import AS_GOOD_AS_NONE
 
 MEMORIES = (0.02, 0.06, 0.2, 0.6, 2.0, 6.0)  # s, that tau may be
@@ -249,15 +255,15 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     if log is not one.log:
         one = replace(again(one, log), noise=one.noise)
     y, v, a, d = (one.signals[name] for name in ("smooth", "v", "a", "d"))
-    opposed, F, n = opposing_force(log, plant, y, v, d), np.asarray(log["F"]), len(log)
-    slides = _slides(one, slowest)
+    F, n, slides = np.asarray(log["F"]), len(log), _slides(one, slowest)
     p, viscous = plant.friction, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
     noise_F = max(one.noise.F, LEAST_NOISE_F * _largest(plant, log))
     if one.imposed:
-        left, none = p.m * a + viscous * v + opposed - F, np.zeros((N, N))
+        left, none = force_along(log, F, plant, Along(y, v, a, d)) - F, np.zeros((N, N))
         known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N), np.zeros(N))
         return _Known(one, 0, left, np.full(n, noise_F**2), slides, slides, ~slides, known)
     free = ~(slides & np.append(slides[1:], False))
+    opposed = opposing_force(log, plant, y, v, d)
     force = (F if one.held else _over_sample(F)) - _over_sample(opposed)
     push, A = _pushed(p.m, viscous, log.h)
     c = np.where(free, 0.0, force)[:, np.newaxis] * push

@@ -16,6 +16,7 @@ from identification.estimation.estimates import widened
 from identification.estimation.imposed_motion import WHY_NOT
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import FIVE
+from identification.estimation.regression.force_terms import of_one_speed
 from identification.estimation.regression.motion_rows import rows_and_windows
 from identification.estimation.regression.weighted_rows import (
     OVERLAP,
@@ -28,7 +29,7 @@ from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.signals.steps import MEDIAN_OF_NOISE
-from identification.thresholds import FOURFOLD, HALF, MATERIAL, NEARLY_ALL, OF_ACCOUNT, TWICE
+from identification.thresholds import FOURFOLD, HALF, MATERIAL, OF_ACCOUNT
 
 COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
 TURNING_WHY = (
@@ -70,7 +71,10 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         elif _is_a_springs(every, y, p.m):
             reasons["m"] = SPRING_WHY.format(p.m, units_of(recorded.rig.motion)["m"])
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
-        if _of_one_speed(every.at(kept), way[1]) and _by_turning(every, kept, way[1]):
+        stated = fit.imposed and fit.estimates[FIVE[way[1]]].known
+        stated = stated and _is_mostly(every, kept, way[1])
+        together = stated or _by_turning(every, kept, way[1])
+        if together and of_one_speed(every.at(kept), way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
     if recorded.by_command or (fit.imposed and not recorded.held):
@@ -113,22 +117,17 @@ def _of_any_instant(fit: KarnoppFit, rate: Array, instant_sd: float) -> KarnoppF
     return replace(fit, estimates={**fit.estimates, **wider}, covariance=covariance)
 
 
-def _of_one_speed(steady: Rows, column: int) -> bool:
-    """Whether nearly all rows of steady sliding have about the same speed."""
-    speed = np.abs(steady.X[steady.X[:, column] != 0.0, column])
-    if not len(speed):
-        return False
-    low, high = np.quantile(speed, (OF_ACCOUNT, NEARLY_ALL))
-    return bool(high < TWICE * low)
-
-
 def _by_turning(every: Rows, steady: BoolArray, column: int) -> bool:
     """Whether rows of steady sliding (r,), though they are most of those in which a column is,
     have next to nothing of the information on its coefficient."""
-    some = every.at(steady)
-    if len(some.b) <= HALF * np.count_nonzero(every.X[:, column]):
+    if not _is_mostly(every, steady, column):
         return False
-    return _information(some, column) < OF_ACCOUNT * _information(every, column)
+    return _information(every.at(steady), column) < OF_ACCOUNT * _information(every, column)
+
+
+def _is_mostly(every: Rows, steady: BoolArray, column: int) -> bool:
+    """Whether rows of steady sliding (r,) are most of those in which a column is."""
+    return bool(np.count_nonzero(steady) > HALF * np.count_nonzero(every.X[:, column]))
 
 
 def _is_a_springs(every: Rows, y: Array, m: float) -> bool:

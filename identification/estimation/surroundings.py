@@ -23,9 +23,11 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
 from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
+from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
     OVERLAP,
     left_out,
+    left_unseen,
     solve_rows,
     spread_of_left_out,
     stacked,
@@ -62,6 +64,7 @@ TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
+SINE = (*PLAIN, 6)
 OF_TAKEN_OUT = 1e-3  # of a value, by which it errs where a force was taken out first
 WHOLE_NUMBER = "exact: a whole number of times in a turn"
 
@@ -113,24 +116,41 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         lag, found = (other, current) if sampled else (lag, found)
     h = logs[0].h
     gives = rig.force_per_command if held else None
-    theta, sd = _with_spread(found, used, lag.value)
+    theta, each = _with_left_out(found, used, lag.value)
     force = sine = cosine = NOT_SHOWN
     if used is GRAVITY:
         late = Surroundings(Size(lag.value * h), gives=gives, sampled=sampled)
         in_time = [again(one, late.of_one_instant(one.log)) for one in moved]
-        theta, sd = _beside_gravity(in_time) or (theta, sd)
+        theta, each = _beside_gravity(in_time) or (theta, each)
+        sd = spread_of_left_out(each)
         sine, cosine = (Size(float(theta[i]), float(sd[i])) for i in (-2, -1))
-    up, down = float(theta[1]), float(theta[2])
     ways = np.concatenate([one.up for one in moved])
-    both = bool(np.any(ways) and not np.all(ways))
-    if both and larger_than_friction(up, down):
-        always = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
-        if stands_out(always.value, always.sd):
-            # As far as friction is equal in both directions, which it is about.
-            unequal = OF_ACCOUNT * 0.5 * abs(up + down) / NORMAL_95
-            force = replace(always, sd=float(np.hypot(always.sd, unequal)))
+    if bool(np.any(ways) and not np.all(ways)):
+        usual = float(np.median(np.concatenate([one.speed for one in moved])))
+        force = _constant_force(theta, each, usual)
     lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold.value * h, hold.sd * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled, held=hold is not None)
+
+
+def _constant_force(theta: Array, each: Array, usual: float) -> Size:
+    """A constant force larger than friction, which it takes below 0 in one direction, by
+    coefficients (k,) and those without each block (blocks, k); nothing where there is none.
+
+    By the Coulomb levels; by friction at the usual speed [m/s] where this is far surer: of strokes
+    of one speed the levels are not known. Spread: Tukey (1958); ours.
+    """
+    found = NOT_SHOWN
+    for speed in (0.0, usual):
+        up, down = np.zeros(len(theta)), np.zeros(len(theta))
+        up[[1, 3]] = down[[2, 4]] = 1.0, speed
+        friction, half = (float(up @ theta), float(down @ theta)), 0.5 * (down - up)
+        always = Size(float(half @ theta), float(spread_of_left_out(each @ half)))
+        shown = larger_than_friction(*friction) and stands_out(always.value, always.sd)
+        if shown and (not found.value or always.sd < HALF * found.sd):
+            # As far as friction is equal in both directions, which it is about.
+            unequal = OF_ACCOUNT * 0.5 * abs(sum(friction)) / NORMAL_95
+            found = replace(always, sd=float(np.hypot(always.sd, unequal)))
+    return found
 
 
 def _looked_far(
@@ -226,13 +246,18 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
 
 
 def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
-    """Coefficients of friction and gravity (7,) and their deviations, in the windows of sliding
+    """Coefficients of friction and gravity (7,) and without each block, in the windows of sliding
     that suit these logs best: wide ones would leave out quick motion, and let gravity have what
     friction makes of it. None where there are too few."""
     rows = stacked([one.rows for one in settled_rows(moved, gravity=True)])
     if len(rows.b) < FEWEST_WINDOWS:
         return None
-    return solve_rows(rows).theta, spread_of_left_out(without_each_block(rows))
+    theta, each = solve_rows(rows).theta, without_each_block(rows)
+    plain = replace(rows, X=rows.X[:, :-1], names=rows.names[:-1])
+    if rms(left_unseen(rows)) < rms(left_unseen(plain)):
+        return theta, each
+    alone, each = solve_rows(plain).theta, without_each_block(plain)
+    return np.append(alone, 0.0), np.column_stack([each, np.zeros(len(each))])
 
 
 def _beside_friction(found: LaggedRows) -> Sequence[int]:
@@ -249,9 +274,15 @@ def _beside_friction(found: LaggedRows) -> Sequence[int]:
         return SPRING
     if not explains(plain, weight):
         return PLAIN
-    theta, sd = _with_spread(found, GRAVITY, 0.0)
-    significant = any(stands_out(float(theta[i]), float(sd[i])) for i in (-2, -1))
+    sizes = [(SINE, -1), (GRAVITY, -2), (GRAVITY, -1)]
+    significant = any(_is_significant(found, used, i) for used, i in sizes)
     return GRAVITY if significant else PLAIN
+
+
+def _is_significant(found: LaggedRows, used: Sequence[int], i: int) -> bool:
+    """Whether a coefficient of these columns is significantly different from 0."""
+    theta, each = _with_left_out(found, used, 0.0)
+    return stands_out(float(theta[i]), float(spread_of_left_out(each)[i]))
 
 
 def is_likelier(left: float, other: float, independent: float) -> bool:
@@ -344,11 +375,11 @@ def _lowest(lags: Array, left: Array) -> float:
     return float(lags[i]) + (0.5 * LAG_STEP * (low - high) / bend if bend > 0.0 else 0.0)
 
 
-def _with_spread(found: LaggedRows, used: Sequence[int], lag: float) -> tuple[Array, Array]:
-    """Coefficients (c,) at a lag in samples, and their deviations by leaving out blocks."""
+def _with_left_out(found: LaggedRows, used: Sequence[int], lag: float) -> tuple[Array, Array]:
+    """Coefficients (c,) at a lag in samples, and those without each block (blocks, c)."""
 
     def of(kept: BoolArray) -> Array:
         theta = found.left(kept, used)[1]
         return np.array([np.interp(lag, found.lags, one) for one in theta])
 
-    return of(found.every), spread_of_left_out(left_out(found.blocks, of))
+    return of(found.every), left_out(found.blocks, of)

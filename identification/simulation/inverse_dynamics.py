@@ -1,6 +1,7 @@
 """Force that a plant with effects needs for a measured motion: the inverse model with effects."""
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from identification.effects._places import Place
 from identification.log import Log
 from identification.model.inverse_model import Smoothing, force_predicted
 from identification.model.plant import Motor, Plant
-from identification.signals.differentiate import Motion, differentiate
+from identification.signals.differentiate import differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
@@ -34,12 +35,15 @@ def force_needed(
     if not (plant.effects or any(falling)):
         return force_predicted(log, plant.friction, how)
     force, motion = np.asarray(log["F"]), differentiate(log["y"], log.h, how.cutoff, how.method)
+    p, v = plant.friction, motion.v
+    d = np.where(v >= p.dv_p, 1.0, np.where(v <= p.dv_n, -1.0, 0.0))
+    along = Along(motion.y, v, motion.a, d)
     if not any(one.effect.load_dependent for one in plant.effects):
-        return _opposed(log, force, plant, motion, falling)
+        return force_along(log, force, plant, along, falling)
     for _ in range(MOST_SUBSTITUTIONS):
-        once = _opposed(log, force, plant, motion, falling)
+        once = force_along(log, force, plant, along, falling)
         first = once - force
-        second = _opposed(log, once, plant, motion, falling) - once
+        second = force_along(log, once, plant, along, falling) - once
         bend = second - first  # from each to the next it is nearer by the same share
         force = once + np.where(bend != 0.0, -first * second / np.where(bend, bend, 1.0), second)
         if float(np.max(np.abs(second))) <= OF_LARGEST_FORCE * float(np.max(np.abs(force))):
@@ -47,13 +51,20 @@ def force_needed(
     return force
 
 
-def _opposed(
-    log: Log, force: Array, plant: Plant, motion: Motion, falling: tuple[float, float]
+class Along(NamedTuple):
+    """A motion: position [m], speed [m/s], acceleration [m/s^2] and direction, 0 at rest, (n,)."""
+
+    y: Array
+    v: Array
+    a: Array
+    d: Array
+
+
+def force_along(
+    log: Log, force: Array, plant: Plant, motion: Along, falling: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
     """As `force_needed`, of friction as this applied force makes it [N], (n,)."""
-    p, v = plant.friction, motion.v
-    d = np.where(v >= p.dv_p, 1.0, np.where(v <= p.dv_n, -1.0, 0.0))
-    blank = np.zeros(len(log))
+    p, v, d, blank = plant.friction, motion.v, motion.d, np.zeros(len(log))
     signals = {"u": blank, **log.signals, "F": force, "y": motion.y, "v": v, "d": d}
     pushed = _sum(plant, lambda place: place.drives, signals, log.h)
     slip = _sum(plant, lambda place: place.rubs, signals, log.h)

@@ -158,6 +158,8 @@ def plain_rows(
     one = stage.logs[i]
     if equation == MECHANICAL:
         rows = mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
+        if stage.imposed:  # no inertia shows: a mass would be what an effect that is missing left
+            rows = replace(rows, X=rows.X * (np.arange(rows.X.shape[1]) > 0))
         return rows if u is None else replace(rows, b=one.sliding.held @ driven(one, u))
     if equation == ACTUATOR:
         return actuator(one, stage.theta_a, y, u)

@@ -23,7 +23,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.log import Log
 from identification.model.estimates import NORMAL_95
 from identification.signals.weak_form import WeakWindows
-from identification.thresholds import HALF, WORSE
+from identification.thresholds import HALF, NEARLY_ALL, OF_ACCOUNT, TWICE, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS, VISCOUS_COLUMNS = (1, 2), (3, 4)
@@ -63,6 +63,10 @@ class ForceFit:
             varies[i] = self.theta[k] * float(np.std(speeds))
         covariance = change @ self.covariance @ change.T + np.diag(varies**2)
         return replace(self, theta=theta, covariance=covariance)
+
+    def left_of(self, rows: Rows) -> float:
+        """What it leaves of the force of rows [N], root mean square."""
+        return rms(rows.b - rows.X[:, self.used] @ self.theta)
 
     @property
     def falling(self) -> list[tuple[int, int]]:
@@ -121,30 +125,39 @@ def ways_of(rows: Sequence[Rows]) -> tuple[int, int]:
     return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
 
 
-def fewest_terms(data: Sequence[Rows], late: Lateness | None = None) -> ForceFit:
+def fewest_terms(
+    data: Sequence[Rows], late: Lateness | None = None, every: Rows | None = None
+) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
-    than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
+    than those that leave least; a mass that comes out below 0 is none, nor one that leaves more of
+    `every` row, those with reversals too, than none does; nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
     the levels are as uncertain as beside viscous friction that is left out, where these logs
     separate the two."""
-    every = [fitted(data, used, late) for used in COLUMN_SETS]
     rows = stacked(data)
-    rubs = _rubs(every[-1], rows.b)
-    fits = [one for one in every if _may_be(one) and (1 in one.used or rubs)]
+    alike = {column for column in VISCOUS_COLUMNS if of_one_speed(rows, column, WORSE)}
+    sets = [fitted(data, used, late) for used in COLUMN_SETS if not alike.intersection(used)]
+    rubs = _rubs(sets[-1], rows.b)
+    fits = [one for one in sets if _may_be(one) and (1 in one.used or rubs)]
+    if every is not None:
+        without = {one.used: one.left_of(every) for one in sets}
+        fits = [one for one in fits if one.left_of(every) <= without[one.used[0 in one.used :]]]
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
     levels, logged = np.isin(best.used, LEVEL_COLUMNS), best.at_logged_speeds(rows)
+    alone = ~np.any(levels)  # friction of speed for all of it: its levels stand for anything
     beside = np.zeros(len(best.used))
-    for fuller in (one.at_logged_speeds(rows) for one in every if set(one.used) > set(best.used)):
+    for fuller in (one.at_logged_speeds(rows) for one in sets if set(one.used) > set(best.used)):
         at = [fuller.used.index(column) for column in best.used]
         theta, square = fuller.theta[at], np.diag(fuller.covariance)[at]
         separate = NORMAL_95 * np.sqrt(square) <= HALF * np.abs(theta)
         off = np.maximum(theta, 0.0) - logged.theta  # no level is below 0
         wider = off**2 + np.maximum(square - np.diag(logged.covariance), 0.0)
-        beside = np.where(separate, np.maximum(beside, wider), beside)
-    covariance = best.covariance + np.diag(np.where(levels, beside, 0.0))
-    return replace(best, covariance=covariance, share=every[-1].share)
+        beside = np.where(separate | alone, np.maximum(beside, wider), beside)
+    of_friction = np.array([column != 0 for column in best.used])
+    covariance = best.covariance + np.diag(np.where(levels | (alone & of_friction), beside, 0.0))
+    return replace(best, covariance=covariance, share=sets[-1].share)
 
 
 def _may_be(fit: ForceFit) -> bool:
@@ -167,6 +180,16 @@ def _rubs(whole: ForceFit, force: Array) -> bool:
     return all(
         found[level] >= -float(np.hypot(NORMAL_95 * sd[level], errs)) for level in ("F_cp", "F_cn")
     )
+
+
+def of_one_speed(steady: Rows, column: int, apart: float = TWICE) -> bool:
+    """Whether the speeds of nearly all rows of steady sliding are less than so many times apart, by
+    a column of speed."""
+    speed = np.abs(steady.X[steady.X[:, column] != 0.0, column])
+    if not len(speed):
+        return False
+    low, high = np.quantile(speed, (OF_ACCOUNT, NEARLY_ALL))
+    return bool(high < apart * low)
 
 
 def predicts_as_much(left: float, least: float) -> bool:

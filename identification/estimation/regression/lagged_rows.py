@@ -65,7 +65,7 @@ def lagged_rows(
     if not any(len(one.speed) for one in moved):
         return None
     own, cross, square, rows = [], [], [], 0
-    slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
+    slow = _slow_of_each_way(moved)
     for one in moved:
         w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
         mean = w.held if held else w.mean
@@ -79,8 +79,8 @@ def lagged_rows(
             [mean @ (np.interp(at - lag, at, F - place) + place) for lag in own_lags]
         )
         inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
-        inside &= plain.speed >= slow
         up = one.up
+        inside &= plain.speed >= np.where(up, *slow)
         if changes:
             apart_by = np.diff(w.start)
             inside = inside[1:] & inside[:-1] & (apart_by == np.min(apart_by, initial=len(F)))
@@ -98,6 +98,16 @@ def lagged_rows(
     if rows < FEWEST_WINDOWS:
         return None
     return LaggedRows(np.array(own), np.array(cross), np.array(square), lags, rows)
+
+
+def _slow_of_each_way(moved: Sequence[MotionLog]) -> tuple[float, float]:
+    """The speed [m/s] of the slow windows that move up, and of those that move down, of which all
+    may be slower than the others."""
+    speed = np.concatenate([one.speed for one in moved])
+    up = np.concatenate([one.up for one in moved])
+    ways = (speed[up], speed[~up])
+    first, second = (float(np.quantile(x, SLOWEST_PART)) if len(x) else 0.0 for x in ways)
+    return first, second
 
 
 def _blocks_of_each_way(up: BoolArray, inside: BoolArray) -> IntArray:
