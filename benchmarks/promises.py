@@ -145,7 +145,7 @@ def main() -> int:
     given = parser.parse_args()
     os.environ.setdefault(DATA_VARIABLE, str(ROOT.parent / "shared" / "data"))
     known = {one["case"]: one for one in read(given.again)} if given.again else {}
-    rigs = [one for one in every_case() if one.group != "split"]
+    rigs = [one for one in every_case() if one.group not in ("split", "half")]
     todo = [one for one in rigs if one.card is not None and one.test]
     if given.only:
         todo = [one for one in todo if one.name in given.only]

@@ -1,14 +1,14 @@
 """Real logs decide: every measured rig, and small cases of known truth, beside ten lines of least
 squares.
 
-    python benchmarks/real.py --out real.jsonl [--only NAME ...] [--splits] [--limit 300]
+    python benchmarks/real.py --out real.jsonl [--only NAME ...] [--splits|--halves] [--limit 300]
         [--part look|identify|trace|both]
     python benchmarks/real.py --report real.jsonl
 
 Rigs are the folders of WORKBENCH_DATA, cases the folder `cases` beside it; what is absent is
 skipped with a line saying so. What each is and what is right of it stands in `real.toml`; the
 yardstick in `yardstick.py`; with --splits other splits of the rigs (`real_splits.toml`), and no
-others; how a model is measured with it in `real_shares.py`. A case is run in
+others; with --halves each of their files by itself, fitted on the first 60 % of its rows; how a model is measured with it in `real_shares.py`. A case is run in
 a process of its own with a limit of processor time, through the functions behind the commands
 `init`, `doctor`, `identify` and `trace`. With --out a line of JSON is added for each case; of
 several lines of a case the later answers count. Exit status 0 in any case.
@@ -89,6 +89,7 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--only", nargs="+", metavar="NAME")
     parser.add_argument("--splits", action="store_true", help="other splits of the rigs")
+    parser.add_argument("--halves", action="store_true", help="each file: 60 % of it and the rest")
     parser.add_argument("--part", choices=PARTS, default="both")
     parser.add_argument("--limit", type=float, default=300.0, help="processor seconds a case")
     parser.add_argument("--out", type=Path, help="lines of JSON are added to it")
@@ -107,7 +108,8 @@ def main() -> int:
     if not cases_folder().is_dir():
         print(f"no folder {cases_folder().name!r} beside {DATA_VARIABLE}: its cases are skipped")
         cases = tuple(one for one in cases if one.group != "case")
-    asked = set(given.only or [one.name for one in cases if given.splits == (one.group == "split")])
+    groups = {"split"} if given.splits else {"half"} if given.halves else {"rig", "case"}
+    asked = set(given.only or [one.name for one in cases if one.group in groups])
     todo = [one for one in cases if one.name in asked]
     found = run(todo, given)
     print_report(cases, read(given.out) if given.out else found)

@@ -3,8 +3,8 @@ them."""
 
 import os
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +16,9 @@ from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
 
 TABLE = Path(__file__).with_name("real.toml")
 SPLITS = TABLE.with_name("real_splits.toml")
-Group = Literal["rig", "case", "split"]
+Group = Literal["rig", "case", "split", "half"]
+HALF = 0.6  # of a file, on which a model is fitted that the rest judges
+CUT = (".csv", ".txt", ".npy")  # files of which rows can be taken
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,26 @@ def every_case() -> tuple[Case, ...]:
     splits = tomllib.loads(SPLITS.read_text("utf-8"))["split"]
     looked = {"init": None, "doctor": None}  # at the rig's own
     others = [{**named[one["of"]], **looked, **one, "group": "split"} for one in splits]
-    return tuple(_case(entry) for entry in (*cases, *others))
+    found = tuple(_case(entry) for entry in (*cases, *others))
+    return (*found, *_halves(found))
+
+
+def _halves(cases: Sequence[Case]) -> tuple[Case, ...]:
+    """Each recorded file of the rigs by itself: fitted on its first part, judged on the rest."""
+    own = {
+        part.file: case
+        for case in reversed(cases)
+        if case.group != "case"
+        for part in (*case.train, *case.test)
+        if part.file.endswith(CUT)
+    }
+    return tuple(
+        replace(
+            case, name=f"{file}, halves", group="half", train=(Part(file, 0.0, HALF),),
+            test=(Part(file, HALF, 1.0),), right=Right(None, None, (), (), (), ()),
+        )
+        for file, case in sorted(own.items())
+    )  # fmt: skip
 
 
 def _case(entry: Mapping[str, Any]) -> Case:
@@ -194,6 +215,7 @@ def _file(part: Part, path: Path, work: Path) -> Path:
     n = len(rows)
     kept = rows[round(part.begin * n) : round(part.end * n)]
     suffix = ".csv" if array else path.suffix
-    out = work / f"{path.stem}_{part.begin:g}_to_{part.end:g}{suffix}"
+    out = work / f"{part.begin:g}_to_{part.end:g}" / f"{path.stem}{suffix}"
+    out.parent.mkdir(exist_ok=True)
     out.write_text("\n".join([head, *kept]) + "\n", "utf-8")
     return out

@@ -13,7 +13,9 @@ HEAD = (
     "", "init", "doctor", "share of the force left: yardstick / identify / trace [%]",
     "free run of 0.2 s [m, rad]", "of 2 s", "parameters", "verdict", "s",
 )  # fmt: skip
-GROUPS = {"rig": "rigs", "split": "other splits of the rigs", "case": "cases"}
+GROUPS = {
+    "rig": "rigs", "split": "other splits of the rigs", "half": "a file each", "case": "cases",
+}  # fmt: skip
 Answers = Mapping[str, Any]
 
 
