@@ -8,8 +8,9 @@ squares.
 Rigs are the folders of WORKBENCH_DATA, cases the folder `cases` beside it; what is absent is
 skipped with a line saying so. What each is and what is right of it stands in `real.toml`; the
 yardstick in `yardstick.py`; with --splits other splits of the rigs (`real_splits.toml`), and no
-others; with --halves each of their files by itself, fitted on the first 60 % of its rows; how a model is measured with it in `real_shares.py`. A case is run in
-a process of its own with a limit of processor time, through the functions behind the commands
+others; with --halves each of their files by itself, fitted on the first 60 % of its rows; how a
+model is measured with it in `real_shares.py`. A case is run in a process of its own with a limit of
+processor time, through the functions behind the commands
 `init`, `doctor`, `identify` and `trace`. With --out a line of JSON is added for each case; of
 several lines of a case the later answers count. Exit status 0 in any case.
 """

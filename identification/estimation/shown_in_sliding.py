@@ -70,9 +70,9 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
             reasons["m"] = TURNING_WHY
         elif _is_a_springs(every, y, p.m):
             reasons["m"] = SPRING_WHY.format(p.m, units_of(recorded.rig.motion)["m"])
+    by_rig = fit.imposed and not fit.estimates["m"].known  # in strokes that are all alike
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
-        stated = fit.imposed and fit.estimates[FIVE[way[1]]].known
-        stated = stated and _is_mostly(every, kept, way[1])
+        stated = by_rig and fit.estimates[FIVE[way[1]]].known and _is_mostly(every, kept, way[1])
         together = stated or _by_turning(every, kept, way[1])
         if together and of_one_speed(every.at(kept), way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
