@@ -248,7 +248,11 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
 def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     """Coefficients of friction and gravity (7,) and without each block, in the windows of sliding
     that suit these logs best: wide ones would leave out quick motion, and let gravity have what
-    friction makes of it. None where there are too few."""
+    friction makes of it. None where there are too few.
+
+    The cosine, about a constant force over a small angle, is 0 where blocks that a fit has not seen
+    are predicted no worse without it, and as unsure as beside the rest. Source: Stone (1974).
+    """
     rows = stacked([one.rows for one in settled_rows(moved, gravity=True)])
     if len(rows.b) < FEWEST_WINDOWS:
         return None
@@ -256,8 +260,10 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     plain = replace(rows, X=rows.X[:, :-1], names=rows.names[:-1])
     if rms(left_unseen(rows)) < rms(left_unseen(plain)):
         return theta, each
-    alone, each = solve_rows(plain).theta, without_each_block(plain)
-    return np.append(alone, 0.0), np.column_stack([each, np.zeros(len(each))])
+    unsure = each[:, -1] - theta[-1]
+    return np.append(solve_rows(plain).theta, 0.0), np.column_stack(
+        [without_each_block(plain), unsure]
+    )
 
 
 def _beside_friction(found: LaggedRows) -> Sequence[int]:

@@ -64,6 +64,11 @@ class ForceFit:
         covariance = change @ self.covariance @ change.T + np.diag(varies**2)
         return replace(self, theta=theta, covariance=covariance)
 
+    @property
+    def used_but_mass(self) -> tuple[int, ...]:
+        """The columns of friction alone."""
+        return tuple(column for column in self.used if column != 0)
+
     def left_of(self, rows: Rows) -> float:
         """What it leaves of the force of rows [N], root mean square."""
         return rms(rows.b - rows.X[:, self.used] @ self.theta)
@@ -141,8 +146,8 @@ def fewest_terms(
     rubs = _rubs(sets[-1], rows.b)
     fits = [one for one in sets if _may_be(one) and (1 in one.used or rubs)]
     if every is not None:
-        without = {one.used: one.left_of(every) for one in sets}
-        fits = [one for one in fits if one.left_of(every) <= without[one.used[0 in one.used :]]]
+        left_by = {one.used: one.left_of(every) for one in sets}
+        fits = [one for one in fits if left_by[one.used] <= left_by[one.used_but_mass]]
     left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
     levels, logged = np.isin(best.used, LEVEL_COLUMNS), best.at_logged_speeds(rows)
@@ -155,8 +160,8 @@ def fewest_terms(
         off = np.maximum(theta, 0.0) - logged.theta  # no level is below 0
         wider = off**2 + np.maximum(square - np.diag(logged.covariance), 0.0)
         beside = np.where(separate | alone, np.maximum(beside, wider), beside)
-    of_friction = np.array([column != 0 for column in best.used])
-    covariance = best.covariance + np.diag(np.where(levels | (alone & of_friction), beside, 0.0))
+    friction = np.isin(best.used, best.used_but_mass)
+    covariance = best.covariance + np.diag(np.where(levels | (alone & friction), beside, 0.0))
     return replace(best, covariance=covariance, share=sets[-1].share)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from identification.effects._library import built_in
 from identification.estimation.latent_force import LatentForces, Rougher, latent_forces
 from identification.estimation.regression.motion_log import motion_log
 from identification.log import Log
@@ -84,6 +85,23 @@ def test_of_prescribed_motion_the_force_alone_is_told() -> None:
     assert np.std((of.force - missing)[of.slides]) < 0.05
     assert found.rms == pytest.approx(float(np.std(missing[t > 1.0])), rel=0.1)
     assert abs(of.force[0]) < 2.0 * found.sigma and of.sd[0] > 0.9 * found.sigma
+
+
+def test_of_prescribed_motion_friction_never_drives_the_body() -> None:
+    """Friction that falls below none along the travel: what is missing was that of a friction that
+    pushes the body, while the force predicted has none, and effects were judged by the former."""
+    rng, h = np.random.default_rng(2), 2e-3
+    t = h * np.arange(4000, dtype=np.float64)
+    y, v = 0.05 * np.sin(3.0 * t), 0.15 * np.cos(3.0 * t)
+    log = Log("rig", {"t": t, "y": y + 1e-6 * rng.standard_normal(len(t)), "F": 0.0 * t})
+    one = motion_log(log, held=False, by_command=False, imposed=True)
+    falls = built_in()["position_dependent_friction"].acting(
+        {"c1": -3.0 * LEVEL / 0.05, "period": 0.1}
+    )
+    light = replace(NINE, m=1e-6, F_vp=0.0, F_vn=0.0)
+    (of,) = latent_forces(Plant(light, None, (falls,)), [one], 0.02).logs
+    against = (of.force * np.sign(v))[of.slides]
+    assert np.max(against) > LEVEL and np.min(against) > -0.05 * LEVEL
 
 
 def test_a_body_that_rests_or_is_driven_by_nothing_has_a_latent_force_all_the_same() -> None:

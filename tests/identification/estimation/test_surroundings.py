@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.random_plants import KINDS, drawn, logged
 from identification.effects._library import built_in
@@ -206,6 +207,37 @@ def test_a_weight_larger_than_friction_is_taken_out(force: float) -> None:
     freed = found.taken_out(pulled)
     assert freed["F"] == pytest.approx(pulled["F"] + found.force.value)
     assert freed["u"] == pytest.approx(freed["F"] / K_A)
+
+
+def test_a_constant_force_is_found_in_strokes_of_one_speed_each_way() -> None:
+    """A rod led up at 5 mm/s and, mostly, down at 11, under friction of 6 and 8 N: pressure on
+    another area than the card's leaves -11 N, as a seal's test stand had it. The Coulomb levels at
+    rest are not known, and all that goes up was left out as the slow part of the motion."""
+    h, rng = 0.01, np.random.default_rng(0)
+    speeds = np.tile(np.repeat([5e-3, -11e-3], [200, 700]), 5)
+    v = speeds * (1.0 + 0.05 * np.sin(np.arange(len(speeds)) / 30.0))
+    F = np.where(v > 0.0, 6.0, -8.0) - 11.0 + 0.2 * rng.standard_normal(len(v))
+    y = h * np.cumsum(v) + 1e-5 * rng.standard_normal(len(v))
+    log = Log("seal", {"t": h * np.arange(len(v), dtype=np.float64), "y": y, "F": F})
+    found = surroundings([log], Rig("force"))
+    assert found.force.value == pytest.approx(12.0, abs=0.1)  # of equal friction, 7 N
+    assert found.force.sd > 0.05 * 7.0
+
+
+def test_a_cosine_about_a_constant_force_is_left_out_of_gravity() -> None:
+    """A pendulum that swings about the horizontal by 0.4 rad: beside Coulomb friction the cosine
+    was 0.4 +- 0.4 N m, and friction was below 0 in one direction."""
+    h, rng = 1.0 / 190.0, np.random.default_rng(3)
+    t = h * np.arange(1140, dtype=np.float64)
+    y = 0.2 * np.sin(1.9 * t) + 0.2 * np.sin(3.1 * t + 1.0)
+    v, a = np.gradient(y, h), np.gradient(np.gradient(y, h), h)
+    F = 0.015 * a + 0.05 * np.sign(v) + 0.01 * v + 1.0 * np.sin(y)
+    y = y + 5e-4 * rng.standard_normal(len(t))
+    F = F + 0.03 * gaussian_filter1d(rng.standard_normal(len(t)), 40.0) * 40.0**0.5
+    log = Log("swing", {"t": t, "y": y, "F": F, "u": F})
+    found = surroundings([log], replace(TURNING, kind="motor", force_per_command=1.0))
+    assert found.cosine.value == 0.0 < found.cosine.sd
+    assert found.sine.value == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])

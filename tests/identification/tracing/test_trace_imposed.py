@@ -131,6 +131,16 @@ def test_no_imposed_stroke_is_taken_for_rest(imposed: bool) -> None:
     assert bool(np.all(o.rows.speed >= o.slowest)) is imposed
 
 
+def test_no_mass_is_fitted_where_a_rig_moves_the_body() -> None:
+    """Mass that a wrong structure left took half of the force where the motion was less smooth."""
+    log = motion_log(strokes(3.0, SPEEDS, 2), held=False, by_command=False, imposed=True)
+    theta = np.array([0.0, COULOMB, COULOMB, 0.0, 0.0])
+    for one, given in ((log, True), (replace(log, imposed=False), False)):
+        rows = EffectRows((one,), theta, np.zeros(3), by_command=False).parts[MECHANICAL][0]
+        assert np.all(rows.X[:, 0] == 0.0) == given
+        assert np.all(np.any(rows.X[:, 1:] != 0.0, axis=0))
+
+
 @pytest.mark.parametrize("free", [True, False])
 def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
     effects = {"position_dependent_friction": {"c1": 150.0, "period": 0.1}}
