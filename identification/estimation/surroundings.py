@@ -166,9 +166,10 @@ def _looked_far(
         found = lagged_rows(moved, lags, turns, held, known)
         if found is None:
             break
+        found = found.with_inertia(PLAIN)
         used = _beside_friction(found) if turns else PLAIN
         first = first or (found, used)
-        if int(np.argmin(found.left(found.every, used)[0])) < len(lags) - 1:
+        if int(np.argmin(found.left(found.every, used)[0])) < len(found.lags) - 1:
             return found, used
     return first
 

@@ -1,7 +1,7 @@
 """The equation of motion's rows with the force at many lags, and what they leave."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from identification.estimation.regression.equation_rows import NOTHING_KNOWN, Mo
 from identification.estimation.regression.motion_log import SLOWEST_PART
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
+from identification.thresholds import OF_ACCOUNT
 
 FEWEST_WINDOWS = 40  # windows of sliding
 
@@ -40,6 +41,30 @@ class LaggedRows:
     def least(self, used: Sequence[int], kept: BoolArray | None = None) -> float:
         """Square left at the best lag, of these blocks, by default all, and columns."""
         return float(np.min(self.left(self.every if kept is None else kept, used)[0]))
+
+    def with_inertia(self, used: Sequence[int]) -> "LaggedRows":
+        """The lags about the least square of those at which inertia is of account, and that of 0;
+        all of them where there is no such.
+
+        A force of two levels that a loop switches is Coulomb friction alone at the lag at which its
+        steps are those of the direction, without anything left. Ours.
+        """
+        left, theta = self.left(self.every, used)
+        force = np.sum(self.force, axis=0)
+        share = theta[0] * np.sqrt(np.sum(self.columns[:, 0, 0]) / np.where(force > 0, force, 1.0))
+        lows = 1 + np.flatnonzero((left[1:-1] < left[:-2]) & (left[1:-1] <= left[2:]))
+        lows = lows[share[lows] >= OF_ACCOUNT]
+        if not len(lows):
+            return self
+        at, none = int(lows[np.argmin(left[lows])]), int(np.argmin(np.abs(self.lags)))
+        rises = np.diff(left) > 0.0
+        first = at - int(np.argmax(np.append(rises[:at][::-1], True)))
+        last = at + int(np.argmax(np.append(~rises[at:], True)))
+        kept = slice(min(first, none), max(last, none) + 1)
+        return replace(
+            self, with_force=self.with_force[:, :, kept], force=self.force[:, kept],
+            lags=self.lags[kept],
+        )  # fmt: skip
 
     @property
     def blocks(self) -> IntArray:
