@@ -32,6 +32,7 @@ from identification.estimation.regression.force_terms import (
     Lateness,
     fewest_terms,
     fitted,
+    robust_parts,
     ways_of,
 )
 from identification.estimation.regression.motion_log import motion_log
@@ -182,7 +183,7 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
     windows = [one.sliding.at(np.flatnonzero(one.up == way)) for one in moved]
     late = None if recorded.held else Lateness.of(windows, recorded.plain)
-    return _made(fitted(data, ONE_WAY[way], late), data, recorded, why)
+    return _made(fitted(robust_parts(data), ONE_WAY[way], late), data, recorded, why)
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:

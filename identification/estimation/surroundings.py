@@ -22,9 +22,10 @@ from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
-from identification.estimation.regression.motion_rows import OF_EQUATION, settled_rows
+from identification.estimation.regression.motion_rows import settled_rows
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
+    OF_EQUATION,
     OVERLAP,
     left_out,
     left_unseen,

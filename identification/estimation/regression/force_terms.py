@@ -11,13 +11,14 @@ import numpy as np
 from identification.arrays import Array
 from identification.arx.residual_tests import effective_samples
 from identification.estimation.regression.equation_rows import FIVE
-from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
+    OF_EQUATION,
     Rows,
     inverse_of_gram,
     least_squares,
     left_unseen,
+    robust,
     stacked,
 )
 from identification.log import Log
@@ -140,7 +141,9 @@ def fewest_terms(
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
     the levels are as uncertain as beside viscous friction that is left out, where these logs
     separate the two."""
-    rows = stacked(data)
+    rows = robust(stacked(data))
+    data = _split(rows, data)
+    weight = np.median(rows.sd) / rows.sd
     alike = {column for column in VISCOUS_COLUMNS if of_one_speed(rows, column, WORSE)}
     sets = [fitted(data, used, late) for used in COLUMN_SETS if not alike.intersection(used)]
     rubs = _rubs(sets[-1], rows.b)
@@ -148,7 +151,7 @@ def fewest_terms(
     if every is not None:
         left_by = {one.used: one.left_of(every) for one in sets}
         fits = [one for one in fits if left_by[one.used] <= left_by[one.used_but_mass]]
-    left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
+    left = [rms(weight * left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
     best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
     levels, logged = np.isin(best.used, LEVEL_COLUMNS), best.at_logged_speeds(rows)
     alone = ~np.any(levels)  # friction of speed for all of it: its levels stand for anything
@@ -163,6 +166,17 @@ def fewest_terms(
     friction = np.isin(best.used, best.used_but_mass)
     covariance = best.covariance + np.diag(np.where(levels | (alone & friction), beside, 0.0))
     return replace(best, covariance=covariance, share=sets[-1].share)
+
+
+def robust_parts(data: Sequence[Rows]) -> list[Rows]:
+    """The rows of each log, outliers of their common fit with more deviation, as `robust`."""
+    return _split(robust(stacked(data)), data)
+
+
+def _split(rows: Rows, data: Sequence[Rows]) -> list[Rows]:
+    """The rows of each log, with the deviations that they have in all."""
+    each = np.split(rows.sd, np.cumsum([len(part.b) for part in data])[:-1])
+    return [replace(part, sd=sd) for part, sd in zip(data, each, strict=True)]
 
 
 def _may_be(fit: ForceFit) -> bool:

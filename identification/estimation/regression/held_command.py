@@ -17,6 +17,7 @@ from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.weighted_rows import (
     Rows,
+    robust,
     solve_rows,
     spread_of_left_out,
     without_each_block,
@@ -39,13 +40,14 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     whole step to the next sample would add to them (r,); slowest [m/s]: of those that count. The
     value is 0 where none shows beside what the rows leave: where an effect is missing it may be
     confounded with the command's rate, and that is no share; the deviation then holds what was
-    found. Ours: `README.md`, (13).
+    found, below 0 too. Ours: `README.md`, (13).
     """
     keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
     if len(with_rate.b) < 4 * with_rate.X.shape[1] or not np.ptp(with_rate.block):
         return UNSEEN
-    found, without = solve_rows(with_rate), solve_rows(rows.at(keep)).cost
+    with_rate = robust(with_rate)
+    found, without = solve_rows(with_rate), solve_rows(replace(with_rate, X=rows.X[keep])).cost
     if without <= 0.0:
         return NOT_SHOWN
 
@@ -57,7 +59,7 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     sd = float(spread_of_left_out(np.array(apart)))
     best = share_of(found.theta)
     share = significant_share(best, sd, 1.0 - found.cost / without)
-    return Size(share, min(sd if share else float(np.hypot(sd, max(best, 0.0))), UNSEEN.sd))
+    return Size(share, min(sd if share else float(np.hypot(sd, best)), UNSEEN.sd))
 
 
 def could_show(found: Size) -> bool:

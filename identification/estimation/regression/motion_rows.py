@@ -22,12 +22,16 @@ from identification.estimation.regression.equation_rows import (
     sliding_sd,
 )
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
-from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
+from identification.estimation.regression.weighted_rows import (
+    OF_EQUATION,
+    Rows,
+    solve_rows,
+    stacked,
+)
 from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
 from identification.thresholds import ADEQUATE, HALF
 
-OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 HALF_WIDTHS = (5, 8, 16, 32, 64)  # samples, half of a window
 FINEST_WINDOW = 4  # samples, of the window that shows direction and speed
 FINER_WINDOW = 4  # times narrower than the rows' windows it is

@@ -6,9 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
+from identification.signals.steps import MEDIAN_OF_NOISE
 
+OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 BLOCKS = 8  # stretches of a log that are left out in turn
+BIWEIGHT = (
+    4.685  # deviations, from which a row counts for nothing (95 % efficient of normal errors)
+)
+LEAST_WEIGHT, NEAR_ENOUGH, MOST_ROUNDS = 1e-3, 1e-2, 50
 NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 
 
@@ -65,6 +71,26 @@ def solve_rows(rows: Rows, keep: BoolArray | None = None) -> Fitted:
     theta = least_squares(A[mask], c[mask])
     residual = c - A @ theta
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
+
+
+def robust(rows: Rows) -> Rows:
+    """The rows, those that the fit of the others leaves far outside with so much more deviation.
+
+    Between the samples of a slow log a loop gives impulses that none of them has; the windows about
+    them are outliers, the others know nothing of it. Source: biweight, Beaton, Tukey, Technometrics
+    16 (1974) 147, its scale by the median, Huber, Robust Statistics (1981), 5.1; no scale is less
+    than the equation errs itself.
+    """
+    weight = np.ones(len(rows.b))
+    least = OF_EQUATION * float(np.linalg.norm(rows.b / rows.sd)) / max(len(rows.b), 1) ** 0.5
+    for _ in range(MOST_ROUNDS):
+        found = solve_rows(replace(rows, sd=rows.sd / weight))
+        left = (rows.b - rows.X @ found.theta) / rows.sd
+        scale = max(float(np.median(np.abs(left))) / MEDIAN_OF_NOISE, least, 1e-300)
+        was, weight = weight, np.maximum(1.0 - (left / (BIWEIGHT * scale)) ** 2, LEAST_WEIGHT)
+        if float(np.max(np.abs(weight - was))) < NEAR_ENOUGH:
+            break
+    return replace(rows, sd=rows.sd / weight)
 
 
 def least_squares(A: Array, b: Array) -> Array:

@@ -1,0 +1,47 @@
+"""Rows of a regression and their outliers."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array, BoolArray
+from identification.estimation.regression.weighted_rows import Rows, robust, solve_rows
+
+TRUTH = np.array([2.0, -1.0, 0.5])
+
+
+def rows_of(noise: float, added: float = 0.0) -> tuple[Rows, BoolArray]:
+    """400 rows of three coefficients; one in six has `added` to it, most where the first column is
+    large; and which these are."""
+    rng = np.random.default_rng(7)
+    X = rng.standard_normal((400, 3))
+    spoilt = np.arange(400) % 6 == 0
+    b = X @ TRUTH + noise * rng.standard_normal(400) + added * spoilt * np.abs(X[:, 0])
+    blank = np.ones(400)
+    return Rows(b, X, 0.1 * blank, np.arange(400) // 50, blank, ("a", "b", "c")), spoilt
+
+
+def of(rows: Rows) -> Array:
+    return solve_rows(rows).theta
+
+
+def test_normal_errors_are_no_outliers() -> None:
+    rows, _ = rows_of(0.1)
+    weight = rows.sd / robust(rows).sd
+    assert np.mean(weight) > 0.9 and np.min(weight) > 0.0
+    assert of(robust(rows)) == pytest.approx(of(rows), abs=0.003)
+
+
+@pytest.mark.parametrize("added", [2.0, 20.0])
+def test_rows_that_hold_what_no_sample_has_do_not_move_the_fit(added: float) -> None:
+    rows, spoilt = rows_of(0.02, added)
+    assert np.max(np.abs(of(rows) - TRUTH)) > 0.05
+    assert of(robust(rows)) == pytest.approx(TRUTH, abs=0.005)
+    weight = rows.sd / robust(rows).sd
+    assert np.mean(weight[spoilt]) < 0.2 < 0.8 < np.mean(weight[~spoilt])
+
+
+def test_rows_without_errors_have_no_outliers_but_beyond_what_the_equation_errs() -> None:
+    rows, spoilt = rows_of(0.0, 1e-3)
+    assert np.all(rows.sd / robust(rows).sd > 0.9)
+    rows, spoilt = rows_of(0.0, 1.0)
+    assert of(robust(rows)) == pytest.approx(TRUTH, abs=1e-4)
