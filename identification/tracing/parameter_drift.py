@@ -50,8 +50,12 @@ def parameter_drift(
             keep = rows.speed >= slowest
             if np.count_nonzero(keep) >= FEWEST_ROWS:
                 blur = _blur(stage, equation, rows, keep)
+                # What a loop commands between the samples of slower logs differs with the motion.
+                unseen = any(one.noise.between for one in stage.logs)
+                slight = OF_ACCOUNT if unseen else MATERIAL
                 found = (Change(name, units[name], *change)
-                         for name, *change in changes(mine, rows, keep, names, blur))  # fmt: skip
+                         for name, *change in changes(mine, rows, keep, names, blur, slight)
+                )  # fmt: skip
                 out += [one for one in found if not is_refined(one, after)]
     return tuple(out)
 
@@ -86,16 +90,17 @@ def _blur(stage: EffectRows, equation: str, rows: Rows, keep: BoolArray) -> Arra
 
 
 def changes(
-    mine: RowFit, rows: Rows, keep: BoolArray, names: Sequence[str], blur: Array
-) -> list[tuple[str, float, float, float]]:
+    mine: RowFit, rows: Rows, keep: BoolArray, names: Sequence[str], blur: Array,
+    slight: float = MATERIAL,
+) -> list[tuple[str, float, float, float]]:  # fmt: skip
     """Name, value before and after, and deviation of the parameters that have changed.
 
     One is freed at a time, the one that lowers the error most, as long as it lowers it by a
     material share and significantly: parameters that a short log cannot separate do not all change.
     One that differs by no more than the largest change would by the error of both logs together has
     not.
-    blur (k,): square sum that noise makes of each whitened column. Source: Fuller (1987), moments
-    less those of the noise.
+    blur (k,): square sum that noise makes of each whitened column; slight: share of a parameter by
+    which it has not changed. Source: Fuller (1987), moments less those of the noise.
     """
     theta = mine.fit.theta.copy()
     A, b = (rows.X / rows.sd[:, np.newaxis])[keep], (rows.b / rows.sd)[keep]
@@ -136,5 +141,5 @@ def changes(
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))
         for i, s, least in zip(free, sd, half, strict=True)
-        if abs(best[i] - theta[i]) > max(MATERIAL * abs(theta[i]), least)
+        if abs(best[i] - theta[i]) > max(slight * abs(theta[i]), least)
     ]

@@ -224,6 +224,26 @@ def test_a_constant_force_is_found_in_strokes_of_one_speed_each_way() -> None:
     assert found.force.sd > 0.05 * 7.0
 
 
+@pytest.mark.parametrize("period", [0.586, 0.6])
+def test_a_switched_command_is_no_friction_a_quarter_period_later(period: float) -> None:
+    """A cart under +-13 N, switched every 0.3 s and logged every 13 ms, its friction uneven: at a
+    lag of 0.12 s the force is friction of 13 N alone, without a mass and with nothing left."""
+    h, sub, rng = 0.0133, 20, np.random.default_rng(4)
+    n = 1500
+    t = h * np.arange(n, dtype=np.float64)
+    force = np.where(t % period < 0.5 * period, 13.3, -13.3)
+    v, x, y = 0.0, 0.0, np.zeros(n)
+    for k in range(n):
+        y[k] = x + 2e-5 * rng.standard_normal()
+        for _ in range(sub):
+            friction = 3.0 + np.sin(2.0 * np.pi * x / 0.13)
+            v += h / sub * (force[k] - friction * np.sign(v)) / 6.3
+            x += h / sub * v
+    log = Log("cart", {"t": t, "y": y, "F": force, "u": force})
+    found = surroundings([log], Rig("motor", force_per_command=1.0))
+    assert abs(found.lag.value) < 2.0 * h
+
+
 def test_a_cosine_about_a_constant_force_is_left_out_of_gravity() -> None:
     """A pendulum that swings about the horizontal by 0.4 rad: beside Coulomb friction the cosine
     was 0.4 +- 0.4 N m, and friction was below 0 in one direction."""

@@ -38,6 +38,14 @@ def test_the_parameter_that_changed_is_named_alone() -> None:
     assert abs(after - before - 3.0) < 5.0 * sd < 0.5
 
 
+def test_a_change_as_small_as_what_a_loop_does_between_the_samples_is_none() -> None:
+    mine, rows = trained()
+    keep = rows.speed >= mine.slowest
+    shifted = Rows(**{**vars(rows), "b": rows.b + 0.05 * NINE.F_cp * (rows.X[:, 1] != 0)})
+    assert changes(mine, shifted, keep, FIVE, np.zeros(5))
+    assert not changes(mine, shifted, keep, FIVE, np.zeros(5), slight=0.1)
+
+
 def test_no_parameter_becomes_negative() -> None:
     mine, rows = trained()
     changed = found(mine, rows, -40.0)

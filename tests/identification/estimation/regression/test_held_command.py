@@ -5,7 +5,12 @@ import pytest
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.regression.held_command import between_samples, unseen
+from identification.estimation.regression.held_command import (
+    between_samples,
+    share_between,
+    unseen,
+)
+from identification.estimation.regression.weighted_rows import Rows
 from identification.log import Log, Rig
 
 H, SECONDS = 2e-3, 40.0  # of a sample, of a log [s]
@@ -63,6 +68,17 @@ def test_a_coarse_position_moves_no_share(R: int) -> None:
 def test_a_share_that_is_not_significant_is_as_unsure_as_it_is_large() -> None:
     recorded = recorded_logs([driven(16, noise=2e-3)[0]], RIG)
     assert recorded.share == 0.0 and recorded.share_sd > 0.15
+
+
+def test_a_share_below_none_makes_the_instants_unsure() -> None:
+    """No loop has one: what was found says how far off the equation is, and was taken for sure."""
+    rng, n = np.random.default_rng(5), 400
+    X, rate = rng.standard_normal((n, 2)), rng.standard_normal(n)
+    blank = np.ones(n)
+    b = X @ np.array([2.0, 1.0]) + 0.25 * rate + 0.05 * rng.standard_normal(n)
+    rows = Rows(b, X, 0.05 * blank, np.arange(n) // 50, blank, ("m", "F"))
+    found = share_between(rows, rate, by_motor=True)
+    assert found.value == 0.0 and found.sd == pytest.approx(0.25, abs=0.03)
 
 
 @pytest.mark.parametrize("later", [0.03, 0.1])

@@ -41,7 +41,7 @@ def test_rows_that_hold_what_no_sample_has_do_not_move_the_fit(added: float) -> 
 
 
 def test_rows_without_errors_have_no_outliers_but_beyond_what_the_equation_errs() -> None:
-    rows, spoilt = rows_of(0.0, 1e-3)
+    rows, _ = rows_of(0.0, 1e-3)
     assert np.all(rows.sd / robust(rows).sd > 0.9)
-    rows, spoilt = rows_of(0.0, 1.0)
+    rows, _ = rows_of(0.0, 1.0)
     assert of(robust(rows)) == pytest.approx(TRUTH, abs=1e-4)
