@@ -22,6 +22,7 @@ from identification.estimation.regression.weighted_rows import (
     Fitted,
     Rows,
     of_column,
+    robust,
     solve_rows,
     stacked,
 )
@@ -52,7 +53,7 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
     TRIM each instead of their squared residual; the best threshold is taken, none above the band
-    where that is known. Under prescribed motion it slides at any speed. Sources: Cauchy's weights,
+    where that is known. Under prescribed motion it slides at any speed. Sources: Cauchy's function,
     Holland, Welsch, Commun. Stat. A 6 (1977) 813; the trimming is ours: `README.md`, (10), (11).
     """
     scale = stage.scale(equation)
@@ -62,8 +63,9 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
             rows, Fitted(np.zeros(0), r, float(np.sum(r**2))), _robust(r, scale), 0.0, True
         )
     if equation == BREAKAWAY:
-        fit = _resistant(rows, scale)
-        return RowFit(rows, fit, _robust(fit.residual, scale), 0.0, True)
+        theta = solve_rows(robust(rows)).theta
+        r = (rows.b - rows.X @ theta) / rows.sd
+        return RowFit(rows, Fitted(theta, r, float(np.sum(r**2))), _robust(r, scale), 0.0, True)
     if not np.any(np.isfinite(rows.speed)):
         fit = solve_rows(rows)
         return RowFit(rows, fit, fit.cost / scale + rows.lost, 0.0)
@@ -87,17 +89,6 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     residual = A[:, -1] - A[:, :-1] @ theta
     fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
     return RowFit(rows, fit, float(total), 0.0 if stage.imposed else float(edges[best]))
-
-
-def _resistant(rows: Rows, scale: float) -> Fitted:
-    """Least squares in which events far off count less (Cauchy's weights)."""
-    fit = solve_rows(rows)
-    for _ in range(10):
-        weight = 1.0 / np.sqrt(1.0 + fit.residual**2 / (scale * ROBUST_SQUARE))
-        theta = solve_rows(replace(rows, sd=rows.sd / np.maximum(weight, 1e-6))).theta
-        residual = (rows.b - rows.X @ theta) / rows.sd
-        fit = Fitted(theta, residual, float(np.sum(residual**2)))
-    return fit
 
 
 def _robust(r: Array, scale: float) -> float:
