@@ -98,10 +98,15 @@ def respond(
 
     model: whose friction is taken off the force; left_in: why not, where there is none, or where it
     is not to be; lowest [Hz]: the frequency to reach down to. read: more remarks. Raises BadLog
-    without an applied force, NotIdentifiable where the runs show nothing.
+    without an applied force, NotIdentifiable where the runs show nothing, or a rig moved the body.
     """
     if model is not None:
         refuse_other_machine(model.rig, rig, f"the card {card}", "motion")
+        if model.prescribed_motion and not model.friction["m"].known:
+            raise NotIdentifiable(
+                f"the motion in the logs of {model.card} is prescribed by a rig (no inertia shows):"
+                " it is no response to the force; log the body driven by its force"
+            )
     logs = [with_applied_force(one.log, rig) for one in runs]
     taken = model if left_in is None else None
     found, modes = _measured(logs, rig.kind == "motor", taken, lowest)

@@ -14,7 +14,7 @@ from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.frequency.estimate import Response
 from identification.frequency.swinging_load import Rests, swinging_load
-from identification.log import Log
+from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
@@ -281,6 +281,14 @@ def test_what_shows_nothing_is_refused() -> None:
     rotary = replace(model(ONE), rig=replace(model(ONE).rig, motion="rotary"))
     with pytest.raises(BadModel, match="the model is of a rotary machine"):
         of_logs(log, model=rotary)
+    led = replace(
+        model(ONE), rig=Rig("force"), actuator=None,
+        log=tuple(replace(one, position_rms=None) for one in model(ONE).log),
+    )  # fmt: skip
+    assert led.prescribed_motion
+    no_mass = {**led.friction, "m": Estimate(None, "kg", reason="none shows", assumed=1.0)}
+    with pytest.raises(NotIdentifiable, match="axis is prescribed by a rig"):
+        of_logs(log, model=replace(led, friction=no_mass))
 
 
 @pytest.mark.slow
