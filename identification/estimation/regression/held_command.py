@@ -40,7 +40,7 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     whole step to the next sample would add to them (r,); slowest [m/s]: of those that count. The
     value is 0 where none shows beside what the rows leave: where an effect is missing it may be
     confounded with the command's rate, and that is no share; the deviation then holds what was
-    found, below 0 too. Ours: `README.md`, (13).
+    found. Ours: `README.md`, (13).
     """
     keep = np.asarray(rows.speed >= slowest)
     with_rate = replace(rows, X=np.column_stack([rows.X, rate])).at(keep)
@@ -59,7 +59,9 @@ def share_between(rows: Rows, rate: Array, by_motor: bool, slowest: float = 0.0)
     sd = float(spread_of_left_out(np.array(apart)))
     best = share_of(found.theta)
     share = significant_share(best, sd, 1.0 - found.cost / without)
-    return Size(share, min(sd if share else float(np.hypot(sd, best)), UNSEEN.sd))
+    # Significantly below 0, which no share is, it says how far off the equation is.
+    off = best if best < -BEYOND_CHANCE * sd else max(best, 0.0)
+    return Size(share, min(sd if share else float(np.hypot(sd, off)), UNSEEN.sd))
 
 
 def could_show(found: Size) -> bool:
