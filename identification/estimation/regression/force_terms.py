@@ -141,8 +141,8 @@ def fewest_terms(
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
     the levels are as uncertain as beside viscous friction that is left out, where these logs
     separate the two."""
-    rows = robust(stacked(data))
-    data = _split(rows, data)
+    data = robust_parts(data)
+    rows = stacked(data)
     weight = np.median(rows.sd) / rows.sd
     alike = {column for column in VISCOUS_COLUMNS if of_one_speed(rows, column, WORSE)}
     sets = [fitted(data, used, late) for used in COLUMN_SETS if not alike.intersection(used)]
@@ -170,12 +170,7 @@ def fewest_terms(
 
 def robust_parts(data: Sequence[Rows]) -> list[Rows]:
     """The rows of each log, outliers of their common fit with more deviation, as `robust`."""
-    return _split(robust(stacked(data)), data)
-
-
-def _split(rows: Rows, data: Sequence[Rows]) -> list[Rows]:
-    """The rows of each log, with the deviations that they have in all."""
-    each = np.split(rows.sd, np.cumsum([len(part.b) for part in data])[:-1])
+    each = np.split(robust(stacked(data)).sd, np.cumsum([len(part.b) for part in data])[:-1])
     return [replace(part, sd=sd) for part, sd in zip(data, each, strict=True)]
 
 

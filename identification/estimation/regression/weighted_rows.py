@@ -11,9 +11,9 @@ from identification.signals.steps import MEDIAN_OF_NOISE
 OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 BLOCKS = 8  # stretches of a log that are left out in turn
-BIWEIGHT = (
-    4.685  # deviations, from which a row counts for nothing (95 % efficient of normal errors)
-)
+# Deviations from which a row counts for nothing: 95 % efficient of normal errors (Tukey's).
+BIWEIGHT = 4.685
+# What such a row counts all the same, since none is without; when the weights have converged.
 LEAST_WEIGHT, NEAR_ENOUGH, MOST_ROUNDS = 1e-3, 1e-2, 50
 NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 

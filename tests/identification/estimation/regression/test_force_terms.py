@@ -23,14 +23,16 @@ def sliding_rows(levels: float, viscous: float, noise: float) -> list[Rows]:
     return [Rows(b, X, sd, blocks, np.abs(v), FIVE)]
 
 
-def strokes(slowest: float, fastest: float, slope: float, level: float = 14.0) -> Rows:
-    """Rows of strokes of these speeds [m/s] under this force [N] in their middle, noise 1 N."""
+def strokes(
+    slowest: float, fastest: float, slope: float, level: float = 14.0, noise: float = 1.0
+) -> Rows:
+    """Rows of strokes of these speeds [m/s] under this force [N] in their middle, and noise [N]."""
     rng, n = np.random.default_rng(4), 400
     v = rng.uniform(slowest, fastest, n) * np.where(np.arange(n) % 2, 1.0, -1.0)
     up = v > 0.0
     X = np.column_stack([np.zeros(n), 1.0 * up, -1.0 * ~up, v * up, v * ~up])
     middle = 0.5 * (slowest + fastest)
-    force = np.sign(v) * (level + slope * (np.abs(v) - middle)) + rng.standard_normal(n)
+    force = np.sign(v) * (level + slope * (np.abs(v) - middle)) + noise * rng.standard_normal(n)
     return Rows(force, X, np.full(n, 1.0), np.arange(n) // 40, np.abs(v), FIVE)
 
 
@@ -75,7 +77,7 @@ def test_a_level_that_viscous_friction_leaves_open_is_so_down_to_none() -> None:
 def test_strokes_of_one_speed_show_no_slope() -> None:
     """13.2 to 13.6 mm/s: as little as this varied, it was taken for friction that falls with speed
     (27 N at rest of 5.4 N logged), and another part of the log was predicted worse by it."""
-    found = fewest_terms([strokes(13.2e-3, 13.6e-3, -1.6e3)])
+    found = fewest_terms([strokes(13.2e-3, 13.6e-3, -1.6e3, noise=0.1)])
     assert found.used == (1, 2)
     assert found.theta == pytest.approx([14.0, 14.0], abs=0.2)
     assert found.sd["F_cp"] < 0.5

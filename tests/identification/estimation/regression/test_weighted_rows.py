@@ -1,5 +1,7 @@
 """Rows of a regression and their outliers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,13 @@ def test_rows_that_hold_what_no_sample_has_do_not_move_the_fit(added: float) -> 
     assert of(robust(rows)) == pytest.approx(TRUTH, abs=0.005)
     weight = rows.sd / robust(rows).sd
     assert np.mean(weight[spoilt]) < 0.2 < 0.8 < np.mean(weight[~spoilt])
+
+
+def test_a_row_eight_deviations_off_counts_for_nothing() -> None:
+    rows, spoilt = rows_of(0.1)
+    off = replace(rows, b=rows.b + 0.8 * spoilt)
+    weight = off.sd / robust(off).sd
+    assert np.median(weight[spoilt]) < 0.01 and np.median(weight[~spoilt]) > 0.9
 
 
 def test_rows_without_errors_have_no_outliers_but_beyond_what_the_equation_errs() -> None:
