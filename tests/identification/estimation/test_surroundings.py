@@ -24,6 +24,7 @@ from tests.identification.plants import made_log, table
 ROD = Karnopp(0.15, 0.3, 0.3, 0.05, 0.05, 0.01, -0.01, 0.36, -0.36)
 TURNING = Rig("force", motion="rotary")
 MOTOR = Rig("motor", force_per_command=K_A)
+TURNED = replace(TURNING, kind="motor", force_per_command=1.0)
 
 
 PULLS = ((0.25, 1.6), (0.6, 1.2), (1.3, 0.8))  # Hz, N m
@@ -244,19 +245,29 @@ def test_a_switched_command_is_no_friction_a_quarter_period_later(period: float)
     assert abs(found.lag.value) < 2.0 * h
 
 
-def test_a_cosine_about_a_constant_force_is_left_out_of_gravity() -> None:
-    """A pendulum that swings about the horizontal by 0.4 rad: beside Coulomb friction the cosine
-    was 0.4 +- 0.4 N m, and friction was below 0 in one direction."""
+def brief_swing(size: float, about: float) -> Log:
+    """6 s of a pendulum led about an angle [rad] by sines of this size each, under gravity of 1 N m
+    and noise of its torque that lasts 0.2 s."""
     h, rng = 1.0 / 190.0, np.random.default_rng(3)
     t = h * np.arange(1140, dtype=np.float64)
-    y = 0.2 * np.sin(1.9 * t) + 0.2 * np.sin(3.1 * t + 1.0)
+    y = about + size * (np.sin(1.9 * t) + np.sin(3.1 * t + 1.0))
     v, a = np.gradient(y, h), np.gradient(np.gradient(y, h), h)
     F = 0.015 * a + 0.05 * np.sign(v) + 0.01 * v + 1.0 * np.sin(y)
     y = y + 5e-4 * rng.standard_normal(len(t))
     F = F + 0.03 * gaussian_filter1d(rng.standard_normal(len(t)), 40.0) * 40.0**0.5
-    log = Log("swing", {"t": t, "y": y, "F": F, "u": F})
-    found = surroundings([log], replace(TURNING, kind="motor", force_per_command=1.0))
+    return Log("swing", {"t": t, "y": y, "F": F, "u": F})
+
+
+def test_a_cosine_about_a_constant_force_is_left_out_of_gravity() -> None:
+    """Beside Coulomb friction the cosine was 0.4 +- 0.4 N m, and friction was below 0 one way."""
+    found = surroundings([brief_swing(0.2, 0.0)], TURNED)
     assert found.cosine.value == 0.0 < found.cosine.sd
+    assert found.sine.value == pytest.approx(1.0, abs=0.15)
+
+
+def test_gravity_of_a_small_swing_shows_by_its_sine() -> None:
+    """Beside the cosine neither was significant, and nothing was taken out."""
+    found = surroundings([brief_swing(0.1, 0.3)], TURNED)
     assert found.sine.value == pytest.approx(1.0, abs=0.15)
 
 
