@@ -9,6 +9,7 @@ from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.regression.weighted_rows import Rows
 from identification.estimation.structure_fit import FittedStructure
+from identification.log import Rig
 from identification.tracing import parameter_drift
 from identification.tracing.parameter_drift import changes, is_refined
 from identification.tracing.result import Change
@@ -91,3 +92,23 @@ def test_what_the_run_has_already_has_not_changed(
     stage, outcomes = first_stage([seen(made(3))], by_command=False)
     model = FittedStructure(stage, outcomes, replace(plant(), friction=friction), {}, False, misfit)
     assert is_refined(Change("m", "kg", 3.7, 4.01, 0.04), model) is same
+
+
+@pytest.mark.parametrize(("between", "named"), [(0.0, ["F_cp"]), (1e-3, [])])
+def test_a_slight_change_is_none_where_commands_are_unseen(
+    between: float, named: list[str]
+) -> None:
+    """The same two logs, of a loop as slow as they and of a faster one."""
+    last = seen(made(4))
+    stage, outcomes = first_stage([seen(made(3))], by_command=False)
+    log = last.log
+    up = np.where(last.signals["d"] > 0.0, 0.05 * NINE.F_cp, 0.0)
+    pushed = replace(
+        last, log=log.with_signals(F=np.asarray(log["F"]) + up),
+        noise=replace(last.noise, between=between),
+    )  # fmt: skip
+    model = FittedStructure(stage, outcomes, plant(), {}, False, 9.0)
+    found = parameter_drift.parameter_drift(
+        model, (), [pushed], Rig("motor", force_per_command=1.0)
+    )
+    assert [one.name for one in found] == named
