@@ -39,6 +39,7 @@ from benchmarks.blind_machines import (
 from design.effect_loop import simulate_effect_loop
 from design.experiment.limits import MotionLimits, Peaks, peaks
 from design.loop import Cascade, LoopNoise
+from design.machine.model import Model
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import UserError
@@ -50,7 +51,6 @@ from identification.model.plant import Motor, Plant
 from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
-from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.steps.closed_loop import present
 from workbench.steps.experiment.plan import experiment

@@ -25,6 +25,8 @@ import numpy as np
 
 from design.controller_program import ProgramUnits, controller_program
 from design.drive_law import drive_law
+from design.machine.design import Design
+from design.machine.model import Model
 from design.polynomial import from_roots
 from design.program import (
     Assign,
@@ -42,8 +44,6 @@ from design.rst import RST
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.cards.card import load_card
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.export.c import c_files
 from workbench.export.exported import Exported, Precision, exported
 from workbench.logs.sources import DATA_VARIABLE, Source, Sources, card_path, read_sources

@@ -22,6 +22,7 @@ from typing import Any
 from benchmarks.real_cases import Case, Prepared, every_case, prepared
 from benchmarks.real_shares import model_run, model_share, window_of
 from benchmarks.yardstick import Fit, Record, fitted, own_share, record, run_errors
+from design.machine.model import Identifiable, Model
 from identification.effects._library import built_in
 from identification.errors import UserError
 from identification.log import Log
@@ -29,7 +30,6 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.tracing.result import Trace
 from workbench.cards.card import Card
-from workbench.documents.model import Identifiable, Model
 from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
 from workbench.steps.doctor import Examined, examine

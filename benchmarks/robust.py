@@ -29,9 +29,9 @@ import numpy as np
 
 from benchmarks.blind_machines import Machine, random_machine, stream
 from benchmarks.experiment import model_of, poor_log
+from design.machine.model import Model
 from identification.errors import UserError
 from identification.model.plant import Actuator, Plant
-from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop, in_loop, present_loop
 from workbench.steps.design import design
 from workbench.steps.loop_figures import PRESENT

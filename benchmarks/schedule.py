@@ -18,6 +18,7 @@ from typing import Literal
 
 import numpy as np
 
+from design.machine.model import FitSummary, LogEntry, Model
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.effects._library import built_in
@@ -26,7 +27,6 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Motor, Plant
-from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.steps.closed_loop import (
     DrivenLoop,
     driven_loop,

@@ -11,6 +11,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray, frozen
 from identification.errors import BadLog
 
+Motion = Literal["linear", "rotary"]
 RigKind = Literal["electro-pneumatic", "force", "motor", "velocity"]
 
 
@@ -30,7 +31,7 @@ class Rig:
     force_per_command: float | None = None
     control_limit: float | None = None
     stroke: tuple[float, float] | None = None
-    motion: Literal["linear", "rotary"] = "linear"
+    motion: Motion = "linear"
     command_unit: str = "V"
     motor_inertia: float | None = None
 

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.design import Design
+from design.machine.model import FitSummary, LogEntry, Model
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -13,8 +15,6 @@ from identification.model.plant import Actuator
 from tests.made import made_once
 from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
-from workbench.documents.design import Design
-from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.logs.sources import Source, Sources, card_path
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources

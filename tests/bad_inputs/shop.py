@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from design.machine.documents import model_document
 from identification.arrays import Array
 from tests.chain import identified
 from tests.workbench.log_files import WRITERS
 from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.documents.result_files import model_document
 from workbench.output import dumps
 from workbench.steps.simulate import as_columns, record
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from design.machine.documents import design_document, model_document
 from identification.model.plant import Actuator
 from tests.chain import CARD, TABLES, designed, model_of
 from tests.workbench.jobs.listener import listening
 from workbench.cli import main
-from workbench.documents.result_files import design_document, model_document
 from workbench.output import dumps
 
 pytestmark = pytest.mark.slow

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from design.machine.documents import design_document, model_document
 from tests.chain import TABLES, designed, model_of
 from workbench.cli import main
-from workbench.documents.result_files import design_document, model_document
 from workbench.output import dumps
 
 pytestmark = pytest.mark.slow

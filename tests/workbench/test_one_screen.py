@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from design.machine.design import Recommendation
+from design.machine.model import Model
 from design.tune import Asked
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.frequency.modes import Modes, Peak
@@ -27,8 +29,6 @@ from tests.workbench.trace_values import trace_of, traced
 from workbench import cli
 from workbench.commands.fleet import fleet_view
 from workbench.commands.reidentify import pass_view
-from workbench.documents.design import Recommendation
-from workbench.documents.model import Model
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
 from workbench.report.doctor import installation_view
@@ -381,8 +381,8 @@ def test_a_registry_of_many_machines_and_versions(
 
 
 def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from design.machine.documents import design_document
     from tests.chain import CARD
-    from workbench.documents.result_files import design_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)
@@ -397,8 +397,8 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from design.machine.documents import model_document
     from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear
-    from workbench.documents.result_files import model_document
     from workbench.output import dumps
 
     monkeypatch.chdir(tmp_path)

@@ -15,13 +15,14 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from design.machine.nearest import nearest
 from identification.effects._library import Library
 from identification.errors import BadCard, BadModel
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
 from workbench.cards.controller import CardController
-from workbench.cards.nearest import keys_at, nearest
 from workbench.cards.recipe import Recipe
+from workbench.cards.table_keys import keys_at
 from workbench.cards.units import si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 

@@ -12,11 +12,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
+from design.machine.readable import shown
 from identification.errors import BadCard
 from identification.log import Rig, RigKind
 from identification.model.plant import over, units_of
 from workbench.cards.controller import ControllerSection
-from workbench.cards.readable import shown
 from workbench.cards.recipe import RecipeSection
 from workbench.cards.table import CardTable, Positive
 from workbench.cards.units import (

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from design.machine.readable import shown
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import over
-from workbench.cards.readable import shown
 from workbench.cards.table import CardTable, NotNegative, Positive
 from workbench.cards.units import in_unit_of
 

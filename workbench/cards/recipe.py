@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from identification.arrays import Array
 from identification.effects._library import Library, built_in
 from identification.errors import BadModel
+from identification.log import Motion
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.check import SHORTEST_LOG
@@ -26,9 +27,8 @@ from identification.signals.excitation import (
     Sum,
 )
 from workbench.cards.controller import Polynomials
-from workbench.cards.effect_values import written_effect
 from workbench.cards.table import CardTable, Divisor, NotNegative, Positive
-from workbench.cards.units import Motion
+from workbench.cards.written_effect import written_effect
 
 
 class StepsSection(CardTable):

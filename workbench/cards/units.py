@@ -7,16 +7,15 @@ text with a unit, as "8 A/mm".
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from identification.errors import BadCard
+from identification.log import Motion
 
 if TYPE_CHECKING:
     import pint
-
-Motion = Literal["linear", "rotary"]
 
 _POSITION = {"linear": "m", "rotary": "rad"}
 _FORCE_UNIT = {"linear": "N", "rotary": "N m"}

@@ -12,8 +12,8 @@ from workbench.signature import option
 from workbench.steps.asked import RobustAsked
 
 if TYPE_CHECKING:
-    from workbench.documents.design import Structure
-    from workbench.documents.model import Model
+    from design.machine.design import Structure
+    from design.machine.model import Model
 
 # Options, by the names of their values, that only --robust has.
 ROBUST_ONLY = (
@@ -167,7 +167,7 @@ def _refuse_beside(given: DesignOptions) -> None:
 
 
 def _robust(given: DesignOptions, model: "Model") -> int:
-    from workbench.documents.result_files import design_document
+    from design.machine.documents import design_document
     from workbench.interface.loops import robust_design
     from workbench.report.next_steps import after_robust, without_design
 

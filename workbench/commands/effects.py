@@ -32,7 +32,7 @@ def list_effects(
 
     KEY: those to be shown, with all of this; by default every effect.
     """
-    from workbench.cards.effect_values import known_effect
+    from design.machine.effect_values import known_effect
     from workbench.cards.own_effects import library
     from workbench.interface.effects import described
 

@@ -1,25 +1,23 @@
-"""Results as plain tables, a parameter as value, unit and interval, with the versions that made
-them; and read back: strict JSON into frozen dataclasses, one line where it does not fit."""
+"""Results read back: strict JSON into frozen dataclasses, one line where it does not fit; and the
+versions that made them."""
 
 import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
+from design.machine.codec import OF_OURS, PLACEHOLDER, UNKNOWN_KEY
+from design.machine.nearest import nearest
 from identification.errors import BadModel
-from identification.model.estimates import Estimate
 from workbench.cards.card import OFFERED_FOR_VELOCITY
-from workbench.cards.nearest import keys_at, nearest
+from workbench.cards.table_keys import keys_at
 from workbench.files import ABSURD, RESULT_BYTES, broken_link, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
-UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
-OF_OURS = "refused"  # type of an error of ours, whose text has PLACEHOLDER for where it is
-PLACEHOLDER = "\0"
 MOST_DIGITS = 30  # of a whole number in a result
 
 
@@ -156,32 +154,6 @@ def _explained(first: Mapping[str, Any], kind: Any) -> str:
 
 def _shown(value: object) -> str:
     return " ".join(repr(value).split())[:60]
-
-
-def plain(value: object) -> Any:
-    """Dataclasses as dictionaries, parameters as results carry them."""
-    match value:
-        case Estimate():
-            return as_number(value)
-        case _ if is_dataclass(value):
-            return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
-        case Mapping():
-            return {key: plain(entry) for key, entry in value.items()}
-        case list():
-            return [plain(entry) for entry in value]
-        case tuple():
-            return tuple(plain(entry) for entry in value)
-    return value
-
-
-def as_number(estimate: Estimate) -> dict[str, Any]:
-    """One parameter as results carry it; beside value and interval only what says something."""
-    number = asdict(estimate)
-    return {
-        key: value
-        for key, value in number.items()
-        if value is not None or key not in ("reason", "assumed", "at_most")
-    }
 
 
 PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")

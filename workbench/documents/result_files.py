@@ -1,8 +1,5 @@
-"""model.json and design.json: a model and a design as written, and read back in SI; a design is
-refused where it contradicts itself."""
+"""model.json and design.json read back in SI; a design is refused where it contradicts itself."""
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,38 +7,25 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.codec import around_in, pairs, said_of
+from design.machine.design import Design
+from design.machine.documents import design_document, model_document
+from design.machine.model import Model, used
+from design.machine.plausible import refuse_apart, refuse_changed_units, refuse_unequal
 from identification.effects._library import Library, built_in
 from identification.errors import BadModel
-from identification.log import Rig
 from identification.model.estimates import Estimate
-from identification.model.karnopp import NAMES
-from workbench.cards.readable import shown
-from workbench.documents.codec import Around, Command, around_in, pairs, said_of, written
-from workbench.documents.design import Design
-from workbench.documents.model import Model, used
-from workbench.documents.plausible import refuse_apart, refuse_changed_units, refuse_unequal
+from workbench.cards.units import conversion
 from workbench.documents.reading import Stored, read_raw, validated
 
 DESIGN_SCHEMA = "design/2"
-
-
-def design_document(found: Design) -> dict[str, Any]:
-    """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document = written(found, Around(found.units, found.command, found.output))
-    return {"schema": document.pop("schema"), **document}
-
-
-def design_digest(found: Design) -> str:
-    """By what a validation names the design that it is of: the SHA-256 of its content."""
-    text = json.dumps(design_document(found), sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_design(path: Path | Stored) -> Design:
     """The design in the file `path`, or stored, in SI; raises BadModel in one line where it is
     none."""
     raw = read_raw(path, DESIGN_SCHEMA)
-    around = around_in(raw, "motion", raw.get("command"), "unit")
+    around = around_in(raw, "motion", raw.get("command"), "unit")._replace(conversion=conversion)
     found = validated(raw, path, Design, around)
     try:
         ours = design_document(found)
@@ -98,19 +82,6 @@ def _refuse_other_laws(raw: Mapping[str, Any], ours: Mapping[str, Any], found: D
 MODEL_SCHEMA = "model/1"
 
 
-def model_document(model: Model) -> dict[str, Any]:
-    """The model as model.json writes it: the schema first, one entry an estimate."""
-    document = written(model, around_of(model.rig))
-    document["friction"] = {name: document["friction"][name] for name in NAMES}
-    return {"schema": document.pop("schema"), **document}
-
-
-def around_of(rig: Rig) -> Around:
-    """What the written form of a rig's controller hangs on."""
-    units = shown(rig.motion == "rotary", rig.command_unit)
-    return Around(units, Command(units.command, rig.control_limit, None))
-
-
 def read_model(path: Path | Stored, library: Library | None = None) -> Model:
     """The model in the file `path`, or stored, in SI; raises BadModel in one line where it is none.
 
@@ -124,7 +95,7 @@ def read_model(path: Path | Stored, library: Library | None = None) -> Model:
 
         library = own_effects.library()
     around = around_in(rig, "motion", rig, "command_unit")._replace(
-        library=built_in() if library is None else library
+        library=built_in() if library is None else library, conversion=conversion
     )
     found = validated(raw, path, Model, around)
     both = tuple(pairs(raw, model_document(found)))

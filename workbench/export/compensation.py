@@ -16,11 +16,11 @@ from design.compensation_tables import (
     is_of_place,
     is_of_speed,
 )
+from design.machine.model import Model
+from design.machine.readable import Unit, number, shown_unit, units_of
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.readable import Unit, number, shown_unit, units_of
-from workbench.documents.model import Model
 from workbench.export.exported import filled, identifier
 
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]

@@ -16,6 +16,9 @@ import numpy as np
 from design.controller_program import ProgramUnits, controller_program
 from design.feed_forward import FeedForward
 from design.filters import filters_at
+from design.machine.design import Design, Structure
+from design.machine.documents import design_digest
+from design.machine.readable import shown
 from design.program import (
     Assign,
     Choice,
@@ -32,10 +35,7 @@ from design.program import (
 from design.program_run import SelfTest, self_test
 from design.servo import Compensation
 from identification.errors import BadModel
-from workbench.cards.readable import shown
-from workbench.documents.design import Design, Structure
 from workbench.documents.reading import read_document
-from workbench.documents.result_files import design_digest
 from workbench.output import templates
 from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop

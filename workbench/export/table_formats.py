@@ -13,10 +13,10 @@ from design.compensation_tables import (
     summed,
     table_points,
 )
+from design.machine.readable import number, shown_unit
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.readable import number, shown_unit
 from workbench.export.compensation import (
     IDENTIFIED_BY_SLIDING,
     Compensation,

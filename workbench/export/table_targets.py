@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from design.compensation_tables import Harmonic, cogging_harmonics, is_cogging
+from design.machine.readable import number
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.plant import Motor
-from workbench.cards.readable import number
 from workbench.cards.units import in_unit_of
 from workbench.export.compensation import (
     IDENTIFIED_BY_SLIDING,

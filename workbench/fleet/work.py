@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from design.machine.documents import model_document
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
 from workbench.documents.reading import versions
-from workbench.documents.result_files import model_document
 from workbench.files import CARD_FILE, sha256_of
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from design.machine.effect_values import known_effect
 from identification.effects._base import Effect
-from workbench.cards.effect_values import known_effect
 from workbench.interface.inputs import PathLike, effects_of
 
 

@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
 
+from design.machine.nearest import nearest
 from identification.effects._library import Library
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, card_from, load_card
 from workbench.cards.card_tables import FileSpec
-from workbench.cards.nearest import nearest
 from workbench.cards.own_effects import library
 from workbench.cards.units import conversion, parse_gain, si_unit
 from workbench.logs.clocks import named_in_turn

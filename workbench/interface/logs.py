@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from design.machine.model import Model
 from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
 from workbench.cards.card import Card, load_card
 from workbench.course import running, working
-from workbench.documents.model import Model
 from workbench.interface.inputs import (
     CardLike,
     LogLike,

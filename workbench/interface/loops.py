@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from design.machine.design import Design
+from design.machine.model import Model
 from identification.errors import BadModel
 from workbench.course import running, working
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.documents.result_files import read_design
 from workbench.interface.inputs import PathLike
 from workbench.interface.models import ModelLike, Result, TraceResult, model_of
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from design.machine.design import Structure
     from design.schedule import Over
     from design.tune import Asked, Goals
-    from workbench.documents.design import Structure
 
 
 class ControlLoop(NamedTuple):

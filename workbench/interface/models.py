@@ -17,11 +17,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
+from design.machine.model import Model
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.course import running
-from workbench.documents.model import Model
 from workbench.documents.result_files import read_model
 from workbench.interface.inputs import (
     CardLike,

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.machine.design import Design
+from design.machine.model import Model
+from design.machine.readable import force, length
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
-from workbench.cards.readable import force, length
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.loop_figures import common_reference, tested_of
 from workbench.steps.predict import default_drive, pooled, predict

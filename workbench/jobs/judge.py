@@ -11,20 +11,16 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
+from design.machine.documents import design_document, model_document
+from design.machine.model import Model
 from identification.drift.drift_result import Shift
 from identification.drift.mewma import DriftState
 from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
 from workbench.cards.own_effects import library as installed
-from workbench.documents.model import Model
 from workbench.documents.reading import Stored
-from workbench.documents.result_files import (
-    design_document,
-    model_document,
-    read_design,
-    read_model,
-)
+from workbench.documents.result_files import read_design, read_model
 from workbench.jobs.challenge import Contender, Terms, challenge
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Source, Sources, read_sources

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.nearest import nearest
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
-from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger
 from workbench.logs.table import BINARY_BYTES, RawColumn, Table, refuse_long
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.nearest import nearest
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
-from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger
 from workbench.logs.channels import optional
 from workbench.logs.layout import NUMBER, Layout, find_layout

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from design.machine.nearest import nearest
 from identification.errors import BadCard, BadLog
 from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.cards.card_tables import FileEntry
-from workbench.cards.nearest import nearest
-from workbench.documents.plausible import log_remarks
+from workbench.documents.log_remarks import log_remarks
 from workbench.files import CARD_FILE, broken_link, refuse_special, sha256_of, shipped_cards
 from workbench.logs.runs import read_runs, runs_of, shown_name
 from workbench.logs.table import Table

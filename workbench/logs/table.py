@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from design.machine.nearest import nearest
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
-from workbench.cards.nearest import nearest
 
 RawColumn = NDArray[Any]
 

@@ -13,9 +13,9 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
+from design.machine.nearest import nearest
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec, Format
-from workbench.cards.nearest import nearest
 from workbench.files import broken_link, refuse_larger, refuse_special
 from workbench.logs.channels import read_mdf, read_tdms, read_ulog
 from workbench.logs.clocks import named_in_turn

@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 
-from workbench.cards.readable import number as written
+from design.machine.readable import number as written
 from workbench.jobs.options import clock
 from workbench.output import templates
 from workbench.page.dropped import Drop

@@ -19,9 +19,9 @@ from identification.errors import UserError
 from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
+    from design.machine.design import Design
+    from design.machine.model import Identifiable
     from identification.arrays import Array
-    from workbench.documents.design import Design
-    from workbench.documents.model import Identifiable
     from workbench.logs.unknown import UnknownLog
     from workbench.report.chart import Colour, LineStyle
     from workbench.steps.first_card.proposal import Proposal

@@ -14,9 +14,9 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Route
 
+from design.machine.readable import shown_unit
 from identification.arrays import Array
 from identification.errors import UserError
-from workbench.cards.readable import shown_unit
 from workbench.jobs.options import clock
 from workbench.page import looks
 from workbench.page.asked import STATE_WORDS, Asked, download, part

@@ -19,11 +19,11 @@ from types import FrameType
 
 import numpy as np
 
+from design.machine.documents import design_document
+from design.machine.model import Model
 from identification.errors import BadModel, BadSpecification, NotIdentifiable, UserError
 from workbench.cards.own_effects import library
 from workbench.course import Course, moving
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document
 from workbench.jobs.options import clock, worker_name
 from workbench.jobs.passes import Patience, Report, renewed
 from workbench.logs.sources import Sources, read_sources

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from workbench.cards.readable import shown_unit
+from design.machine.readable import shown_unit
 
 MODEL_PARTS = ("friction", "actuator", "effects")
 DESIGN_PARTS = ("recommended", "force", "rst", "pid", "p_pi", "compensator")

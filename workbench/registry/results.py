@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 from sqlalchemy import and_, select
 
-from workbench.cards.readable import shown_unit
+from design.machine.readable import shown_unit
 from workbench.registry.database import Database
 from workbench.registry.rows import accepted_version, judged_now
 from workbench.registry.tables import (

@@ -8,7 +8,7 @@ from typing import get_args
 from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from workbench.cards.nearest import nearest
+from design.machine.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.database import insert_missing
 from workbench.registry.overview import summary_moved

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from datetime import datetime
 
+from design.machine.readable import in_digits, number
 from identification.model.estimates import NORMAL_95
-from workbench.cards.readable import in_digits, number
 from workbench.registry.difference import Line, Number, as_read
 from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled

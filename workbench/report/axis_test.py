@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from design.machine.readable import in_digits, number, shown_unit, units_of
 from identification.estimation.estimates import counted
-from workbench.cards.readable import in_digits, number, shown_unit, units_of
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.templating import render
 from workbench.report.view import Section, View

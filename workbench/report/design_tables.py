@@ -1,10 +1,10 @@
 """A design as tables and lines, for a terminal and a report."""
 
 from design.drive_law import DriveLaw
-from workbench.cards.readable import length, number
-from workbench.documents.codec import Output
-from workbench.documents.design import Controller, Design
-from workbench.documents.drive import equation_lines, force_lines
+from design.machine.codec import Output
+from design.machine.design import Controller, Design
+from design.machine.drive import equation_lines, force_lines
+from design.machine.readable import length, number
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words

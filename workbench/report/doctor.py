@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.readable import number
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.log import Log
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
-from workbench.cards.readable import number
 from workbench.cards.units import si_unit
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel

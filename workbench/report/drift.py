@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from design.machine.readable import number, shown_unit
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import reported_estimate
-from workbench.cards.readable import number, shown_unit
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
 from workbench.report.model_tables import reasons_once

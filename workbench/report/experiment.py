@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from workbench.cards.readable import shown
+from design.machine.readable import shown
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, Row, listed, more, tabled

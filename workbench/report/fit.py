@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from design.machine.model import Model
+from design.machine.readable import force, times, units_of
 from identification.arrays import Array
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import NORMAL_95
@@ -14,8 +16,6 @@ from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from identification.tracing.result import Trace
-from workbench.cards.readable import force, times, units_of
-from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from design.machine.model import Model, used
+from design.machine.readable import units_of
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.log import Log
@@ -17,8 +19,6 @@ from identification.model.size import Size
 from identification.model.surroundings import Surroundings
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
-from workbench.cards.readable import units_of
-from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
 from workbench.report.chart_figure import evenly_spread

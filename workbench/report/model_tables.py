@@ -3,15 +3,15 @@
 import re
 from collections.abc import Iterable, Sequence
 
+from design.machine.effect_values import known_effect
+from design.machine.model import Model, used
+from design.machine.readable import as_shown, in_digits, length, number, shown, times
+from design.machine.velocity import VelocityModel
 from identification.effects._base import Param
 from identification.estimation.latent_force import LatentForces
 from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
-from workbench.cards.effect_values import known_effect
-from workbench.cards.readable import as_shown, in_digits, length, number, shown, times
-from workbench.documents.model import Model, used
-from workbench.documents.velocity import VelocityModel
 from workbench.remarks import printed_once
 from workbench.report.templating import MEANINGS
 from workbench.report.trace_words import share_of_friction

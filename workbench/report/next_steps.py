@@ -9,9 +9,9 @@ from workbench.files import CARD_FILE, shipped_cards
 from workbench.output import Step, step
 
 if TYPE_CHECKING:
-    from workbench.documents.design import Controller, Design
-    from workbench.documents.model import Model
-    from workbench.documents.velocity import VelocityModel
+    from design.machine.design import Controller, Design
+    from design.machine.model import Model
+    from design.machine.velocity import VelocityModel
     from workbench.steps.demo import Demonstration
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted

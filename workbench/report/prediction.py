@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.cards.readable import force, length, units_of
+from design.machine.readable import force, length, units_of
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes

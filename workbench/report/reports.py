@@ -8,14 +8,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 from design.loop_frequencies import open_loop_response
+from design.machine.design import Controller, Design
+from design.machine.documents import design_document, model_document
+from design.machine.model import Model, used
 from design.margins import sensitivities
 from design.rst import RST, closed_loop
 from identification.arrays import Array
 from identification.estimation.windowed_run.parameters import AT_ZERO
 from identification.simulation.free_run import FreeRun
-from workbench.documents.design import Controller, Design
-from workbench.documents.model import Model, used
-from workbench.documents.result_files import design_document, model_document
 from workbench.report.chart import Chart, Colour, Line, Mark, Panel
 from workbench.report.design_tables import (
     design_lines,

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from design.machine.model import Model
+from design.machine.readable import number, shown
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
@@ -12,8 +14,6 @@ from identification.frequency.modes import Peak
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from identification.thresholds import COHERENCE_SURE
-from workbench.cards.readable import number, shown
-from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, report_notes, table

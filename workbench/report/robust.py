@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from design.machine.documents import design_document
+from design.machine.readable import length, number, units_of
 from identification.arrays import Array
-from workbench.cards.readable import length, number, units_of
-from workbench.documents.result_files import design_document
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.machine.documents import model_document
+from design.machine.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
 from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
 from identification.tracing.result import FoundEffect, Trace
-from workbench.cards.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
-from workbench.documents.result_files import model_document
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart
 from workbench.report.friction import trace_friction_chart

@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 
+from design.machine.readable import units_of
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting, Effect
 from identification.model.karnopp import Karnopp
 from identification.simulation.effect_along_motion import contribution
 from identification.tracing.result import FreeCurve, Residual, Trace
-from workbench.cards.readable import units_of
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
 from workbench.report.trace_words import words

@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from design.loop import LoopRun
+from design.machine.readable import Shown, length, number, shown, shown_unit, units_of
 from identification.arrays import Array
 from identification.model.estimates import Estimate
-from workbench.cards.readable import Shown, length, number, shown, shown_unit, units_of
 from workbench.output import next_step, step, written
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel
 from workbench.report.design_tables import design_lines, of_the_model

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.readable import length, number
+from design.machine.velocity import VelocityDesign, VelocityModel, velocity_document
 from identification.velocity.record import RUN_IN
 from identification.velocity.rivals import STRUCTURES, is_noise
-from workbench.cards.readable import length, number
-from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity_document
 from workbench.output import Step, step
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.prediction import csv_text

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from design.machine.plain import plain
+from design.machine.readable import number, shown_unit
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
 from identification.estimation.estimates import counted, reported_estimate
@@ -22,8 +24,6 @@ from identification.model.surroundings import Surroundings
 from identification.signals.check import check_driven
 from identification.thresholds import HALF
 from workbench.cards.card_tables import limit_units
-from workbench.cards.readable import number, shown_unit
-from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 

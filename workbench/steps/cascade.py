@@ -10,16 +10,16 @@ from design.cascade import TunedCascade, tune_cascade
 from design.drive_law import drive_law
 from design.feed_forward import FeedForward
 from design.loop_frequencies import loop_frequencies
+from design.machine.design import Controller, Design, Linear, Recommended, margin_values
+from design.machine.drive import ForceLoop
+from design.machine.model import Model, used
+from design.machine.readable import number
 from design.margins import margins
 from design.series_filters import SeriesFilter, filters_against
 from design.tracking import Plants
 from design.tune import Goals
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from workbench.cards.readable import number
-from workbench.documents.design import Controller, Design, Linear, Recommended, margin_values
-from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import command_of, delayed, law_to_force, swings_of
 
 FILTER_EARNS = 1.1  # times the bandwidth without it, from which a notch or a low-pass is proposed

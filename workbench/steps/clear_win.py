@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.machine.drive import ForceLoop
+from design.machine.model import Model
 from design.servo import ServoRun
 from identification.arrays import Array, BoolArray
 from identification.effects._library import built_in
 from identification.errors import UserError
 from identification.model.plant import Plant
-from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model
 from workbench.steps.cascade import feed_forward, reference_limits, unseen_lag
 from workbench.steps.closed_loop import DrivenLoop, drawn_plants, in_loop, run_plant
 from workbench.steps.loop_figures import risen_sine, speed_seen

@@ -14,6 +14,10 @@ from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise
 from design.loop_signals import OfForce, pressures
+from design.machine.active_model import active_model
+from design.machine.design import Controller, Design, Structure
+from design.machine.drive import ForceLoop, Present
+from design.machine.model import Model, used
 from design.pid import pd_to_rst, pid_to_rst
 from design.present import cascade_to_rst
 from design.rst import RST
@@ -27,11 +31,7 @@ from identification.log import Rig
 from identification.model.plant import Actuator, Motor, Plant
 from workbench.cards.card import Card, load_card
 from workbench.cards.controller import CardController, Kind
-from workbench.documents.design import Controller, Design, Structure
-from workbench.documents.drive import ForceLoop, Present
-from workbench.documents.model import Model, used
 from workbench.logs.sources import card_path
-from workbench.steps.drift import active_model
 from workbench.steps.linear_loop import command_of
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.design import Design
 from identification.effects._library import built_in
 from identification.errors import BadCard
 from identification.model.karnopp import NAMES
 from identification.progress import Progress
 from workbench.cards.card import Card
 from workbench.cards.recipe import Recipe
-from workbench.documents.design import Design
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.steps.design import design

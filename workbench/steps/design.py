@@ -9,13 +9,7 @@ import numpy as np
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
 from design.loop_frequencies import loop_frequencies
-from design.tracking import Demand
-from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
-from identification.errors import BadModel, BadSpecification
-from identification.model.plant import Actuator, Motor
-from identification.remarks import MinorRemark
-from workbench.cards.readable import Shown, length, number, shown, shown_unit
-from workbench.documents.design import (
+from design.machine.design import (
     DESIGNED_STRUCTURES,
     Controller,
     Design,
@@ -25,9 +19,15 @@ from workbench.documents.design import (
     Structure,
     margin_values,
 )
-from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model, used
-from workbench.documents.plausible import bandwidth_remarks, stored_remarks
+from design.machine.drive import ForceLoop
+from design.machine.model import Model, used
+from design.machine.plausible import bandwidth_remarks, stored_remarks
+from design.machine.readable import Shown, length, number, shown, shown_unit
+from design.tracking import Demand
+from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
+from identification.errors import BadModel, BadSpecification
+from identification.model.plant import Actuator, Motor
+from identification.remarks import MinorRemark
 from workbench.documents.reading import versions
 from workbench.steps.cascade import beside_resonance, cascade_controller, limit_force, tuned_cascade
 from workbench.steps.clear_win import CLEARLY_LESS

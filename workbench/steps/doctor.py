@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.model import Identifiable
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
@@ -27,8 +28,7 @@ from identification.signals.relations import command_lag, lead
 from workbench.cards.card import Card
 from workbench.cards.headers import contradicted_units
 from workbench.cards.units import conversion
-from workbench.documents.model import Identifiable
-from workbench.documents.plausible import log_remarks
+from workbench.documents.log_remarks import log_remarks
 from workbench.logs.runs import longest_run, runs_of, table_of, with_force
 from workbench.steps.first_card.remarks import are_exchanged
 from workbench.steps.hardly_identifiable import hardly_identifiable

@@ -12,21 +12,21 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from design.machine.active_model import active_model
+from design.machine.documents import model_document
+from design.machine.model import Model
+from design.machine.plain import as_number, plain
+from design.machine.plausible import refuse_other_machine, refuse_other_units
+from design.machine.readable import number
 from identification.drift.drift_result import DriftTest, DriftVerdict, Shift, Statistic
 from identification.drift.drift_test import DriftSettings, drift_test
 from identification.drift.mewma import DriftState
-from identification.drift.reference_model import ReferenceModel
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES
-from identification.model.plant import Motor
 from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, OF_ACCOUNT, TWICE
-from workbench.cards.readable import number
-from workbench.documents.model import Model, used
-from workbench.documents.plausible import refuse_other_machine, refuse_other_units
-from workbench.documents.reading import as_number, plain, read_result, versions
-from workbench.documents.result_files import model_document
+from workbench.documents.reading import read_result, versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
 from workbench.steps.predict import of_one_instant
@@ -122,50 +122,6 @@ def model_key(model: Model) -> str:
     if not document["bad_samples"]:
         del document["bad_samples"]
     return hashlib.sha256(dumps(document).encode()).hexdigest()
-
-
-def active_model(model: Model, key: str) -> ReferenceModel:
-    """The model as the drift test takes it; key: names it in the stored state.
-
-    Without a correlation in the model file the parameters' errors count as independent.
-    """
-    every: dict[str, Estimate] = {name: model.friction[name] for name in NAMES}
-    if not isinstance(model.simulated.actuator, Motor):
-        every |= model.actuator or {}
-    for effect, found in model.effects.items():
-        every |= {f"{effect}.{name}": estimate for name, estimate in found.items()}
-    identified = {n: e for n, e in every.items() if e.known and e.sd is not None}
-    why = "it gives no standard deviation"
-    unidentified = {n: e.reason or why for n, e in every.items() if n not in identified}
-    return ReferenceModel(
-        plant=model.simulated,
-        names=tuple(identified),
-        values=np.array([used(e) for e in identified.values()]),
-        covariance=_covariance(model, identified),
-        rig=model.rig,
-        drive=model.fit.drive,
-        chi_square=model.fit.chi_square,
-        imposed=model.by_equation,
-        untold=unidentified,
-        key=key,
-        fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),
-        own_logs=model.own_logs,
-        force_relative=model.fit.force_relative,
-    )
-
-
-def _covariance(model: Model, identified: Mapping[str, Estimate]) -> Any:
-    """Covariance (d, d) of the identified parameters by their deviations and the model's
-    correlation."""
-    sd = np.array([e.sd or 0.0 for e in identified.values()])
-    together = np.eye(len(identified))
-    if model.correlation is not None:
-        place = {name: i for i, name in enumerate(model.correlation.names)}
-        matrix = np.array(model.correlation.matrix)
-        at = [(i, place[name]) for i, name in enumerate(identified) if name in place]
-        rows, columns = [i for i, _ in at], [k for _, k in at]
-        together[np.ix_(rows, rows)] = matrix[np.ix_(columns, columns)]
-    return together * np.outer(sd, sd)
 
 
 def drift_of(

@@ -5,11 +5,11 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+from design.machine.design import Design
+from design.machine.model import Model, used
+from design.machine.readable import number
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.cards.readable import number
-from workbench.documents.design import Design
-from workbench.documents.model import Model, used
 from workbench.documents.reading import read_document, read_raw
 from workbench.steps.response import RESPONSE_SCHEMA
 

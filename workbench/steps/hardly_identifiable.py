@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from design.machine.readable import length
 from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
 from identification.log import Log, Rig
@@ -16,7 +17,6 @@ from identification.signals.differentiate import differentiate, low_pass
 from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
 from identification.thresholds import ASTRAY, HALF
-from workbench.cards.readable import length
 
 INFORMATIVE_RATE = 50.0  # Hz, below which starts and stops lie between two samples
 NEARLY_ONE_WAY = 0.05  # of the motion, that goes the other way at most

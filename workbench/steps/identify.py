@@ -12,6 +12,17 @@ from typing import Any, Literal
 
 import numpy as np
 
+from design.machine.active_model import active_model
+from design.machine.effect_values import relabelled
+from design.machine.model import (
+    ArxPlant,
+    ArxTests,
+    FitSummary,
+    LogEntry,
+    Model,
+    ParameterCorrelation,
+)
+from design.machine.readable import friction_units
 from identification.arrays import Array
 from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulation_errors
 from identification.arx.order_selection import OrderRange, select_arx
@@ -31,21 +42,10 @@ from identification.model.surroundings import Surroundings
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
-from workbench.cards.effect_values import relabelled
-from workbench.cards.readable import friction_units
-from workbench.documents.model import (
-    ArxPlant,
-    ArxTests,
-    FitSummary,
-    LogEntry,
-    Model,
-    ParameterCorrelation,
-)
 from workbench.documents.reading import versions
 from workbench.logs.sources import Source
 from workbench.steps.asked import Options as Options
 from workbench.steps.asked import Orders
-from workbench.steps.drift import active_model
 from workbench.steps.predict import of_one_instant
 
 DESIGN_PERIOD = 10e-3  # s

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from design.machine.model import Model
+from design.machine.plain import plain
+from design.machine.plausible import model_remarks
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, Progress, quiet, without_end
-from workbench.documents.model import Model
-from workbench.documents.plausible import model_remarks
-from workbench.documents.reading import plain
 from workbench.logs.sources import Source, Sources
 from workbench.steps.closed_loop import present_of_card
 from workbench.steps.hardly_identifiable import braked_by_its_voltage

@@ -8,16 +8,16 @@ import numpy as np
 from design.drive_law import DriveLaw
 from design.elastic import Swing, elastic_plant
 from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
+from design.machine.codec import Command
+from design.machine.design import From, Linear
+from design.machine.drive import ForceLoop
+from design.machine.model import Model, used
+from design.machine.readable import shown
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
-from workbench.cards.readable import shown
-from workbench.documents.codec import Command
-from workbench.documents.design import From, Linear
-from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model, used
 
 FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design
 IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has then done 80 %

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from design.machine.model import Model, used
 from design.schedule import OVERS, Over
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.model.estimates import Estimate
-from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import chambers, in_the_loop
 
 CHANGES_FROM = 0.05  # of the friction, by which it has to change to ask for a schedule

@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from design.loop import LoopRun
-from design.margins import margins
-from design.rst import closed_loop_poles
-from design.tune import worst_modulus
-from identification.arrays import Array
-from identification.errors import BadModel, BadSpecification
-from identification.model.plant import Motor
-from workbench.cards.readable import length, shown
-from workbench.documents.design import (
+from design.machine.design import (
     DESIGNED_STRUCTURES,
     Design,
     MarginValues,
     Structure,
     margin_values,
 )
-from workbench.documents.model import Model
+from design.machine.model import Model
+from design.machine.readable import length, shown
+from design.margins import margins
+from design.rst import closed_loop_poles
+from design.tune import worst_modulus
+from identification.arrays import Array
+from identification.errors import BadModel, BadSpecification
+from identification.model.plant import Motor
 from workbench.steps.asked import Limits as Limits
 from workbench.steps.closed_loop import (
     DrivenLoop,

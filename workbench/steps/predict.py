@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from design.machine.model import Model, used
+from design.machine.plausible import refuse_other_machine, refuse_other_units
 from identification.arrays import Array, IntArray
 from identification.effects._base import Acting
 from identification.errors import BadLog, BadModel
@@ -28,8 +30,6 @@ from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start, measured_states
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import force_needed, of_body, with_motor_force
-from workbench.documents.model import Model, used
-from workbench.documents.plausible import refuse_other_machine, refuse_other_units
 from workbench.logs.sources import Sources
 
 if TYPE_CHECKING:

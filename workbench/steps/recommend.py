@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from design.machine.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
+from design.machine.model import Model
+from design.machine.readable import Shown, shown
 from identification.errors import BadModel
-from workbench.cards.readable import Shown, shown
-from workbench.documents.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
-from workbench.documents.model import Model
 from workbench.steps.clear_win import contest
 from workbench.steps.closed_loop import driven_loop, present_loop
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures, tried_loops

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from design.machine.model import Model, used
+from design.machine.plain import as_number
+from design.machine.plausible import refuse_other_machine
+from design.machine.readable import shown
 from design.measured_loop import MeasuredMargins, is_minus_one, measured_margins
 from design.polynomial import evaluate
 from identification.arrays import Array, BoolArray
@@ -21,10 +25,6 @@ from identification.frequency.swinging_load import swinging_load
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.size import Size
-from workbench.cards.readable import shown
-from workbench.documents.model import Model, used
-from workbench.documents.plausible import refuse_other_machine
-from workbench.documents.reading import as_number
 from workbench.logs.sources import Source, fingerprints
 from workbench.steps.linear_force import (
     freed,

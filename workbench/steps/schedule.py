@@ -6,17 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from design.compensation_tables import spread_points, table_points
+from design.machine.design import Controller, Design, GainSchedule, ScheduledController, Structure
+from design.machine.model import Model
 from design.schedule import Over
 from design.tune import Asked, Goals
 from identification.errors import BadModel, BadSpecification
-from workbench.documents.design import (
-    Controller,
-    Design,
-    GainSchedule,
-    ScheduledController,
-    Structure,
-)
-from workbench.documents.model import Model
 from workbench.steps.clear_win import contest
 from workbench.steps.closed_loop import driven_loop, scheduled_loop
 from workbench.steps.design import effort_limit, placed_design

@@ -10,6 +10,12 @@ from design.effect_loop import simulate_effect_loop
 from design.filters import filters_at
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
+from design.machine.codec import written
+from design.machine.documents import around_of
+from design.machine.drive import Present
+from design.machine.effect_values import exact
+from design.machine.plain import as_number
+from design.machine.readable import friction_units
 from design.rst import RST
 from design.servo import Compensation, simulate_servo
 from identification.arrays import Array
@@ -22,13 +28,7 @@ from identification.signals.excitation import reference_signal
 from identification.simulation.free_run import FreeRun, free_run
 from workbench.cards.card import Card
 from workbench.cards.controller import CardController
-from workbench.cards.effect_values import exact
-from workbench.cards.readable import friction_units
 from workbench.cards.recipe import Recipe
-from workbench.documents.codec import written
-from workbench.documents.drive import Present
-from workbench.documents.reading import as_number
-from workbench.documents.result_files import around_of
 from workbench.files import ABSURD
 from workbench.steps.closed_loop import DrivenLoop, present, rst_of
 from workbench.steps.predict import lacking_signals

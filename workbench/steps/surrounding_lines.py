@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Mapping
 
+from design.machine.readable import number
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.plant import units_of
@@ -10,7 +11,6 @@ from identification.model.resonance import Resonance
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
 from identification.thresholds import TWICE
-from workbench.cards.readable import number
 
 MS = 1e3
 

@@ -6,6 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.effect_values import relabelled
+from design.machine.model import FitSummary, Model
+from design.machine.plain import plain
+from design.machine.plausible import model_remarks, refuse_other_units
 from identification.effects._library import Library
 from identification.errors import BadLog
 from identification.estimation.surroundings import lag_estimate
@@ -18,10 +22,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.tracing.result import FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
-from workbench.cards.effect_values import relabelled
-from workbench.documents.model import FitSummary, Model
-from workbench.documents.plausible import model_remarks, refuse_other_units
-from workbench.documents.reading import plain, versions
+from workbench.documents.reading import versions
 from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
 from workbench.steps.closed_loop import present_of_card
 from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects

@@ -10,10 +10,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from design.filters import filters_at, quick_filters
+from design.machine.compensator import CompensatorValues, FiltersAt
+from design.machine.design import Controller
+from design.machine.model import Model
 from design.tracking import integrates
-from workbench.documents.compensator import CompensatorValues, FiltersAt
-from workbench.documents.design import Controller
-from workbench.documents.model import Model
 
 N_C = 2.0  # the paper's, in simulation and on the rig
 E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m

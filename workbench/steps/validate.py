@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.design import Design
+from design.machine.documents import design_digest
+from design.machine.model import Model
+from design.machine.readable import Shown, shown
 from identification.remarks import MinorRemark
-from workbench.cards.readable import Shown, shown
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.documents.reading import versions
-from workbench.documents.result_files import design_digest
 from workbench.steps.closed_loop import effects_left_out
 from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.model import Model
+from design.machine.plain import plain
+from design.machine.plausible import refuse_other_machine
+from design.machine.readable import length
+from design.machine.velocity import PredictionErrors, VelocityLog, VelocityModel
 from identification.arrays import Array
 from identification.errors import BadModel, UserError
 from identification.log import Log, Rig
@@ -25,11 +30,7 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
-from workbench.cards.readable import length
-from workbench.documents.model import Model
-from workbench.documents.plausible import refuse_other_machine
-from workbench.documents.reading import plain, versions
-from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
+from workbench.documents.reading import versions
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
 from workbench.steps.identify import decimated
 from workbench.steps.predict import predict

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.velocity import VelocityDesign, VelocityModel
 from design.margins import Margins, margins
 from design.valve_loop import (
     SLOW_END,
@@ -22,7 +23,6 @@ from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.velocity.model import Valve
 from workbench.documents.reading import versions
-from workbench.documents.velocity import VelocityDesign, VelocityModel
 from workbench.steps.loop_figures import Limits
 
 SMOOTHED = 3.0  # deviations of the position's noise, within which no offset is given in full

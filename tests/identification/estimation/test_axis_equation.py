@@ -10,8 +10,8 @@ from identification.errors import NotIdentifiable
 from identification.estimation.axis_equation import axis_equation
 from identification.log import Log, Rig
 from tests.chain import short_recipe
-from workbench.cards.effect_values import written_effect
 from workbench.cards.recipe import Recipe
+from workbench.cards.written_effect import written_effect
 from workbench.steps.simulate import record
 
 MADE = Rig("force")

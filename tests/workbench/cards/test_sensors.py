@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.errors import BadCard
+from identification.log import Motion
 from tests.workbench.log_files import CARD, card, signals, write_csv
-from workbench.cards.units import Gain, Motion, column_scale, parse_gain
+from workbench.cards.units import Gain, column_scale, parse_gain
 from workbench.logs.runs import read_log
 from workbench.steps.simulate import as_columns
 

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.errors import BadCard
-from workbench.cards.units import Motion, column_scale, conversion, in_unit_of
+from identification.log import Motion
+from workbench.cards.units import column_scale, conversion, in_unit_of
 
 
 @pytest.mark.parametrize(

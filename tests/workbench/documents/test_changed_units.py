@@ -9,17 +9,13 @@ from typing import Any
 
 import pytest
 
+from design.machine.documents import design_document, model_document
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cli import main
-from workbench.documents.result_files import (
-    design_document,
-    model_document,
-    read_design,
-    read_model,
-)
+from workbench.documents.result_files import read_design, read_model
 from workbench.output import dumps
 from workbench.steps.design import design
 

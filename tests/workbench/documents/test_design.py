@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
+from design.machine.design import Design
+from design.machine.documents import design_document
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, model_of
-from workbench.documents.design import Design
-from workbench.documents.result_files import design_document, read_design
+from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.steps.design import design
 

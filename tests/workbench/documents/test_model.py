@@ -7,15 +7,16 @@ from typing import Any
 
 import pytest
 
+from design.machine.documents import model_document
+from design.machine.effect_values import effect_units, relabelled
+from design.machine.model import Model
 from identification.effects._library import built_in
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, identified, model_of
-from workbench.cards.effect_values import effect_units, relabelled
-from workbench.documents.model import Model
-from workbench.documents.result_files import model_document, read_model
+from workbench.documents.result_files import read_model
 from workbench.output import dumps
 
 ACTUATOR = Actuator(19530.0, 10405.0)

@@ -8,6 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.machine.documents import model_document
+from design.machine.model import Model
+from design.machine.plausible import bandwidth_remarks, model_remarks, stored_remarks
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator
@@ -15,14 +18,7 @@ from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cards.card import load_card
 from workbench.cards.card_tables import SignalSpec
 from workbench.cli import main
-from workbench.documents.model import Model
-from workbench.documents.plausible import (
-    bandwidth_remarks,
-    log_remarks,
-    model_remarks,
-    stored_remarks,
-)
-from workbench.documents.result_files import model_document
+from workbench.documents.log_remarks import log_remarks
 from workbench.logs.sources import card_path, read_sources
 from workbench.output import dumps
 from workbench.steps.design import design

@@ -6,14 +6,14 @@ from functools import cache
 import numpy as np
 
 from design.loop import LoopNoise
+from design.machine.design import Design
+from design.machine.model import Model
 from design.servo import ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.export.exported import Exported
 from workbench.steps.design import design
 from workbench.steps.schedule import scheduled

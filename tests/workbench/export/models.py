@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from design.machine.effect_values import effect_units, known_effect
+from design.machine.model import Model
 from identification.model.estimates import Estimate
 from identification.model.karnopp import ROTARY_UNITS, Karnopp
 from tests.chain import TABLES, model_of
-from workbench.cards.effect_values import effect_units, known_effect
-from workbench.documents.model import Model
 
 STRIBECK = {"stribeck": {"F_s": 6.0, "v_s": 0.02, "asymmetry": 0.3}}
 COGGING = {

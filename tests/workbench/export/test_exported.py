@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from design.machine.compensator import CompensatorValues
+from design.machine.drive import Present
 from identification.errors import BadModel
 from tests.workbench.export.designs import case
-from workbench.documents.compensator import CompensatorValues
-from workbench.documents.drive import Present
 from workbench.export.exported import exported, identifier, lead_of, rows, title_of
 
 

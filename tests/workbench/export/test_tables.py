@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.machine.model import Model
 from identification.errors import BadModel, UserError
 from identification.model.estimates import Estimate
 from identification.model.karnopp import slip_friction
 from tests.workbench.export import table_readers as read
 from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear, lost, rotary
 from tests.workbench.export.structured_text_runner import Blocks
-from workbench.documents.model import Model
 from workbench.export.compensation import Compensation, TableFile, TablesAsked
 from workbench.export.table_targets import Tables, tables, tables_asked
 

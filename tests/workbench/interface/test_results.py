@@ -14,10 +14,10 @@ import pytest
 from nbclient import NotebookClient
 
 import workbench as wb
+from design.machine.documents import model_document
 from identification.errors import UserError
 from identification.estimation.posterior import Posterior
 from tests.chain import identified
-from workbench.documents.result_files import model_document
 from workbench.interface.models import IdentifyResult
 from workbench.output import dumps
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from design.machine.documents import model_document
 from identification.effects._library import built_in
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
-from workbench.cards.effect_values import written_effect
-from workbench.documents.result_files import model_document
+from workbench.cards.written_effect import written_effect
 from workbench.jobs.axis_history import by_quantity, earlier_of
 from workbench.jobs.judge import Reading
 from workbench.logs.sources import Source, Sources

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.machine.model import Model
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
 from identification.model.karnopp import Karnopp
 from tests.chain import CARD, TABLES, designed
 from workbench.cards.card import Card, load_card
-from workbench.documents.model import Model
 from workbench.documents.result_files import read_model
 from workbench.jobs import judge
 from workbench.jobs.challenge import Terms

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.model import Model
 from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from tests.chain import EMPS, model_of, short_recipe
 from tests.workbench.trace_values import missing_force
-from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Chart
 from workbench.report.fit import fit_chart, residual

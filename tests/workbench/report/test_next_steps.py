@@ -10,6 +10,8 @@ import click
 import numpy as np
 import pytest
 
+from design.machine.design import Design
+from design.machine.model import Model
 from design.tune import Asked
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of
@@ -17,8 +19,6 @@ from workbench import cli
 from workbench.commands.axis_test import after_axis_test
 from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.output import Step, step
 from workbench.report.next_steps import (
     after_demo,

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from design.machine.readable import friction_units
 from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, designed, identified, model_of
-from workbench.cards.readable import friction_units
 from workbench.report.chart import Chart
 from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest

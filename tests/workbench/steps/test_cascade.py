@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.design import Design
+from design.machine.documents import design_document
+from design.machine.model import Model, used
 from design.program_run import ProgramRun
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
-from workbench.documents.design import Design
-from workbench.documents.model import Model, used
-from workbench.documents.result_files import design_document, read_design
+from workbench.documents.result_files import read_design
 from workbench.export.data import json_file
 from workbench.export.exported import exported
 from workbench.output import dumps

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from design.loop import LoopRun
+from design.machine.documents import design_document
+from design.machine.model import Model
 from design.tune import Asked, Goals
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
 from identification.estimation.imposed_motion import fit_imposed
@@ -21,8 +23,7 @@ from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, identified, model_of, short_recipe
 from tests.identification.plants import made_log, table
 from workbench.cards.recipe import RecipePID
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document, read_design
+from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps import loop_figures

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.machine.design import Design
+from design.machine.model import Model
 from design.tune import Asked, Goals
 from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.report.reports import design_view
 from workbench.steps.closed_loop import driven_loop, run_driven
 from workbench.steps.design import reference_demand

@@ -9,6 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.machine.active_model import active_model
+from design.machine.documents import model_document
+from design.machine.model import ParameterCorrelation
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.drift.drift_test import DriftSettings
 from identification.drift.mewma import fresh_state
@@ -18,17 +21,10 @@ from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
 from tests.told import broken_in
 from workbench.cli import main
-from workbench.documents.model import ParameterCorrelation
-from workbench.documents.result_files import model_document, read_model
+from workbench.documents.result_files import read_model
 from workbench.output import dumps
 from workbench.report.drift import drift_sentence, reason_sentence
-from workbench.steps.drift import (
-    Drifted,
-    Stream,
-    active_model,
-    model_key,
-    read_stream,
-)
+from workbench.steps.drift import Drifted, Stream, model_key, read_stream
 from workbench.steps.drift import (
     Tested as OneRun,
 )

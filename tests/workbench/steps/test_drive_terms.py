@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.machine.design import Design
+from design.machine.documents import design_document
+from design.machine.model import Model
 from identification.arrays import Array
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.documents.design import Design
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.steps.closed_loop import driven_loop, run_driven
 

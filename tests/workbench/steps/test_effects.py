@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.effect_values import exact
+from design.machine.model import Model
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog
@@ -16,7 +18,6 @@ from identification.signals.excitation import Steps
 from identification.simulation.inverse_dynamics import of_body
 from tests.chain import EMPS, designed, model_of, short_recipe
 from workbench.cards.card import load_card
-from workbench.cards.effect_values import exact
 from workbench.cards.recipe import (
     FrictionSection,
     LoopSpec,
@@ -25,7 +26,6 @@ from workbench.cards.recipe import (
     RecipeForcePI,
     RecipePD,
 )
-from workbench.documents.model import Model
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path
 from workbench.steps.closed_loop import driven_loop, effects_left_out, in_the_loop, run_driven

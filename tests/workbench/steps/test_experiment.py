@@ -9,6 +9,7 @@ import pytest
 
 from design.experiment.limits import MotionLimits
 from design.loop import LoopNoise
+from design.machine.model import Model
 from design.pid import pid_to_rst
 from identification.arrays import Array
 from identification.effects._library import built_in
@@ -19,7 +20,6 @@ from identification.model.karnopp import NAMES
 from identification.progress import KeepGoing, quiet
 from tests.chain import TABLES, model_of
 from workbench.cards.controller import CardController
-from workbench.documents.model import Model
 from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.closed_loop import drawn_plants, in_loop, present
 from workbench.steps.experiment.plan import _remarks, bench_of, experiment, made_safe

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.machine.model import Model
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog
@@ -16,7 +17,6 @@ from identification.model.plant import Plant
 from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.cards.card import load_card
-from workbench.documents.model import Model
 from workbench.logs.sources import Source, Sources, card_path
 from workbench.report import friction
 from workbench.steps import drift

@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from design.machine.design import Design, Recommendation
+from design.machine.model import Model
 from design.tune import Asked
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.cards.controller import CardController
-from workbench.documents.design import Design, Recommendation
-from workbench.documents.model import Model
 from workbench.report.design_tables import margins_table
 from workbench.report.validation import validation_table
 from workbench.steps import recommend

@@ -10,6 +10,7 @@ import pytest
 
 import workbench as wb
 from benchmarks.response_rig import Machine, gains, machine, record
+from design.machine.model import Model
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.frequency.estimate import Response
@@ -23,7 +24,6 @@ from identification.simulation.inverse_dynamics import force_needed, opposing_fo
 from tests.chain import model_of
 from tests.made import made_once
 from workbench.cards.card import card_from
-from workbench.documents.model import Model
 from workbench.interface.logs import ResponseResult
 from workbench.logs.sources import Source
 from workbench.report.response import (

@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.machine.documents import model_document
+from design.machine.model import Model
 from identification.model.karnopp import NAMES
 from tests.identification.motor_logs import K_A, made
-from workbench.documents.model import Model
-from workbench.documents.result_files import model_document, read_model
+from workbench.documents.result_files import read_model
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines, runs_to_add

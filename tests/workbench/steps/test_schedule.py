@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.machine.documents import design_document
+from design.machine.model import Model
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
 from tests.workbench.export.designs import RUBS, case
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document, read_design
+from workbench.documents.result_files import read_design
 from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import schedule_lines, schedule_rows

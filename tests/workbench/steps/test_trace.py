@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.machine.documents import model_document
 from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.estimation.estimates import HELD, of_effect
@@ -28,7 +29,7 @@ from identification.tracing.result import (
 from tests.told import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
-from workbench.documents.result_files import model_document, read_model
+from workbench.documents.result_files import read_model
 from workbench.output import dumps
 from workbench.report.friction import sliding_friction
 from workbench.report.trace import (

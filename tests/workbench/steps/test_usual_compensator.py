@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from design.machine.model import Model
 from design.tune import Asked
 from identification.model.karnopp import Karnopp
 from tests.chain import designed, model_of
-from workbench.documents.model import Model
 from workbench.steps.closed_loop import driven_loop
 from workbench.steps.loop_figures import COMPENSATED, Limits, tried_loop
 from workbench.steps.recommend import compared

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from design.loop import LoopRun
+from design.machine.design import Recommendation
+from design.machine.documents import design_document
+from design.machine.model import Model
+from design.machine.readable import shown
 from design.tune import Asked
 from identification.arrays import Array
 from tests.chain import EMPS, designed, model_of
-from workbench.cards.readable import shown
-from workbench.documents.design import Recommendation
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.report.chart import Chart
 from workbench.report.design_tables import design_sentence

@@ -13,6 +13,10 @@ from design.experiment.precision import Machine, evaluated, precision
 from design.experiment.search import best_run
 from design.experiment.separation import pairs_of, separation
 from design.loop import LoopRun
+from design.machine.design import Design
+from design.machine.effect_values import known_effect
+from design.machine.model import Model
+from design.machine.readable import Shown, shown
 from design.servo import moved_reference
 from identification.arrays import Array
 from identification.effects._base import Acting
@@ -34,10 +38,6 @@ from identification.log import Log
 from identification.model.estimates import Drive, Estimate
 from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import KeepGoing, Progress
-from workbench.cards.effect_values import known_effect
-from workbench.cards.readable import Shown, shown
-from workbench.documents.design import Design
-from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.closed_loop import (
     DrivenLoop,

@@ -13,12 +13,13 @@ from typing import Any, Literal
 from design.experiment.limits import MotionLimits, Peaks
 from design.experiment.segments import Segment
 from design.loop import LoopRun
+from design.machine.model import Model
+from design.machine.plain import plain
 from identification.arrays import Array
 from identification.effects._library import Library
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.documents.model import Model
-from workbench.documents.reading import plain, read_raw
+from workbench.documents.reading import read_raw
 from workbench.steps.asked import Wanted as Wanted
 
 Criterion = Literal["D", "T"]

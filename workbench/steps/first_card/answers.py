@@ -5,9 +5,9 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
+from design.machine.nearest import nearest
 from identification.errors import BadCard, UserError
 from workbench.cards.card import NEEDED_SIGNALS
-from workbench.cards.nearest import nearest
 from workbench.cards.units import column_scale, over_time
 from workbench.cards.written_units import written_unit
 from workbench.steps.first_card.column import COLUMN, Column

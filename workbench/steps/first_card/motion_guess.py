@@ -10,9 +10,10 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadCard
+from identification.log import Motion
 from identification.signals.relations import of_a_weight
 from workbench.cards.headers import words_of
-from workbench.cards.units import Motion, conversion
+from workbench.cards.units import conversion
 from workbench.steps.first_card.column import Column, halved_counts
 from workbench.steps.first_card.roles import Roles
 

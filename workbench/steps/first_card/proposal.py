@@ -6,11 +6,10 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from identification.log import RigKind
+from identification.log import Motion, RigKind
 from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import read_header
-from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card import remarks
 from workbench.steps.first_card.column import Column

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.cards.units import Motion
+from identification.log import Motion
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import UnitGuess, factor

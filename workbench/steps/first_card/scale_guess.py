@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.arrays import Array
+from identification.log import Motion
 from identification.signals.relations import derivative, lead
 from identification.thresholds import TWICE
-from workbench.cards.units import Motion
 from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (

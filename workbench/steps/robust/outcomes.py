@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.drawn_loops import DrawnPlants, loop_margins
+from design.machine.drive import ForceLoop
+from design.machine.model import Model
 from identification.arrays import Array
 from identification.errors import BadSpecification, UserError
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor, Plant
-from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, drawn_plants, in_loop, limit_on, run_plant
 from workbench.steps.linear_loop import sampled
 from workbench.steps.loop_figures import Limits

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from design.machine.design import Design, From, Recommendation, Recommended
+from design.machine.model import Model
 from design.tune import Asked, Goals
 from identification.errors import BadModel, NotIdentifiable
 from identification.progress import Progress, quiet
-from workbench.documents.design import Design, From, Recommendation, Recommended
-from workbench.documents.model import Model
 from workbench.documents.reading import versions
 from workbench.steps.asked import RobustAsked as RobustAsked
 from workbench.steps.closed_loop import DrivenLoop, present_loop

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from design.filters import scaled_filters
+from design.machine.compensator import CompensatorValues, FiltersAt
+from design.machine.design import Controller, Design, Structure
+from design.machine.model import Model
 from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
 from identification.progress import Progress
-from workbench.documents.compensator import CompensatorValues, FiltersAt
-from workbench.documents.design import Controller, Design, Structure
-from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
 from workbench.steps.design import POLES_PLACED, placed_design
 from workbench.steps.robust.outcomes import DrawnMachines, Motion, Outcomes, outcomes

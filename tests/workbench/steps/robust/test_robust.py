@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from design.machine.documents import design_document
+from design.machine.model import Model
 from design.tune import Asked
 from identification.errors import NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from tests.chain import TABLES, model_of
-from workbench.documents.model import Model
-from workbench.documents.result_files import design_document
 from workbench.output import dumps
 from workbench.report.robust import robust_lines, robust_sentence, robust_view
 from workbench.steps.closed_loop import driven_loop

@@ -7,75 +7,20 @@ A document is refused where the rest of it rules a value out. Only values in ano
 commands write are looked at: a command writes no such file, a hand or another program did.
 """
 
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from importlib.resources import files
 from math import sqrt
 
 import numpy as np
 
+from design.machine.model import LogEntry, Model
+from design.machine.sizes import LINEAR, ROTARY, Size
 from identification.errors import BadLog, BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from workbench.cards.card_tables import SignalSpec
-from workbench.cards.headers import contradicted_units
-from workbench.documents.model import LogEntry, Model
 
-
-@dataclass(frozen=True)
-class Size:
-    """What a quantity lies between in its SI unit, and the units that are mistaken for it."""
-
-    low: float
-    high: float
-    unit: str
-    slips: Sequence[tuple[float, str]] = ()
-
-
-_SIZES = tomllib.loads((files("workbench.documents") / "sizes.toml").read_text("utf-8"))
-LINEAR = {name: Size(**one) for name, one in _SIZES["linear"].items()}
-ROTARY = {**LINEAR, **{name: Size(**one) for name, one in _SIZES["rotary"].items()}}
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
 # Times another log's clock or travel: a slip of 1000, and motions alike in part.
 _OTHER_UNIT = 200.0
-_UNUSED = 1e-3  # share of the command's limit that a log reaches at least
-
-
-def log_remarks(
-    logs: Sequence[Log], rig: Rig, signals: Mapping[str, SignalSpec]
-) -> tuple[str, ...]:
-    """A line for each signal, and each number of the rig, whose size no machine has, or whose unit
-    is not that of its header.
-
-    signals: how the card reads them, for the units in the lines.
-    """
-    other = contradicted_units(signals, rig)
-    named = {name: f"signals.{name}, read in {spec.unit!r}" for name, spec in signals.items()}
-
-    def peak(name: str, logged: str = "") -> float:
-        return max(float(np.max(np.abs(log.signals.get(logged, log[name])))) for log in logs)
-
-    periods = [log.h for log in logs]
-    seen = [("t", "period", h, "sampled every") for h in _extremes(periods)]
-    seen += [("y", "travel", max(map(_travel, logs)), "the position covers")]
-    if "F" in signals:
-        seen += [("F", "force", peak("F", "F_logged"), "the force is at most")]
-    pressures = (name for name in ("p_p", "p_n") if name in signals)
-    seen += [(name, "pressure", peak(name), "the pressure is at most") for name in pressures]
-    lines = [*other.values()] + [
-        _judged(quantity, value, rig, named.get(name, f"signals.{name}"), said)
-        for name, quantity, value, said in seen
-        if name not in other
-    ]
-    if rig.control_limit and "u" in signals and "u" not in other:
-        most = peak("u")
-        if 0 < most < _UNUSED * rig.control_limit:
-            lines += [
-                f"{named['u']}: the command reaches {most:.3g} of a control_limit_v ="
-                f" {rig.control_limit:g}; check both units"
-            ]
-    return tuple(dict.fromkeys(line for line in (*lines, *_of_rig(rig)) if line))
 
 
 def model_remarks(model: Model) -> tuple[str, ...]:
@@ -84,35 +29,35 @@ def model_remarks(model: Model) -> tuple[str, ...]:
     if mass is None:
         return ()
     where = "friction.m, by the units of t, y and the force"
-    line = _judged("mass", mass, model.rig, where, "the moving body has")
-    clock = any(_judged("period", entry.h, model.rig, "", "") for entry in model.log)
+    line = size_remark("mass", mass, model.rig, where, "the moving body has")
+    clock = any(size_remark("period", entry.h, model.rig, "", "") for entry in model.log)
     if line is None and mass > 0 and not clock:  # a wrong clock makes the mass wrong, and is said
         said = f"on {mass:.4g} {model.friction['m'].unit} the logs' largest force makes"
         reached = model.force_peak / mass
-        line = _judged("acceleration", reached, model.rig, "the unit of y (or t)", said)
+        line = size_remark("acceleration", reached, model.rig, "the unit of y (or t)", said)
     return (line,) if line else ()
 
 
 def stored_remarks(model: Model) -> tuple[str, ...]:
     """As `model_remarks`, and what a model file says of its logs and rig, for who reads it."""
     logs, rig = model.log, model.rig
-    periods = _extremes([entry.h for entry in logs])
-    lines = [_judged("period", h, rig, "t of its logs", "sampled every") for h in periods]
-    travel = max(_travel(entry) for entry in logs)
-    way = _judged("travel", travel, rig, "y of its logs", "the position covers")
+    periods = extremes([entry.h for entry in logs])
+    lines = [size_remark("period", h, rig, "t of its logs", "sampled every") for h in periods]
+    travel = max(travel_of(entry) for entry in logs)
+    way = size_remark("travel", travel, rig, "y of its logs", "the position covers")
     speed = max((entry.speed or 0.0 for entry in logs), default=0.0)
     lines += [
-        way or _judged("speed", speed, rig, "y or t of its logs", "the body moves at"),
-        _judged("force", model.force_peak, rig, "the force of its logs", "at most"),
+        way or size_remark("speed", speed, rig, "y or t of its logs", "the body moves at"),
+        size_remark("force", model.force_peak, rig, "the force of its logs", "at most"),
     ]
-    every = (*lines, *_of_rig(rig), *model_remarks(model))
+    every = (*lines, *rig_remarks(rig), *model_remarks(model))
     return tuple(dict.fromkeys(line for line in every if line))
 
 
 def bandwidth_remarks(w_n: Iterable[float], rig: Rig) -> tuple[str, ...]:
     """A line where the dominant poles [rad/s] of a design lie where no position loop has them."""
     where = "design (units of the model's logs)"
-    found = (_judged("bandwidth", w, rig, where, "the loop's w_n is") for w in w_n)
+    found = (size_remark("bandwidth", w, rig, where, "the loop's w_n is") for w in w_n)
     return tuple(dict.fromkeys(line for line in found if line))
 
 
@@ -121,11 +66,11 @@ def refuse_other_units(
 ) -> None:
     """Raises BadLog where the clock or the travel of a log is hundreds of times that of the known
     ones, training logs or those of a model, or as much less: it is in other units."""
-    periods, travels = [one.h for one in known], [_travel(one) for one in known]
+    periods, travels = [one.h for one in known], [travel_of(one) for one in known]
     for log in logs:
         _refuse_apart("period", log.h, periods, rig, f"{log.name}: signals.t: sampled every")
         said = f"{log.name}: signals.y: the position covers"
-        _refuse_apart("travel", _travel(log), travels, rig, said)
+        _refuse_apart("travel", travel_of(log), travels, rig, said)
 
 
 def refuse_other_machine(of_model: Rig, of_logs: Rig, card: str, *keys: str) -> None:
@@ -141,7 +86,7 @@ def refuse_other_machine(of_model: Rig, of_logs: Rig, card: str, *keys: str) -> 
 
 
 def _refuse_apart(quantity: str, value: float, known: Sequence[float], rig: Rig, said: str) -> None:
-    low, high = _extremes(known)
+    low, high = extremes(known)
     if value <= 0.0 or low <= 0.0 or low / _OTHER_UNIT < value < high * _OTHER_UNIT:
         return
     size = (ROTARY if rig.motion == "rotary" else LINEAR)[quantity]
@@ -154,19 +99,21 @@ def _refuse_apart(quantity: str, value: float, known: Sequence[float], rig: Rig,
     )
 
 
-def _of_rig(rig: Rig) -> Iterator[str | None]:
+def rig_remarks(rig: Rig) -> Iterator[str | None]:
     """Areas, supply pressure and stroke as the card gives them."""
     for key, area in (("area_p_m2", rig.area_p), ("area_n_m2", rig.area_n)):
         if area is not None:
-            yield _judged("area", area, rig, f"rig.{key}", "an area of")
+            yield size_remark("area", area, rig, f"rig.{key}", "an area of")
     if rig.supply_pressure:
         where = "rig.supply_pressure_pa"
-        yield _judged("pressure", abs(rig.supply_pressure), rig, where, "a pressure of")
+        yield size_remark("pressure", abs(rig.supply_pressure), rig, where, "a pressure of")
     if rig.stroke is not None:
-        yield _judged("travel", rig.stroke[1] - rig.stroke[0], rig, "rig.stroke_m", "a stroke of")
+        yield size_remark(
+            "travel", rig.stroke[1] - rig.stroke[0], rig, "rig.stroke_m", "a stroke of"
+        )
 
 
-def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str | None:
+def size_remark(quantity: str, value: float, rig: Rig, where: str, said: str) -> str | None:
     """What to say of a value out of its range, with the unit that would bring it there."""
     size = (ROTARY if rig.motion == "rotary" else LINEAR)[quantity]
     if value == 0.0 or size.low <= value <= size.high:
@@ -196,11 +143,13 @@ def _slips(size: Size) -> Iterator[tuple[float, str, int]]:
         yield 1.0 / factor, f"{unit} in place of {name}", rank + 1
 
 
-def _extremes(values: Sequence[float]) -> tuple[float, float]:
+def extremes(values: Sequence[float]) -> tuple[float, float]:
+    """The least and the largest."""
     return min(values), max(values)
 
 
-def _travel(of: Log | LogEntry) -> float:
+def travel_of(of: Log | LogEntry) -> float:
+    """From the lowest to the highest position of a log [m]."""
     return float(np.ptp(of["y"] if isinstance(of, Log) else of.travel))
 
 

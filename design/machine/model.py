@@ -6,6 +6,20 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, SkipValidation
 
+from design.machine.codec import (
+    NOT_WRITTEN,
+    PLACEHOLDER,
+    UNWRITTEN,
+    Parameter,
+    Through,
+    in_units,
+    no_key,
+)
+from design.machine.drive import PRESENT_LOOP, Present
+from design.machine.effect_values import estimates_in_si, known_effect
+from design.machine.nearest import nearest
+from design.machine.plain import as_number
+from design.machine.readable import in_unit
 from identification.drift.reference_model import OwnLogs
 from identification.effects._base import Acting
 from identification.effects._library import Library, built_in
@@ -16,12 +30,6 @@ from identification.model.karnopp import COULOMB_NAMES, NAMES, VISCOUS_NAMES, Ka
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, MATERIAL
-from workbench.cards.effect_values import estimates_in_si, known_effect
-from workbench.cards.nearest import nearest
-from workbench.cards.readable import in_unit
-from workbench.documents.codec import NOT_WRITTEN, UNWRITTEN, Parameter, Through, in_units, no_key
-from workbench.documents.drive import PRESENT_LOOP, Present
-from workbench.documents.reading import PLACEHOLDER, as_number
 
 FALLING_NAMES = (*COULOMB_NAMES, *VISCOUS_NAMES)
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
@@ -169,7 +177,9 @@ def _effects(found: Mapping[str, Mapping[str, Estimate]], info: Any) -> Any:
     around = info.context
     try:
         return {
-            key: estimates_in_si(key, own, around.library, around.motion, around.units.command)
+            key: estimates_in_si(
+                key, own, around.library, around.conversion, around.motion, around.units.command
+            )
             for key, own in found.items()
         }
     except BadModel as error:
@@ -194,9 +204,11 @@ def _posterior(found: Mapping[str, Any], info: Any) -> Mapping[str, Any]:
     for name in own:
         if name not in units:
             raise BadModel(f"[{where}] unknown parameter {name!r}")
-    return {**found, "parameters": {
-        name: as_number(in_unit(one, units[name], f"[{where}.{name}]")) for name, one in own.items()
-    }}  # fmt: skip
+    in_si = {
+        name: in_unit(one, units[name], f"[{where}.{name}]", around.conversion)
+        for name, one in own.items()
+    }
+    return {**found, "parameters": {name: as_number(one) for name, one in in_si.items()}}
 
 
 def _library(found: Any, info: Any) -> Any:
@@ -207,9 +219,14 @@ def _library(found: Any, info: Any) -> Any:
 Parameters = Mapping[str, Parameter]
 Nine = Annotated[
     Mapping[str, Estimate],
-    Through(Parameters, lambda found, info: in_units(found, info.context.units.friction)),
+    Through(
+        Parameters,
+        lambda found, info: in_units(found, info.context.units.friction, info.context.conversion),
+    ),
 ]
-OF_ACTUATOR = Through(Parameters, lambda found, info: in_units(found, info.context.actuator))
+OF_ACTUATOR = Through(
+    Parameters, lambda found, info: in_units(found, info.context.actuator, info.context.conversion)
+)
 
 
 @dataclass(frozen=True)

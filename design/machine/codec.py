@@ -19,15 +19,18 @@ from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
+from design.machine.nearest import nearest
+from design.machine.plain import as_number
+from design.machine.readable import Conversion, Shown, converted, in_unit, no_conversion, shown
 from identification.effects._library import Library
 from identification.errors import BadModel, BadSpecification
+from identification.log import Motion
 from identification.model.estimates import Estimate
 from identification.model.plant import actuator_units
-from workbench.cards.nearest import nearest
-from workbench.cards.readable import Shown, converted, in_unit, shown
-from workbench.cards.units import Motion
-from workbench.documents.reading import OF_OURS, PLACEHOLDER, UNKNOWN_KEY, as_number
 
+UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
+OF_OURS = "refused"  # type of an error of ours, whose text has PLACEHOLDER for where it is
+PLACEHOLDER = "\0"
 Output = Literal["command", "force"]
 NO_LIMIT = "the card gives no control_limit"
 
@@ -37,7 +40,7 @@ class Around(NamedTuple):
     is not known, and what its laws give.
 
     in_full: a parameter is written with all keys, also those that say nothing. library: the effects
-    that a file may name.
+    that a file may name. conversion: of the units of a file that is read.
     """
 
     units: Shown
@@ -45,6 +48,7 @@ class Around(NamedTuple):
     output: Output = "command"
     in_full: bool = False
     library: Library | None = None
+    conversion: Conversion = no_conversion
 
     @property
     def motion(self) -> Motion:
@@ -113,15 +117,16 @@ class InUnit:
         def read(found: Estimate | None, info: Any) -> Any:
             if found is None or self.for_readers:
                 return found and found.value
-            unit = info.context.units.named(self.unit)
+            unit, conversion = info.context.units.named(self.unit), info.context.conversion
             with at_its_place():
                 if whole:
-                    return in_unit(found, unit, f"[{PLACEHOLDER}]")
+                    return in_unit(found, unit, f"[{PLACEHOLDER}]", conversion)
                 if found.value is None and self.why_none is not None:
                     if not found.reason:
                         raise BadModel(f"[{PLACEHOLDER}] is null; it needs a 'reason'")
                     return None
-                return (positive if self.above_0 else number)(found, unit, PLACEHOLDER)
+                of_kind = positive if self.above_0 else number
+                return of_kind(found, unit, PLACEHOLDER, conversion)
 
         def write(value: Any, info: Any) -> Any:
             if whole or (value is None and self.why_none is None):
@@ -169,10 +174,12 @@ class Through:
         return _schema(handler, self.form | None if optional else self.form, read, write)
 
 
-def in_units(found: Mapping[str, Estimate], units: Mapping[str, str]) -> dict[str, Estimate]:
+def in_units(
+    found: Mapping[str, Estimate], units: Mapping[str, str], conversion: Conversion
+) -> dict[str, Estimate]:
     """Parameters in their units; those of other names are left to who knows them."""
     return {
-        name: in_unit(one, units.get(name, one.unit), f"[{PLACEHOLDER}.{name}]")
+        name: in_unit(one, units.get(name, one.unit), f"[{PLACEHOLDER}.{name}]", conversion)
         for name, one in found.items()
     }
 
@@ -218,25 +225,25 @@ def numbers(
     def read(found: Mapping[str, Estimate | None], info: Any) -> Any:
         own = {name: one for name, one in found.items() if name not in derived}
         wanted = info.context.units.by_name(units)
-        return make(**numbers_of(own, wanted, PLACEHOLDER, positive if above_0 else number))
+        return make(**numbers_of(own, wanted, PLACEHOLDER, info.context, above_0=above_0))
 
     return Through(Mapping[str, Parameter | None], read, write)
 
 
 def numbers_of(
-    found: Mapping[str, Estimate | None], units: Mapping[str, str], where: str,
-    read: Callable[[Estimate, str, str], float],
+    found: Mapping[str, Estimate | None], units: Mapping[str, str], where: str, around: Around, *,
+    above_0: bool = False,
 ) -> dict[str, float]:  # fmt: skip
     """The numbers of these names; raises BadModel where one is missing or is not known."""
     for name in found:
         if name not in units:
             raise BadModel(f"[{where}] unknown key {name!r}{nearest(name, units)}")
-    out = {}
+    out, read = {}, positive if above_0 else number
     for name, unit in units.items():
         one = found.get(name)
         if one is None:
             raise BadModel(f"[{where}] has no {name!r}; add it, or run the command again")
-        out[name] = read(one, unit, f"{where}.{name}")
+        out[name] = read(one, unit, f"{where}.{name}", around.conversion)
     return out
 
 
@@ -262,17 +269,17 @@ UNWRITTEN: tuple[Any, ...] = (
 NOT_WRITTEN: tuple[Any, ...] = (BeforeValidator(no_key), *UNWRITTEN)
 
 
-def number(found: Estimate, unit: str, where: str) -> float:
+def number(found: Estimate, unit: str, where: str, conversion: Conversion) -> float:
     """A chosen value in `unit`; raises BadModel where there is none, or in another kind of unit."""
-    value = in_unit(found, unit, f"[{where}]").value
+    value = in_unit(found, unit, f"[{where}]", conversion).value
     if value is None:
         raise BadModel(f"[{where}] is null; a number in {unit!r} needed")
     return value
 
 
-def positive(found: Estimate, unit: str, where: str) -> float:
+def positive(found: Estimate, unit: str, where: str, conversion: Conversion) -> float:
     """As `number`, above 0."""
-    value = number(found, unit, where)
+    value = number(found, unit, where, conversion)
     if not (value > 0 and np.isfinite(value)):
         raise BadModel(f"[{where}] {value:g} {unit}: must be > 0")
     return value

@@ -1,16 +1,16 @@
-"""Parameters of effects: as cards and results write them, and as simulation takes them."""
+"""Parameters of effects: as results write them, and as simulation takes them."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from design.machine.nearest import nearest
+from design.machine.readable import Conversion, in_unit
 from identification.effects._base import Acting, Effect
 from identification.effects._library import Library, of_key
-from identification.errors import BadCard, BadModel
+from identification.errors import BadModel
+from identification.log import Motion
 from identification.model.estimates import Estimate
-from workbench.cards.nearest import nearest
-from workbench.cards.readable import in_unit
-from workbench.cards.units import Motion, in_unit_of
 
 _COMMAND = re.compile(r"\bV\b")
 _SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
@@ -37,50 +37,19 @@ def known_effect(key: str, library: Library) -> Effect:
     return found
 
 
-def written_effect(
-    key: str,
-    written: Mapping[str, object],
-    library: Library,
-    motion: Motion = "linear",
-    command: str = "V",
-) -> Acting:
-    """The effect as a card writes it: numbers in SI, or texts with a unit such as "30 mm/s".
-
-    Raises BadModel, naming key and parameter, where one is unknown, missing, out of its bounds or
-    of another kind.
-    """
-    effect = known_effect(key, library)
-    units = effect_units(effect, motion, command)
-    _check_names(key, written, effect)
-    values = dict[str, float]()
-    # Units with an exponent of their own last, when the exponent is known.
-    for name in sorted(written, key=lambda name: "**" in units[name]):
-        value, where = written[name], f"{key}.{name}"
-        unit = _with_exponents(units[name], values)
-        try:
-            if isinstance(value, bool) or not isinstance(value, int | float | str):
-                raise BadCard(f"{where} = {value!r}: a number in {unit!r} or a text with its unit")
-            number = in_unit_of(value, unit, where)
-        except BadCard as error:
-            p = effect.params[effect.names.index(name)]
-            example = f"{p.typical:g}" if p.unit == "1" else f"{p.typical:g} {p.unit}"
-            raise BadModel(f'{error}; write it as "{example}"') from None
-        assert number is not None
-        values[name] = float(number)
-    return effect.acting(values)
-
-
 def estimates_in_si(
     key: str,
     estimates: Mapping[str, Estimate],
     library: Library,
+    conversion: Conversion,
     motion: Motion,
     command: str = "V",
 ) -> dict[str, Estimate]:
-    """An effect's estimates in their SI units; raises BadModel as `written_effect`."""
+    """An effect's estimates in their SI units; raises BadModel, naming key and parameter, where one
+    is unknown, missing or of another kind."""
     effect = known_effect(key, library)
     units = effect_units(effect, motion, command)
-    _check_names(key, estimates, effect)
+    check_names(key, estimates, effect)
 
     known = {
         name: one.assumed if one.value is None else one.value for name, one in estimates.items()
@@ -89,8 +58,8 @@ def estimates_in_si(
     out: dict[str, Estimate] = {}
     for name, found in estimates.items():
         unit = units[name]
-        plain, target = (_with_exponents(one, values) for one in (found.unit, unit))
-        same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]")
+        plain, target = (with_exponents(one, values) for one in (found.unit, unit))
+        same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]", conversion)
         out[name] = replace(same, unit=unit)
     return out
 
@@ -109,7 +78,8 @@ def exact(acting: Acting, motion: Motion, command: str = "V") -> dict[str, Estim
     return {name: Estimate(value, units[name]) for name, value in acting.values.items()}
 
 
-def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
+def check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
+    """Raises BadModel where a parameter is given that the effect has not, or one is missing."""
     for name in given:
         if name not in effect.names:
             raise BadModel(f"{key}: unknown parameter {name!r}{nearest(name, effect.names)}")
@@ -118,7 +88,7 @@ def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
             raise BadModel(f"{key} has no {p.name!r} [{p.unit}], {p.meaning}; add it")
 
 
-def _with_exponents(unit: str, values: Mapping[str, float]) -> str:
+def with_exponents(unit: str, values: Mapping[str, float]) -> str:
     """A unit, its exponents that are parameters as numbers; 1 where one is not known."""
     return _SYMBOLIC_EXPONENT.sub(lambda found: f"**{values.get(found[1], 1.0):g}", unit)
 

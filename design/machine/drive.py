@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from design.drive_law import DriveLaw
+from design.machine.codec import PLACEHOLDER, Around, InUnit, Output, Parameter, Through
+from design.machine.readable import Shown
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
-from workbench.cards.readable import Shown
-from workbench.documents.codec import Around, InUnit, Output, Parameter, Through
-from workbench.documents.reading import PLACEHOLDER
 
 
 @dataclass(frozen=True)

@@ -22,17 +22,9 @@ from design.cascade import CascadeGains
 from design.drive_law import DriveLaw, drive_law
 from design.feed_forward import FeedForward
 from design.loop_frequencies import LoopFrequencies
-from design.margins import Margins
-from design.pid import PIDGains
-from design.rst import RST
-from design.schedule import Over, Schedule
-from design.series_filters import FilterKind, SeriesFilter
-from identification.errors import BadModel
-from identification.model.estimates import Estimate
-from workbench.cards.readable import Shown, shown
-from workbench.cards.units import Motion
-from workbench.documents.codec import (
+from design.machine.codec import (
     NOT_WRITTEN,
+    PLACEHOLDER,
     Around,
     Command,
     InUnit,
@@ -40,13 +32,12 @@ from workbench.documents.codec import (
     Parameter,
     Through,
     entry,
-    number,
     numbers,
     numbers_of,
     written,
 )
-from workbench.documents.compensator import CompensatorValues
-from workbench.documents.drive import (
+from design.machine.compensator import CompensatorValues
+from design.machine.drive import (
     FORCE_LOOP_UNITS,
     PRESENT_LOOP,
     ForceLoop,
@@ -55,7 +46,15 @@ from workbench.documents.drive import (
     law_file,
     law_of,
 )
-from workbench.documents.reading import PLACEHOLDER
+from design.machine.readable import Shown, shown
+from design.margins import Margins
+from design.pid import PIDGains
+from design.rst import RST
+from design.schedule import Over, Schedule
+from design.series_filters import FilterKind, SeriesFilter
+from identification.errors import BadModel
+from identification.log import Motion
+from identification.model.estimates import Estimate
 
 From = Literal["physical", "arx"]
 Structure = Literal["rst", "pid", "p-pi"]
@@ -315,7 +314,7 @@ def _schedule(found: ScheduleFile, info: Any) -> GainSchedule:
     """The schedule; raises BadModel where a controller has not one at every point."""
     units = _schedule_units(found.over, info.context)
     rows = [
-        tuple(numbers_of(one, units, f"{PLACEHOLDER}.points[{k}]", number).values())
+        tuple(numbers_of(one, units, f"{PLACEHOLDER}.points[{k}]", info.context).values())
         for k, one in enumerate(found.points)
     ]
     every: dict[Structure, ScheduledController | None] = {"pid": found.pid, "p-pi": found.p_pi}

@@ -2,8 +2,8 @@
 
 import pytest
 
+from design.machine.readable import as_shown, force, in_digits, length, number, small, times
 from identification.model.estimates import Estimate
-from workbench.cards.readable import as_shown, force, in_digits, length, number, small, times
 
 
 @pytest.mark.parametrize(

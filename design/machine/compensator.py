@@ -9,13 +9,12 @@ import numpy as np
 
 from design.compensator import Compensator
 from design.filters import CompensatorFilters, sampled
+from design.machine.codec import PLACEHOLDER, Around, InUnit, Parameter, Through, in_units
+from design.machine.model import used
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
 from identification.signals.filters import Filter, slope_filter
-from workbench.documents.codec import Around, InUnit, Parameter, Through, in_units
-from workbench.documents.model import used
-from workbench.documents.reading import PLACEHOLDER
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def _all_nine(found: Mapping[str, Estimate], info: Any) -> dict[str, Estimate]:
             raise BadModel(f"{where} is none of the nine: {', '.join(units)}")
         if one.value is None and (not one.reason or one.assumed is None):
             raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
-    return in_units(found, units)
+    return in_units(found, units, info.context.conversion)
 
 
 @dataclass(frozen=True)

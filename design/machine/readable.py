@@ -2,15 +2,19 @@
 numbers as an engineer reads them: no exponents, lengths in mm, digits that say something."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from identification.errors import BadCard, BadModel
+from identification.log import Motion
 from identification.model.estimates import Estimate
 from identification.model.karnopp import ROTARY_UNITS, UNITS
 from identification.model.plant import over
-from workbench.cards.units import Motion, conversion
+
+# Of two units: by what a number in the first is multiplied, and what is added to it, to have it in
+# the other; None where they are unlike. It raises BadCard where it does not know one.
+Conversion = Callable[[str, str], tuple[float, float] | None]
 
 
 class Shown(NamedTuple):
@@ -60,7 +64,12 @@ def friction_units(motion: Motion) -> Mapping[str, str]:
     return ROTARY_UNITS if motion == "rotary" else UNITS
 
 
-def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:
+def no_conversion(unit: str, _target: str) -> None:
+    """Of who converts no units: raises BadCard."""
+    raise BadCard(f"unit {unit!r} is another one, and no conversion of units is given")
+
+
+def in_unit(estimate: Estimate, unit: str, where: str, conversion: Conversion) -> Estimate:
     """The estimate in `unit`; raises BadModel, naming `where`, if its own is of another kind."""
     if estimate.unit == unit:
         return estimate
@@ -73,8 +82,7 @@ def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:
             f"{where} unit {estimate.unit!r} is of another kind than {unit!r}; write the value in"
             f" {unit!r}, or run 'workbench identify' again"
         )
-
-    return scaled(estimate, unit, found.factor, found.shift)
+    return scaled(estimate, unit, *found)
 
 
 def scaled(estimate: Estimate, unit: str, factor: float, shift: float = 0.0) -> Estimate:
