@@ -36,8 +36,11 @@ from benchmarks.blind_machines import (
     random_machine,
     stream,
 )
+from design.asked import Wanted
 from design.effect_loop import simulate_effect_loop
 from design.experiment.limits import MotionLimits, Peaks, peaks
+from design.experiment.plan import experiment
+from design.experiment.planned import Experiment
 from design.loop import Cascade, LoopNoise
 from design.machine.model import Model
 from identification.arrays import Array
@@ -52,10 +55,8 @@ from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
 from workbench.logs.sources import Source
-from workbench.steps.closed_loop import present
-from workbench.steps.experiment.plan import experiment
-from workbench.steps.experiment.planned import Experiment, Wanted
 from workbench.steps.identify import identify
+from workbench.steps.present import present
 
 POOR, WORSE = 6.0, 10.0  # s of the poor log, and times its noise
 KEPT = 1.5

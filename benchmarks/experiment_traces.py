@@ -19,6 +19,9 @@ from benchmarks.blind_cases import effect_keys
 from benchmarks.blind_effects import acting, place_of, shows
 from benchmarks.blind_machines import Machine, random_machine, simulated, stream
 from benchmarks.experiment import limits_of, logged, model_of, poor_log
+from design.asked import Wanted
+from design.experiment.plan import experiment
+from design.experiment.planned import rivals_of
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import UserError
@@ -26,8 +29,6 @@ from identification.log import Log
 from identification.progress import quiet
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
-from workbench.steps.experiment.plan import experiment
-from workbench.steps.experiment.planned import Wanted, rivals_of
 
 STRENGTH = 0.2
 POOR, WORSE = 5.0, 5.0  # s of the poor log, and times its noise

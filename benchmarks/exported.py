@@ -23,7 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
+from design.closed_loop.driven_loop import run_driven
 from design.controller_program import ProgramUnits, controller_program
+from design.controllers.design import design
 from design.drive_law import drive_law
 from design.machine.design import Design
 from design.machine.model import Model
@@ -47,8 +49,6 @@ from workbench.cards.card import load_card
 from workbench.export.c import c_files
 from workbench.export.exported import Exported, Precision, exported
 from workbench.logs.sources import DATA_VARIABLE, Source, Sources, card_path, read_sources
-from workbench.steps.closed_loop import run_driven
-from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.simulate import record
 

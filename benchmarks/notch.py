@@ -24,6 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.cascade import TunedCascade, bandwidth_of, tune_cascade
+from design.closed_loop.linear_loop import SWING_UNSURE, delayed
+from design.controllers.cascade import better
 from design.elastic import Swing, elastic_plant
 from design.linear import linear_plant
 from design.margins import modulus_margin
@@ -32,8 +34,6 @@ from design.series_filters import filters_against
 from design.tune import Asked, Goals, tune_pid, tune_rst
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from workbench.steps.cascade import better
-from workbench.steps.linear_loop import SWING_UNSURE, delayed
 
 NOISE_PART = 0.05  # of the Coulomb force, that the encoder's noise may ask for
 KEPT_ON_TRUTH = 0.98  # of the modulus margin asked

@@ -24,9 +24,9 @@ import pandas as pd
 import workbench as wb
 from benchmarks.drives_rig import Machine, machine, simulated
 from benchmarks.p_pi_rig import Ride, by_present, by_program, reference_of
+from design.closed_loop.driven_loop import driven_loop
 from identification.errors import BadSpecification, NotIdentifiable
 from workbench.report.design_tables import cascade_lines
-from workbench.steps.closed_loop import driven_loop
 
 BETTER, NOT_WORSE, NOT_HARDER, WITHIN_LIMIT = 0.95, 1.1, 1.2, 0.95
 LONGEST = 40.0  # s of the log

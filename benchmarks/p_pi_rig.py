@@ -6,11 +6,11 @@ import numpy as np
 
 from benchmarks.drives_kernel import ALGEBRAIC, RATE, STUCK, run, through
 from benchmarks.drives_rig import Machine, stream, trajectory
+from design.closed_loop.driven_loop import DrivenLoop
 from design.servo import servo_law, servo_memory
 from design.servo_kernels import Law, Memory, servo_step
 from identification.arrays import Array
 from identification.compiled import compiled
-from workbench.steps.closed_loop import DrivenLoop
 
 SIZES_OF_NONE = 25  # effects of `drives_kernel`, all 0
 LAST_OF_A_DWELL = 0.05  # s, over which a dwell's error is taken

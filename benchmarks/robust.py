@@ -29,21 +29,16 @@ import numpy as np
 
 from benchmarks.blind_machines import Machine, random_machine, stream
 from benchmarks.experiment import model_of, poor_log
+from design.asked import RobustAsked
+from design.closed_loop.drawn_plants import in_loop
+from design.closed_loop.driven_loop import DrivenLoop, driven_loop, present_loop
+from design.closed_loop.loop_figures import PRESENT
+from design.controllers.design import design
 from design.machine.model import Model
+from design.robust.outcomes import DrawnMachines, Outcomes, limits_by_name, outcomes
+from design.robust.robust import NOMINAL, ROBUST, Robust, one_motion, robust_design
 from identification.errors import UserError
 from identification.model.plant import Actuator, Plant
-from workbench.steps.closed_loop import DrivenLoop, driven_loop, in_loop, present_loop
-from workbench.steps.design import design
-from workbench.steps.loop_figures import PRESENT
-from workbench.steps.robust.outcomes import DrawnMachines, Outcomes, limits_by_name, outcomes
-from workbench.steps.robust.robust import (
-    NOMINAL,
-    ROBUST,
-    Robust,
-    RobustAsked,
-    one_motion,
-    robust_design,
-)
 
 PID = "PID alone"
 FIFTH = 0.2

@@ -18,6 +18,9 @@ from typing import Literal
 
 import numpy as np
 
+from design.closed_loop.driven_loop import DrivenLoop, driven_loop, run_plant, scheduled_loop
+from design.controllers.design import design
+from design.controllers.schedule import scheduled
 from design.machine.model import FitSummary, LogEntry, Model
 from identification.arrays import Array
 from identification.effects._base import Acting
@@ -27,14 +30,6 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Motor, Plant
-from workbench.steps.closed_loop import (
-    DrivenLoop,
-    driven_loop,
-    run_plant,
-    scheduled_loop,
-)
-from workbench.steps.design import design
-from workbench.steps.schedule import scheduled
 
 Kind = Literal["place", "load", "plain"]
 KINDS: tuple[Kind, ...] = ("place", "load", "plain")

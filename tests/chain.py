@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from design.controllers.design import design
 from design.machine.design import Design
 from design.machine.model import FitSummary, LogEntry, Model
 from identification.errors import BadCard
@@ -16,7 +17,6 @@ from tests.made import made_once
 from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
 from workbench.logs.sources import Source, Sources, card_path
-from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.simulate import record
 

@@ -7,8 +7,8 @@
 
 What an annotation says is not said again: a `Path` is one, a tuple may be given several times, a
 `bool` is a flag, a `Literal` a choice; a dataclass stands for the options that its fields say, with
-`option` or, where it is also made elsewhere, with `asked`. Name and order of the options are those
-of the parameters.
+`option` or, where it is also made elsewhere, with `asked`; of one that knows of no options,
+`options_of` says them. Name and order of the options are those of the parameters.
 """
 
 import inspect
@@ -58,6 +58,28 @@ def asked(default: object, said: str, *names: str, **how: Any) -> Any:
     return field(default=default, metadata={"said": option(said, *names, **how)})
 
 
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """A parameter that is a dataclass: what each of its fields that is an option was said as."""
+
+    options: Mapping[str, Any]
+
+
+def options_of(kind: Any, **how: Any) -> Any:
+    """A dataclass whose fields say default and meaning, as `design.asked` has them, with the option
+    of each that `how` names: as click has it, `names` where it is not called as the field, or the
+    options of a dataclass within."""
+    options = dict[str, Any]()
+    for one in fields(kind):
+        own = how.get(one.name)
+        if isinstance(own, Mapping):
+            given: dict[str, Any] = {key: value for key, value in own.items() if key != "names"}
+            given |= {} if one.default is None else {"default": one.default}
+            own = option(one.metadata["meaning"], *own.get("names", ()), **given)
+        options[one.name] = own
+    return _Group(options)
+
+
 def argument(metavar: str | None = None, **how: Any) -> Any:
     """An argument, shown as `metavar`; how: as click has it."""
     return _Said((), {"metavar": metavar, **how}, is_argument=True)
@@ -86,8 +108,10 @@ def by_signature(function: Callable[..., Any], shared: Decorator) -> Callable[..
 def _options(name: str, kind: Any, default: object) -> Iterator[tuple[str, _Said, object]]:
     """Name, option and annotation of a parameter, or of each field of its dataclass."""
     if is_dataclass(kind):
+        own = default.options if isinstance(default, _Group) else {}
         for one in fields(kind):
-            yield from _options(one.name, one.type, one.metadata.get("said", one.default))
+            said = own.get(one.name, one.metadata.get("said", one.default))
+            yield from _options(one.name, one.type, said)
     elif isinstance(default, _Said):
         yield name, default, kind
 

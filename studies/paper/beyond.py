@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 
 from design.compensator import Compensator
+from design.controllers.design import NOISE_SHARE
 from design.filters import PASS, CompensatorFilters, rig_filters
 from design.linear import ForceGains, linear_plant
 from design.margins import Margins, margins
@@ -26,7 +27,6 @@ from identification.signals.filters import RIG_A, RIG_C
 from studies.paper.figures_rig import IdentifiedRig
 from studies.paper.measures import Case, measure
 from studies.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst
-from workbench.steps.design import NOISE_SHARE
 
 PARAMETER_SPREAD = 0.05  # of every parameter, on the machines near the identified one
 MACHINES = 4

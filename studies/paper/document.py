@@ -4,11 +4,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from design.machine.versions import versions
 from studies.paper.claims import claims
 from studies.paper.measures import Case, Figures
 from studies.paper.settings import PRINTED_SUMS
 from studies.paper.study import Study
-from workbench.documents.reading import versions
 from workbench.output import written
 from workbench.screen import Row, Screen, more, screen, tabled
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.closed_loop.loop_motion import LimitCycle, limit_cycle
 from design.servo import Servo, ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from studies.paper.settings import NOISE_Y, SetUp
-from workbench.steps.loop_motion import LimitCycle, limit_cycle
 
 STANDSTILL_SHARE = 0.25  # part of a dwell over which the error at standstill is taken
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from design.asked import Limits
+from design.controllers.validate import validate
 from identification.effects import spring as spring_module
 from tests.chain import CARD
 from workbench.cli import COMMANDS, main
 from workbench.steps import demo as demonstration
-from workbench.steps.loop_figures import Limits
 from workbench.steps.trace import Traced, trace_sources
-from workbench.steps.validate import validate
 
 WITHOUT_FILES = (
     "reidentify",

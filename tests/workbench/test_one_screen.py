@@ -13,8 +13,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from design.asked import Limits, RobustAsked
+from design.closed_loop.loop_figures import COMPENSATED, PRESENT, LoopFigures
+from design.closed_loop.loop_motion import LimitCycle
+from design.controllers.validate import Validation
+from design.experiment.planned import Experiment, Promised, Safety
 from design.machine.design import Recommendation
 from design.machine.model import Model
+from design.robust.outcomes import MEASURES, Outcomes
+from design.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
 from design.tune import Asked
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.frequency.modes import Modes, Peak
@@ -46,16 +53,10 @@ from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.drift import Drifted
 from workbench.steps.drift import Tested as OneTested
-from workbench.steps.experiment.planned import Experiment, Promised, Safety
 from workbench.steps.first_card.proposal import proposed
 from workbench.steps.installation import check_installation
-from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures
-from workbench.steps.loop_motion import LimitCycle
 from workbench.steps.predict import Predicted
 from workbench.steps.response import respond
-from workbench.steps.robust.outcomes import MEASURES, Outcomes
-from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, RobustAsked, Spread
-from workbench.steps.validate import Validation
 
 LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
 OUT = Path("results") / ("a folder with a long name " * 4)

@@ -1,15 +1,16 @@
 """`workbench design`: a model -> design.json and report.html."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from design.asked import RobustAsked
 from workbench import options
 from workbench.output import results
 from workbench.signature import option
-from workbench.steps.asked import RobustAsked
+from workbench.steps.asked import ROBUST_OPTIONS
 
 if TYPE_CHECKING:
     from design.machine.design import Structure
@@ -62,7 +63,7 @@ class DesignOptions:
         "Period of the position loop [s].", type=options.POSITIVE, metavar="S"
     )
     robust: bool = option("Choose by the loops of machines drawn from the model's uncertainty.")
-    wanted: RobustAsked = field(default_factory=RobustAsked)
+    wanted: RobustAsked = ROBUST_OPTIONS
     machine: str | None = option(
         "Machine in the registry by whose drift so far the machines differ, with --robust.",
         metavar="NAME",
@@ -89,8 +90,8 @@ def command(given: DesignOptions) -> int:
     """
     from workbench.documents.velocity import is_velocity_model
     from workbench.interface.models import load_model
-    from workbench.steps.closed_loop import with_card
     from workbench.steps.elastic import with_response
+    from workbench.steps.present import with_card
 
     if is_velocity_model(given.model_file):
         options.refuse_for_velocity(*NOT_FOR_VELOCITY)
@@ -103,10 +104,10 @@ def command(given: DesignOptions) -> int:
 
 
 def _nominal(given: DesignOptions, model: "Model") -> int:
+    from design.controllers.design import effort_limit
     from design.tune import Asked, Goals
     from workbench.interface.loops import design
     from workbench.report.next_steps import after_design, without_design
-    from workbench.steps.design import effort_limit
     from workbench.steps.elastic import beyond_response
 
     limits, asked = given.wanted.limits, _asked(given)
@@ -185,11 +186,11 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     """By how much the machine's parameters have changed between its active models."""
     from pydantic import TypeAdapter
 
+    from design.robust.outcomes import drift_found
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import Registry
     from workbench.registry.values import MOVES
-    from workbench.steps.robust.outcomes import drift_found
 
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from design.asked import Wanted
 from workbench import options
 from workbench.output import results
 from workbench.signature import option
-from workbench.steps.asked import Wanted
+from workbench.steps.asked import EXPERIMENT_OPTIONS
 
 SEARCH_SECONDS = 30.0
 
@@ -16,7 +17,7 @@ SEARCH_SECONDS = 30.0
     epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20",
 )
 def command(
-    wanted: Wanted,
+    wanted: Wanted = EXPERIMENT_OPTIONS,
     model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path | None = option(
         "A design whose recommended controller moves the machine.  [default: its present one]",
@@ -43,7 +44,7 @@ def command(
     """
     from workbench.interface.loops import experiment
     from workbench.interface.models import load_model
-    from workbench.steps.closed_loop import with_card
+    from workbench.steps.present import with_card
 
     model = with_card(load_model(model_file, effects), card)
     with results("experiment", out) as folder:

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from design.asked import Limits
 from workbench import options
 from workbench.output import results
 from workbench.signature import argument, option
-from workbench.steps.asked import Limits
+from workbench.steps.asked import LIMIT_OPTIONS
 
 
 @options.command(
@@ -13,7 +14,7 @@ from workbench.steps.asked import Limits
     epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
 )
 def command(
-    limits: Limits,
+    limits: Limits = LIMIT_OPTIONS,
     model_file: Path = options.MODEL_ARGUMENT,
     design_file: Path = argument("DESIGN"),
     plant_file: Path | None = option(
@@ -35,7 +36,7 @@ def command(
     from workbench.interface.loops import validate
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_validate, as_code
-    from workbench.steps.closed_loop import with_card
+    from workbench.steps.present import with_card
 
     if is_velocity_model(model_file):
         options.refuse_for_velocity("force", "card", "effects")

@@ -1,12 +1,10 @@
-"""Results read back: strict JSON into frozen dataclasses, one line where it does not fit; and the
-versions that made them."""
+"""Results read back: strict JSON into frozen dataclasses, one line where it does not fit."""
 
 import json
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -154,19 +152,3 @@ def _explained(first: Mapping[str, Any], kind: Any) -> str:
 
 def _shown(value: object) -> str:
     return " ".join(repr(value).split())[:60]
-
-
-PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
-
-
-def versions() -> dict[str, str]:
-    """Versions of our package and of those that its numbers hang on."""
-    return {name: installed(name) or "unknown" for name in PACKAGES}
-
-
-def installed(name: str) -> str | None:
-    """The version of a package; None where it is not installed."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None

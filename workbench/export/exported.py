@@ -13,7 +13,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from design.closed_loop.driven_loop import DrivenLoop
 from design.controller_program import ProgramUnits, controller_program
+from design.controllers.cascade import filter_words
 from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.machine.design import Design, Structure
@@ -37,8 +39,6 @@ from design.servo import Compensation
 from identification.errors import BadModel
 from workbench.documents.reading import read_document
 from workbench.output import templates
-from workbench.steps.cascade import filter_words
-from workbench.steps.closed_loop import DrivenLoop
 
 Precision = Literal["double", "single"]
 REAL: Mapping[Precision, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from design.machine.versions import versions
 from workbench.addresses import shown
-from workbench.documents.reading import versions
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
 from workbench.verdicts import counted

@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from design.machine.documents import model_document
+from design.machine.versions import versions
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
-from workbench.documents.reading import versions
 from workbench.files import CARD_FILE, sha256_of
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result

@@ -37,10 +37,10 @@ from workbench.report.view import View
 from workbench.steps.asked import IDENTIFY_STAGES
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.axis_test import axis_test as test_of_axis
-from workbench.steps.closed_loop import present_of_card
 from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, write_stream
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import Predicted, predict_sources, prediction_frame
+from workbench.steps.present import present_of_card
 from workbench.steps.response import (
     Curve,
     Responded,

@@ -10,11 +10,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from design.asked import Limits, RobustAsked, Wanted
+from design.closed_loop.loop_figures import Traces
+from design.controllers.design import design as design_of_model
+from design.controllers.design import effort_limit
+from design.controllers.schedule import scheduled
+from design.controllers.validate import Validation
+from design.controllers.validate import validate as validate_design
+from design.experiment.plan import EXPERIMENT_STAGES
+from design.experiment.plan import experiment as plan_experiment
+from design.experiment.planned import Experiment, rivals_of
 from design.machine.design import Design
 from design.machine.model import Model
+from design.robust.robust import ROBUST, ROBUST_STAGES, Robust
+from design.robust.robust import robust_design as robust_of_model
 from identification.errors import BadModel
 from workbench.course import running, working
 from workbench.documents.result_files import read_design
+from workbench.documents.rivals import read_rivals
 from workbench.interface.inputs import PathLike
 from workbench.interface.models import ModelLike, Result, TraceResult, model_of
 from workbench.report.experiment import experiment_view
@@ -22,17 +35,6 @@ from workbench.report.reports import design_view
 from workbench.report.robust import robust_view
 from workbench.report.validation import validation_view
 from workbench.report.view import View
-from workbench.steps.design import design as design_of_model
-from workbench.steps.design import effort_limit
-from workbench.steps.experiment.plan import EXPERIMENT_STAGES
-from workbench.steps.experiment.plan import experiment as plan_experiment
-from workbench.steps.experiment.planned import Experiment, Wanted, read_rivals, rivals_of
-from workbench.steps.loop_figures import Limits, Traces
-from workbench.steps.robust.robust import ROBUST, ROBUST_STAGES, Robust, RobustAsked
-from workbench.steps.robust.robust import robust_design as robust_of_model
-from workbench.steps.schedule import scheduled
-from workbench.steps.validate import Validation
-from workbench.steps.validate import validate as validate_design
 
 if TYPE_CHECKING:
     from typing import Literal

@@ -121,8 +121,8 @@ class _OfModel(Result):
 
         period [s]: by default as for a design. Raises NotIdentifiable where the model carries none.
         """
+        from design.closed_loop.linear_loop import linear_of
         from design.convert import to_control
-        from workbench.steps.linear_loop import linear_of
 
         plant, _ = linear_of(self.model, None, period)
         return to_control(plant.A, plant.B, plant.h)

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.closed_loop.driven_loop import driven_loop, run_driven
+from design.closed_loop.loop_figures import common_reference, tested_of
+from design.controllers.validate import validate
 from design.machine.design import Design
 from design.machine.model import Model
 from design.machine.readable import force, length
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
-from workbench.steps.closed_loop import driven_loop, run_driven
-from workbench.steps.loop_figures import common_reference, tested_of
 from workbench.steps.predict import default_drive, pooled, predict
-from workbench.steps.validate import validate
 
 WINDOW = 2.0  # s between fresh starts of a free run, as everywhere on held-out logs
 LEAST_HELD_OUT = 2.0  # s

@@ -11,6 +11,8 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
+from design.controllers.design import design
+from design.controllers.validate import validate, validation_document
 from design.machine.documents import design_document, model_document
 from design.machine.model import Model
 from identification.drift.drift_result import Shift
@@ -28,7 +30,6 @@ from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.drift import reason_sentence
 from workbench.report.trace_words import trace_sentence
-from workbench.steps.design import design
 from workbench.steps.drift import (
     Stream,
     detectable_sizes,
@@ -39,7 +40,6 @@ from workbench.steps.drift import (
 )
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import Traced, trace_sources
-from workbench.steps.validate import validate, validation_document
 
 TestedDrift = Literal["none", "drift", "structure", "not_judged"]
 

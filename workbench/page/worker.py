@@ -19,6 +19,8 @@ from types import FrameType
 
 import numpy as np
 
+from design.controllers.design import design
+from design.controllers.validate import validate, validation_document
 from design.machine.documents import design_document
 from design.machine.model import Model
 from identification.errors import BadModel, BadSpecification, NotIdentifiable, UserError
@@ -45,10 +47,8 @@ from workbench.report.reports import identified_view
 from workbench.report.trace import errors_table, logs_of_trace, traced_view
 from workbench.report.view import View, report_notes
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
-from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import trace_sources
-from workbench.steps.validate import validate, validation_document
 
 MODEL_SHARE = 0.9  # of the bar, for the model; the rest for its design
 LAST_STAGES = {"designing": (MODEL_SHARE, 0.95), "validating": (0.95, 1.0)}

@@ -1,5 +1,8 @@
 """A design as tables and lines, for a terminal and a report."""
 
+from design.closed_loop.loop_figures import COMPENSATED, FIGURES_SAID, takes_compensator
+from design.controllers.cascade import filter_words
+from design.controllers.recommend import called, other_figures, own_figures
 from design.drive_law import DriveLaw
 from design.machine.codec import Output
 from design.machine.design import Controller, Design
@@ -7,9 +10,6 @@ from design.machine.drive import equation_lines, force_lines
 from design.machine.readable import length, number
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, listed, more, tabled
-from workbench.steps.cascade import filter_words
-from workbench.steps.loop_figures import COMPENSATED, FIGURES_SAID, takes_compensator
-from workbench.steps.recommend import called, other_figures, own_figures
 
 DESIGN_HEAD = (
     "loop", "w_n rad/s", "zeta", "modulus", "worst", "gain", "phase", "delay", "periods", "|S_up|",

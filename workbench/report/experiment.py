@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from design.experiment.planned import Experiment, experiment_document
 from design.machine.readable import shown
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, Row, listed, more, tabled
-from workbench.steps.experiment.planned import Experiment, experiment_document
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
 PIECE_NAMES = {

@@ -9,14 +9,14 @@ from workbench.files import CARD_FILE, shipped_cards
 from workbench.output import Step, step
 
 if TYPE_CHECKING:
+    from design.controllers.validate import Validation
     from design.machine.design import Controller, Design
     from design.machine.model import Model
     from design.machine.velocity import VelocityModel
+    from design.robust.robust import Robust
     from workbench.steps.demo import Demonstration
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted
-    from workbench.steps.robust.robust import Robust
-    from workbench.steps.validate import Validation
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0
@@ -133,7 +133,7 @@ def after_validate(
     card: str | None,
 ) -> Step | None:  # fmt: skip
     """What to change where the tested controller misses a limit; None where it keeps all."""
-    from workbench.steps.loop_figures import COMPENSATED
+    from design.closed_loop.loop_figures import COMPENSATED
 
     failed = {place: one for place, one in found.figures[found.judged].items() if not one.passed}
     if not failed:

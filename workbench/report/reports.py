@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
+from design.controllers.cascade import filter_words
 from design.loop_frequencies import open_loop_response
 from design.machine.design import Controller, Design
 from design.machine.documents import design_document, model_document
@@ -41,7 +42,6 @@ from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
 from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
-from workbench.steps.cascade import filter_words
 from workbench.steps.identify_sources import Identified
 from workbench.steps.predict import fitted_run, missing_force
 

@@ -5,18 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
+from design.closed_loop.loop_figures import FIGURES_SAID, PRESENT
 from design.machine.documents import design_document
 from design.machine.readable import length, number, units_of
+from design.robust.outcomes import MEASURES, Measure
+from design.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
+from design.robust.search import WEIGHED
 from identification.arrays import Array
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
 from workbench.report.view import Section, View, notes, table
 from workbench.screen import Part, Row, listed, tabled
-from workbench.steps.loop_figures import FIGURES_SAID, PRESENT
-from workbench.steps.robust.outcomes import MEASURES, Measure
-from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
-from workbench.steps.robust.search import WEIGHED
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")

@@ -8,6 +8,24 @@ from typing import Any, Literal
 
 import numpy as np
 
+from design.closed_loop.loop_figures import (
+    COMPENSATED,
+    FIGURES_SAID,
+    PRESENT,
+    SCHEDULED,
+    LoopFigures,
+    Traces,
+)
+from design.closed_loop.loop_motion import worst_rest
+from design.controllers.recommend import (
+    called,
+    in_thousandths,
+    other_figures,
+    own_figures,
+    percent,
+    settling_words,
+)
+from design.controllers.validate import Validation, validation_document
 from design.loop import LoopRun
 from design.machine.readable import Shown, length, number, shown, shown_unit, units_of
 from identification.arrays import Array
@@ -22,25 +40,7 @@ from workbench.report.trace_words import trace_sentence, words
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, Row, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
-from workbench.steps.loop_figures import (
-    COMPENSATED,
-    FIGURES_SAID,
-    PRESENT,
-    SCHEDULED,
-    LoopFigures,
-    Traces,
-)
-from workbench.steps.loop_motion import worst_rest
-from workbench.steps.recommend import (
-    called,
-    in_thousandths,
-    other_figures,
-    own_figures,
-    percent,
-    settling_words,
-)  # fmt: skip
 from workbench.steps.trace import effect_estimates
-from workbench.steps.validate import Validation, validation_document
 
 LOOP_COLOURS: dict[str, Colour] = {
     "rst": "reference", "pid": "model", "p-pi": "measured", PRESENT: "before",

@@ -1,17 +1,18 @@
 """What is asked of a computation: each number with its default, and the option that says it.
 
-Of these the commands make their options, and the functions of Python take them as they are; and
-which part of a command's bar each stage takes. Light to import, since every `--help` asks for it.
+Of these the commands make their options, and the functions of Python take them as they are; of what
+is asked of a loop, `design.asked` has the numbers. And which part of a command's bar each stage
+takes. Light to import, since every `--help` asks for it.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import click
 
+from design.asked import Limits, RobustAsked, Wanted
 from workbench.options import POSITIVE, SEEDS, Finite, Parsed, listed_names, parse_orders
-from workbench.signature import asked
+from workbench.signature import asked, options_of
 
 Orders = tuple[int, int, int]
 
@@ -33,78 +34,25 @@ class Options:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a loop must keep to pass.
-
-    Margins; error at standstill and overshoot relative to the step; error along the smooth
-    reference relative to its amplitude; largest force relative to that in the machine's logs.
-    """
-
-    modulus: float = asked(0.5, "Least modulus margin.", type=POSITIVE)
-    delay: float = asked(2.0, "Least delay margin, in samples.", type=POSITIVE)
-    standstill: float = asked(
-        0.05, "Largest error at standstill, relative to the step.", type=POSITIVE
-    )
-    tracking: float = asked(
-        0.2, "Largest rms error along the smooth reference, relative to its amplitude.",
-        type=POSITIVE,
-    )  # fmt: skip
-    overshoot: float = asked(0.1, "Largest overshoot, relative to the step.", type=POSITIVE)
-    force: float = asked(
-        1.2, "Largest force, relative to the largest in the logs of the machine's model.",
-        type=POSITIVE,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class RobustAsked:
-    """What is asked over the machines: so many drawn, on what share of them each limit has to hold.
-
-    staircase: largest on a slow ramp [m], None for any. drift: see `drift_found`.
-    """
-
-    draws: int = asked(200, "Machines drawn, with --robust.", type=click.IntRange(20, 10_000))
-    probability: float = asked(
-        0.95, "Share of the machines on which each limit has to hold, with --robust.",
-        type=Finite(0.5, 1.0, max_open=True),
-    )  # fmt: skip
-    limits: Limits = field(default_factory=Limits)
-    staircase: float | None = asked(
-        None, "Largest staircase on a slow ramp [m, rad], with --robust.  [default: any]",
-        type=POSITIVE, metavar="M",
-    )  # fmt: skip
-    drift: Mapping[str, float] | None = None
-    seed: int = asked(0, "Of the machines drawn, with --robust.", type=SEEDS)
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked: parameters to be identified (none: all), limits where they are not those of
-    card and logs, seed. rivals: keys of effects of which one is at work, which the run is to
-    discriminate."""
-
-    parameters: tuple[str, ...] = asked(
-        (), "Parameters to be identified, as m,F_cp,dv_p.  [default: all]",
-        type=Parsed(listed_names), multiple=False, metavar="NAME,...",
-    )  # fmt: skip
-    stroke: tuple[float, float] | None = asked(
-        None, "Positions between which it may move [m, rad].  [default: the card's, or the logs']",
-        type=(Finite(), Finite()), metavar="LOW HIGH",
-    )  # fmt: skip
-    speed: float | None = asked(
-        None, "Largest speed [m/s, rad/s].  [default: 1.5 times the logs']", type=POSITIVE
-    )
-    force: float | None = asked(
-        None, "Largest force [N, N m].  [default: 1.2 times the logs']", type=POSITIVE
-    )
-    command: float | None = asked(None, "Largest command.  [default: any]", type=POSITIVE)
-    seconds: float = asked(
-        20.0, "How long the run lasts [s].", "--time", type=Finite(min=2, max=600)
-    )
-    seed: int = asked(0, "", type=SEEDS)
-    rivals: tuple[str, ...] = ()
-
+LIMIT_OPTIONS = options_of(Limits, **{one.name: {"type": POSITIVE} for one in fields(Limits)})
+ROBUST_OPTIONS = options_of(
+    RobustAsked,
+    draws={"type": click.IntRange(20, 10_000)},
+    probability={"type": Finite(0.5, 1.0, max_open=True)},
+    limits=LIMIT_OPTIONS,
+    staircase={"type": POSITIVE, "metavar": "M"},
+    seed={"type": SEEDS},
+)
+EXPERIMENT_OPTIONS = options_of(
+    Wanted,
+    parameters={"type": Parsed(listed_names), "multiple": False, "metavar": "NAME,..."},
+    stroke={"type": (Finite(), Finite()), "metavar": "LOW HIGH"},
+    speed={"type": POSITIVE},
+    force={"type": POSITIVE},
+    command={"type": POSITIVE},
+    seconds={"names": ("--time",), "type": Finite(min=2, max=600)},
+    seed={"type": SEEDS},
+)
 
 IDENTIFY_STAGES = {
     "refining": (0.0, 0.4),

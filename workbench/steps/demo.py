@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from design.closed_loop.loop_figures import Traces
+from design.controllers.design import design
+from design.controllers.validate import Validation, validate
 from design.machine.design import Design
 from identification.effects._library import built_in
 from identification.errors import BadCard
@@ -16,11 +19,8 @@ from workbench.cards.card import Card
 from workbench.cards.recipe import Recipe
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
-from workbench.steps.design import design
-from workbench.steps.loop_figures import Traces
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import Traced, trace_sources
-from workbench.steps.validate import Validation, validate
 
 HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees
 

@@ -1,6 +1,5 @@
-"""A machine's resonance where its model has none: of a frequency response, or of a design."""
+"""A machine's resonance where its model has none: of a frequency response that was measured."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,13 +11,6 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.reading import read_document, read_raw
 from workbench.steps.response import RESPONSE_SCHEMA
-
-
-def with_resonance(model: Model, resonance: Mapping[str, Estimate] | None) -> Model:
-    """The model with this resonance, where it has none of its own."""
-    if model.resonance is not None or resonance is None:
-        return model
-    return replace(model, resonance=resonance)
 
 
 def with_response(model: Model, file: Path | None) -> Model:

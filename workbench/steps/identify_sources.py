@@ -14,10 +14,10 @@ from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.logs.sources import Source, Sources
-from workbench.steps.closed_loop import present_of_card
 from workbench.steps.hardly_identifiable import braked_by_its_voltage
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify
+from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 from workbench.steps.velocity import looks_like_velocity
 

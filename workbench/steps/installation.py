@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from design.machine.versions import installed
 from workbench.cards.card import load_card
-from workbench.documents.reading import installed
 from workbench.files import shipped_cards
 from workbench.logs.sources import DATA_VARIABLE
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.closed_loop.linear_loop import dead_time
 from design.machine.model import Model, used
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting
@@ -15,7 +16,6 @@ from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING
 from identification.signals.differentiate import differentiate
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
-from workbench.steps.linear_loop import dead_time
 from workbench.steps.predict import refuse_missing
 
 LINEAR_EFFECTS = frozenset({"compliance", "input_delay"})  # they stay in the response

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from design.closed_loop.linear_loop import dead_time, law_to_force
 from design.machine.model import Model, used
 from design.machine.plain import as_number
 from design.machine.plausible import refuse_other_machine
@@ -34,7 +35,6 @@ from workbench.steps.linear_force import (
     plain_recording,
     stiffness_of,
 )
-from workbench.steps.linear_loop import dead_time, law_to_force
 from workbench.steps.predict import with_applied_force
 
 if TYPE_CHECKING:

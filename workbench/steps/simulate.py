@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from design.closed_loop.driven_loop import DrivenLoop
 from design.compensator import Compensator
 from design.effect_loop import simulate_effect_loop
 from design.filters import filters_at
@@ -30,8 +31,8 @@ from workbench.cards.card import Card
 from workbench.cards.controller import CardController
 from workbench.cards.recipe import Recipe
 from workbench.files import ABSURD
-from workbench.steps.closed_loop import DrivenLoop, present, rst_of
 from workbench.steps.predict import lacking_signals
+from workbench.steps.present import present, rst_of
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 CONVERGED_CHANGE = 1e-9  # relative change of the force from which it has settled

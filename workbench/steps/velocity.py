@@ -12,7 +12,9 @@ from design.machine.plain import plain
 from design.machine.plausible import refuse_other_machine
 from design.machine.readable import length
 from design.machine.velocity import PredictionErrors, VelocityLog, VelocityModel
+from design.machine.versions import versions
 from identification.arrays import Array
+from identification.arx.design_period import decimated
 from identification.errors import BadModel, UserError
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -30,9 +32,7 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
-from workbench.documents.reading import versions
 from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
-from workbench.steps.identify import decimated
 from workbench.steps.predict import predict
 
 COMPARED_EVERY = 0.01  # s, which is enough to decide a kind by and takes a second or two

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from design.asked import Limits
 from design.machine.velocity import VelocityDesign, VelocityModel
+from design.machine.versions import versions
 from design.margins import Margins, margins
 from design.valve_loop import (
     SLOW_END,
@@ -22,8 +24,6 @@ from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.velocity.model import Valve
-from workbench.documents.reading import versions
-from workbench.steps.loop_figures import Limits
 
 SMOOTHED = 3.0  # deviations of the position's noise, within which no offset is given in full
 STEP_OF_TRAVEL = 0.25

@@ -7,7 +7,7 @@ import pytest
 
 from identification.errors import BadCard
 from workbench.cards.card import Card, load_card
-from workbench.steps.closed_loop import present, present_of_card
+from workbench.steps.present import present, present_of_card
 
 MOTOR = """
 [card]

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from design.controllers.design import design
 from design.machine.documents import design_document, model_document
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
@@ -17,7 +18,6 @@ from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cli import main
 from workbench.documents.result_files import read_design, read_model
 from workbench.output import dumps
-from workbench.steps.design import design
 
 pytestmark = pytest.mark.slow
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from design.controllers.design import design
 from design.machine.design import Design
 from design.machine.documents import design_document
 from identification.errors import BadModel
@@ -17,7 +18,6 @@ from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, model_of
 from workbench.documents.result_files import read_design
 from workbench.output import dumps
-from workbench.steps.design import design
 
 BARE = {"sd": None, "low": None, "high": None}
 

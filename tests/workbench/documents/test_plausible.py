@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.controllers.design import design
 from design.machine.documents import model_document
 from design.machine.model import Model
 from design.machine.plausible import bandwidth_remarks, model_remarks, stored_remarks
@@ -21,7 +22,6 @@ from workbench.cli import main
 from workbench.documents.log_remarks import log_remarks
 from workbench.logs.sources import card_path, read_sources
 from workbench.output import dumps
-from workbench.steps.design import design
 
 UNITS = {"t": "s", "y": "m", "F": "N", "p_p": "bar", "u": "V"}
 SIGNALS = {name: SignalSpec(column=name, unit=unit) for name, unit in UNITS.items()}

@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 
+from design.controllers.design import design
+from design.controllers.schedule import scheduled
 from design.loop import LoopNoise
 from design.machine.design import Design
 from design.machine.model import Model
@@ -15,8 +17,6 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.export.exported import Exported
-from workbench.steps.design import design
-from workbench.steps.schedule import scheduled
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 RUBS = Karnopp(4.0, 15.0, 16.0, 40.0, 42.0, 3e-3, -3e-3, 18.0, -19.0)

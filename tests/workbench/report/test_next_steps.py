@@ -10,6 +10,8 @@ import click
 import numpy as np
 import pytest
 
+from design.asked import Limits
+from design.controllers.validate import validate
 from design.machine.design import Design
 from design.machine.model import Model
 from design.tune import Asked
@@ -31,8 +33,6 @@ from workbench.report.next_steps import (
     check_of_refused,
     without_design,
 )
-from workbench.steps.loop_figures import Limits
-from workbench.steps.validate import validate
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODEL = Path("my model/model.json")

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from design.controllers.validate import validate
 from design.machine.readable import friction_units
 from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, designed, identified, model_of
@@ -22,7 +23,6 @@ from workbench.report.validation import (
 )
 from workbench.report.view import Section, page
 from workbench.steps.identify_sources import Identified
-from workbench.steps.validate import validate
 
 LARGEST = 2_000_000
 VOID = {"meta", "br", "img", "hr"}

@@ -9,10 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.asked import Limits
+from design.closed_loop import loop_figures
+from design.closed_loop.driven_loop import driven_loop, run_driven
+from design.closed_loop.linear_loop import corners, linear_of
+from design.controllers.design import effort_limit
+from design.controllers.validate import validate, validation_document
 from design.loop import LoopRun
 from design.machine.documents import design_document
 from design.machine.model import Model
 from design.tune import Asked, Goals
+from identification.arx.design_period import common_period, decimated, decimation
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import recorded_logs
@@ -26,23 +33,9 @@ from workbench.cards.recipe import RecipePID
 from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
-from workbench.steps import loop_figures
-from workbench.steps.closed_loop import driven_loop, run_driven
-from workbench.steps.design import effort_limit
-from workbench.steps.identify import (
-    _actuator,
-    _force_error,
-    arx_plant,
-    closed_loop_remarks,
-    common_period,
-    decimated,
-    decimation,
-)
-from workbench.steps.linear_loop import corners, linear_of
-from workbench.steps.loop_figures import Limits
+from workbench.steps.identify import _actuator, _force_error, arx_plant, closed_loop_remarks
 from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_frame
 from workbench.steps.simulate import record, truth
-from workbench.steps.validate import validate, validation_document
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 

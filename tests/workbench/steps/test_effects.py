@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.closed_loop.driven_loop import driven_loop, effects_left_out, in_the_loop, run_driven
 from design.machine.effect_values import exact
 from design.machine.model import Model
 from identification.effects._base import Acting
@@ -28,7 +29,6 @@ from workbench.cards.recipe import (
 )
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path
-from workbench.steps.closed_loop import driven_loop, effects_left_out, in_the_loop, run_driven
 from workbench.steps.demo import recipe_of, simulated_log
 from workbench.steps.predict import Prediction, predict
 from workbench.steps.simulate import record, truth

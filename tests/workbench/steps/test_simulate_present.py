@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.closed_loop.driven_loop import present_loop, run_driven
 from design.machine.model import Model
 from identification.errors import BadCard
 from identification.log import Log
@@ -17,7 +18,7 @@ from identification.signals.excitation import reference_signal
 from tests.chain import model_of
 from workbench.cards.card import Card, load_card
 from workbench.cli import main
-from workbench.steps.closed_loop import present_loop, present_of_card, run_driven
+from workbench.steps.present import present_of_card
 from workbench.steps.simulate import record
 
 PLANT = """

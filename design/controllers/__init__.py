@@ -1,0 +1,1 @@
+"""Controllers for a model: placed, compared, recommended, scheduled and validated."""
