@@ -43,6 +43,7 @@ from design.experiment.plan import experiment
 from design.experiment.planned import Experiment
 from design.loop import Cascade, LoopNoise
 from design.machine.model import Model
+from design.machine.source import Source
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import UserError
@@ -54,7 +55,6 @@ from identification.model.plant import Motor, Plant
 from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
-from workbench.logs.sources import Source
 from workbench.steps.identify import identify
 from workbench.steps.present import present
 

@@ -29,6 +29,7 @@ from design.controllers.design import design
 from design.drive_law import drive_law
 from design.machine.design import Design
 from design.machine.model import Model
+from design.machine.source import Source
 from design.polynomial import from_roots
 from design.program import (
     Assign,
@@ -48,7 +49,7 @@ from identification.errors import UserError
 from workbench.cards.card import load_card
 from workbench.export.c import c_files
 from workbench.export.exported import Exported, Precision, exported
-from workbench.logs.sources import DATA_VARIABLE, Source, Sources, card_path, read_sources
+from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.simulate import record
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.yardstick import Fit, Record, Sliding, ratio, share_left, shifted, weighed
 from design.machine.model import Model, used
+from design.measured.predict import force_by_model, predict, refuse_missing
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import UserError
@@ -22,7 +23,6 @@ from identification.signals.differentiate import differentiate
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
 from identification.simulation.inverse_dynamics import of_body
-from workbench.steps.predict import force_by_model, predict, refuse_missing
 
 MOST = 1e6  # times the signal, beyond which a prediction runs away
 STEEPEST = 20.0  # command per command that a dead zone asks for

@@ -28,13 +28,13 @@ import pandas as pd
 import workbench as wb
 from benchmarks.response_rig import Machine, machine, record
 from design.machine.model import FitSummary, LogEntry, Model
+from design.measured.response import Responded
 from identification.frequency.estimate import Response
 from identification.frequency.modes import Peak
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import UNITS
 from identification.thresholds import COHERENCE_SURE
-from workbench.steps.response import Responded
 
 NEAR_DB, NEAR_DEG, NEAR_PEAK = 1.0, 5.0, 0.02
 IDENTIFIED_FROM = 10.0  # s at the begin of the log

@@ -8,6 +8,7 @@ import numpy as np
 from design.controllers.design import design
 from design.machine.design import Design
 from design.machine.model import FitSummary, LogEntry, Model
+from design.machine.source import Source
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -16,7 +17,7 @@ from identification.model.plant import Actuator
 from tests.made import made_once
 from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
-from workbench.logs.sources import Source, Sources, card_path
+from workbench.logs.sources import Sources, card_path
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.simulate import record
 

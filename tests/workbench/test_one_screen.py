@@ -20,6 +20,7 @@ from design.controllers.validate import Validation
 from design.experiment.planned import Experiment, Promised, Safety
 from design.machine.design import Recommendation
 from design.machine.model import Model
+from design.measured.response import respond
 from design.robust.outcomes import MEASURES, Outcomes
 from design.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
 from design.tune import Asked
@@ -56,7 +57,6 @@ from workbench.steps.drift import Tested as OneTested
 from workbench.steps.first_card.proposal import proposed
 from workbench.steps.installation import check_installation
 from workbench.steps.predict import Predicted
-from workbench.steps.response import respond
 
 LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
 OUT = Path("results") / ("a folder with a long name " * 4)
@@ -250,8 +250,9 @@ def doctor() -> Iterator[Screen]:
 
 def axis_test() -> Iterator[Screen]:
     """Every number beyond its limits, of a log of many runs."""
+    from design.machine.source import Source
     from tests.chain import short_recipe
-    from workbench.logs.sources import Source, Sources
+    from workbench.logs.sources import Sources
     from workbench.report.axis_test import axis_view
     from workbench.steps import axis_test as step
     from workbench.steps.axis_limits import MEANING_OF

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from design.machine.source import Source
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.estimates import of_effect
@@ -25,7 +26,7 @@ from identification.tracing.result import (
     TraceVerdict,
 )
 from tests.chain import TABLES, short_recipe
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Sources
 from workbench.steps.simulate import record
 from workbench.steps.trace import Traced, traced_model
 

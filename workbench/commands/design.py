@@ -139,10 +139,10 @@ def _asked(given: DesignOptions) -> dict[str, Any]:
 
 def _velocity(given: DesignOptions) -> int:
     """The same of a rig whose velocity follows the command."""
+    from design.controllers.velocity_loop import design_velocity
     from workbench.documents.velocity import read_velocity_model
     from workbench.report.next_steps import in_simulation, without_design
     from workbench.report.velocity import velocity_view
-    from workbench.steps.velocity_loop import design_velocity
 
     model = read_velocity_model(given.model_file)
     with results("design", given.out, without_design(model, None)) as folder:

@@ -58,10 +58,10 @@ def _velocity(
     """The same of a rig whose velocity follows the command; files: model, design, plant."""
     import numpy as np
 
+    from design.controllers.velocity_loop import validate_velocity
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
     from workbench.report.velocity import after_velocity_validation, velocity_view
-    from workbench.steps.velocity_loop import validate_velocity
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
     plant = read_velocity_model(files[2]) if files[2] else None

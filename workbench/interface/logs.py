@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from design.machine.model import Model
+from design.measured.response import Curve, Responded, curve_of, respond
 from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
 from workbench.cards.card import Card, load_card
@@ -41,13 +42,7 @@ from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, wri
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import Predicted, predict_sources, prediction_frame
 from workbench.steps.present import present_of_card
-from workbench.steps.response import (
-    Curve,
-    Responded,
-    curve_of,
-    respond,
-    response_frame,
-)  # fmt: skip
+from workbench.steps.response import response_frame
 from workbench.steps.simulate import as_columns, record, truth
 
 if TYPE_CHECKING:

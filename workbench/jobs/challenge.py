@@ -17,10 +17,10 @@ from design.controllers.validate import validate
 from design.machine.design import Design
 from design.machine.model import Model
 from design.machine.readable import force, length
+from design.measured.predict import default_drive, pooled, predict
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
-from workbench.steps.predict import default_drive, pooled, predict
 
 WINDOW = 2.0  # s between fresh starts of a free run, as everywhere on held-out logs
 LEAST_HELD_OUT = 2.0  # s

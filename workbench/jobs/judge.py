@@ -15,6 +15,7 @@ from design.controllers.design import design
 from design.controllers.validate import validate, validation_document
 from design.machine.documents import design_document, model_document
 from design.machine.model import Model
+from design.machine.source import Source
 from identification.drift.drift_result import Shift
 from identification.drift.mewma import DriftState
 from identification.effects._library import Library
@@ -25,7 +26,7 @@ from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_design, read_model
 from workbench.jobs.challenge import Contender, Terms, challenge
 from workbench.jobs.passes import Task
-from workbench.logs.sources import Source, Sources, read_sources
+from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.drift import reason_sentence

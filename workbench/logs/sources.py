@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from design.machine.nearest import nearest
+from design.machine.source import Source
 from identification.errors import BadCard, BadLog
-from identification.log import Log, Rig
+from identification.log import Rig
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.cards.card_tables import FileEntry
@@ -18,20 +18,6 @@ from workbench.documents.log_remarks import log_remarks
 from workbench.files import CARD_FILE, broken_link, refuse_special, sha256_of, shipped_cards
 from workbench.logs.runs import read_runs, runs_of, shown_name
 from workbench.logs.table import Table
-
-
-@dataclass(frozen=True)
-class Source:
-    """One run of a file: its log on an even clock, the file's name, hash and rows.
-
-    period: of the samples in the file [s]; None where it is that of the log.
-    """
-
-    log: Log
-    file: str
-    sha256: str
-    rows: int
-    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -124,12 +110,6 @@ def refuse_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
                 f"--test {source.file}: the same bytes as the training log"
                 f" {names[source.sha256]}; test on a log that the fit has not used"
             )
-
-
-def fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
-    """Name, digest and rows of each file, as a result names the logs that it is of."""
-    found = {s.sha256: {"file": s.file, "sha256": s.sha256, "rows": s.rows} for s in sources}
-    return list(found.values())
 
 
 DATA_VARIABLE = "WORKBENCH_DATA"

@@ -9,6 +9,8 @@ import numpy as np
 
 from design.machine.model import Model
 from design.machine.readable import force, times, units_of
+from design.machine.source import Source
+from design.measured.predict import FORCE_WINDOW, force_by_model, in_windows
 from identification.arrays import Array
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import NORMAL_95
@@ -16,12 +18,10 @@ from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from identification.tracing.result import Trace
-from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE
 from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
-from workbench.steps.predict import FORCE_WINDOW, force_by_model, in_windows
 
 NOISE_BAND = "±2σ of the sensor's noise"
 Which = Literal["training", "test"]

@@ -8,6 +8,8 @@ import numpy as np
 
 from design.machine.model import Model, used
 from design.machine.readable import units_of
+from design.machine.source import Source
+from design.measured.predict import of_one_instant
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.log import Log
@@ -19,12 +21,10 @@ from identification.model.size import Size
 from identification.model.surroundings import Surroundings
 from identification.signals.differentiate import differentiate, low_pass
 from identification.simulation.effect_along_motion import contribution
-from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
 from workbench.report.chart_figure import evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
-from workbench.steps.predict import of_one_instant
 from workbench.steps.trace import Traced
 
 POINTS = 80  # of a branch of the curve

@@ -192,7 +192,7 @@ def to_the_noise_by_equation(model: Model) -> bool:
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, and what would identify the rest, in words."""
-    from workbench.steps.predict import FORCE_WINDOW, in_windows
+    from design.measured.predict import FORCE_WINDOW, in_windows
 
     by, within = "the command", ""
     if model.fit.drive != "command":
@@ -246,7 +246,7 @@ def runs_to_add(model: Model) -> tuple[str, ...]:
 
 def run_coupling(model: Model) -> str:
     """How a run on the measured force was kept near the measured position."""
-    from workbench.steps.predict import FORCE_WINDOW
+    from design.measured.predict import FORCE_WINDOW
 
     anew = f"restarted from the measured state every {FORCE_WINDOW:g} s"
     if model.fit.stiffness == 0.0:

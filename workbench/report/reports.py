@@ -13,6 +13,7 @@ from design.machine.design import Controller, Design
 from design.machine.documents import design_document, model_document
 from design.machine.model import Model, used
 from design.margins import sensitivities
+from design.measured.predict import fitted_run, missing_force
 from design.rst import RST, closed_loop
 from identification.arrays import Array
 from identification.estimation.windowed_run.parameters import AT_ZERO
@@ -43,7 +44,6 @@ from workbench.report.validation import LOOP_COLOURS
 from workbench.report.view import Section, View, report_notes, table
 from workbench.screen import more
 from workbench.steps.identify_sources import Identified
-from workbench.steps.predict import fitted_run, missing_force
 
 
 def identified_view(found: Identified) -> View:

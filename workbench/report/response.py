@@ -6,6 +6,16 @@ import numpy as np
 
 from design.machine.model import Model
 from design.machine.readable import number, shown
+from design.machine.source import Source
+from design.measured.response import (
+    Responded,
+    decibels,
+    degrees,
+    ranges,
+    respond,
+    response_document,
+    sure_share,
+)
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import reported_estimate
@@ -14,20 +24,10 @@ from identification.frequency.modes import Peak
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from identification.thresholds import COHERENCE_SURE
-from workbench.logs.sources import Source
 from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, report_notes, table
 from workbench.screen import Part, listed, tabled
-from workbench.steps.response import (
-    Responded,
-    decibels,
-    degrees,
-    ranges,
-    respond,
-    response_document,
-    response_frame,
-    sure_share,
-)
+from workbench.steps.response import response_frame
 
 PEAK_HEAD = ("", "frequency", "95 % interval", "damping", "95 % interval")
 FREQUENCY = "frequency [Hz]"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from design.controllers.velocity_loop import VelocityValidation, velocity_validation_document
 from design.machine.readable import length, number
 from design.machine.velocity import VelocityDesign, VelocityModel, velocity_document
 from identification.velocity.record import RUN_IN
@@ -24,7 +25,6 @@ from workbench.steps.velocity import (
     prediction_summary,
     velocity_trace_document,
 )
-from workbench.steps.velocity_loop import VelocityValidation, velocity_validation_document
 
 WHAT_LAW = (
     "law: v = k_p e + k_i int(e) + dr/dt, e = r - y; u = v/g_p + d_p min(|v|/smooth, 1) where"

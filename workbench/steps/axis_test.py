@@ -14,6 +14,7 @@ from scipy.stats import norm
 
 from design.machine.plain import plain
 from design.machine.readable import number, shown_unit
+from design.machine.source import Source
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
 from identification.estimation.estimates import counted, reported_estimate
@@ -24,7 +25,7 @@ from identification.model.surroundings import Surroundings
 from identification.signals.check import check_driven
 from identification.thresholds import HALF
 from workbench.cards.card_tables import limit_units
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Sources
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 
 AXIS_SCHEMA = "axis_test/1"

@@ -18,7 +18,9 @@ from design.machine.model import Model
 from design.machine.plain import as_number, plain
 from design.machine.plausible import refuse_other_machine, refuse_other_units
 from design.machine.readable import number
+from design.machine.source import Source
 from design.machine.versions import versions
+from design.measured.predict import of_one_instant
 from identification.drift.drift_result import DriftTest, DriftVerdict, Shift, Statistic
 from identification.drift.drift_test import DriftSettings, drift_test
 from identification.drift.mewma import DriftState
@@ -28,9 +30,8 @@ from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, OF_ACCOUNT, TWICE
 from workbench.documents.reading import read_result
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Sources
 from workbench.output import dumps, write_whole
-from workbench.steps.predict import of_one_instant
 
 DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 QUANTITIES = ("length", "force", "time")

@@ -7,10 +7,10 @@ from pathlib import Path
 from design.machine.design import Design
 from design.machine.model import Model, used
 from design.machine.readable import number
+from design.measured.response import RESPONSE_SCHEMA
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from workbench.documents.reading import read_document, read_raw
-from workbench.steps.response import RESPONSE_SCHEMA
 
 
 def with_response(model: Model, file: Path | None) -> Model:

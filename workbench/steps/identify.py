@@ -23,7 +23,9 @@ from design.machine.model import (
     ParameterCorrelation,
 )
 from design.machine.readable import friction_units
+from design.machine.source import Source
 from design.machine.versions import versions
+from design.measured.predict import of_one_instant
 from identification.arrays import Array
 from identification.arx.design_period import check_period, common_period, decimated, decimation
 from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulation_errors
@@ -44,10 +46,8 @@ from identification.model.surroundings import Surroundings
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
-from workbench.logs.sources import Source
 from workbench.steps.asked import Options as Options
 from workbench.steps.asked import Orders
-from workbench.steps.predict import of_one_instant
 
 SPLIT = 0.6
 FAST = 0.99

@@ -8,12 +8,13 @@ import numpy as np
 from design.machine.model import Model
 from design.machine.plain import plain
 from design.machine.plausible import model_remarks
+from design.machine.source import Source
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, Progress, quiet, without_end
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Sources
 from workbench.steps.hardly_identifiable import braked_by_its_voltage
 from workbench.steps.identifiable_by_log import identifiability_of_runs
 from workbench.steps.identify import Options, identify

@@ -17,6 +17,7 @@ from design.machine.drive import Present
 from design.machine.effect_values import exact
 from design.machine.plain import as_number
 from design.machine.readable import friction_units
+from design.measured.predict import lacking_signals
 from design.rst import RST
 from design.servo import Compensation, simulate_servo
 from identification.arrays import Array
@@ -31,7 +32,6 @@ from workbench.cards.card import Card
 from workbench.cards.controller import CardController
 from workbench.cards.recipe import Recipe
 from workbench.files import ABSURD
-from workbench.steps.predict import lacking_signals
 from workbench.steps.present import present, rst_of
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force

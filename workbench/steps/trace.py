@@ -10,6 +10,7 @@ from design.machine.effect_values import relabelled
 from design.machine.model import FitSummary, Model
 from design.machine.plain import plain
 from design.machine.plausible import model_remarks, refuse_other_units
+from design.machine.source import Source, fingerprints
 from design.machine.versions import versions
 from identification.effects._library import Library
 from identification.errors import BadLog
@@ -23,7 +24,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.tracing.result import FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
-from workbench.logs.sources import Source, Sources, card_path, fingerprints, refuse_twins
+from workbench.logs.sources import Sources, card_path, refuse_twins
 from workbench.steps.identify import arx_or_reason, log_entry, resonance_of, surrounding_effects
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction

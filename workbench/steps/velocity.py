@@ -11,8 +11,10 @@ from design.machine.model import Model
 from design.machine.plain import plain
 from design.machine.plausible import refuse_other_machine
 from design.machine.readable import length
+from design.machine.source import Source, fingerprints
 from design.machine.velocity import PredictionErrors, VelocityLog, VelocityModel
 from design.machine.versions import versions
+from design.measured.predict import predict
 from identification.arrays import Array
 from identification.arx.design_period import decimated
 from identification.errors import BadModel, UserError
@@ -32,8 +34,7 @@ from identification.velocity.rivals import (
     left_by_valve,
 )
 from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
-from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
-from workbench.steps.predict import predict
+from workbench.logs.sources import Sources, refuse_twins
 
 COMPARED_EVERY = 0.01  # s, which is enough to decide a kind by and takes a second or two
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried

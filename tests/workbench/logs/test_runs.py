@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from design.machine.source import fingerprints
 from identification.arrays import Array
 from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv, write_parquet
 from workbench.logs.runs import read_log, read_runs
-from workbench.logs.sources import fingerprints, read_sources
+from workbench.logs.sources import read_sources
 
 EXACT = sorted({*WRITERS} - {"a.xlsx"})  # whose numbers have 16 digits
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from design.machine.model import Model
+from design.machine.source import Source
 from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from tests.chain import EMPS, model_of, short_recipe
 from tests.workbench.trace_values import missing_force
-from workbench.logs.sources import Source
 from workbench.report.chart import Chart
 from workbench.report.fit import fit_chart, residual
 from workbench.report.model_tables import fit_lines, summary

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.source import Source
 from identification.errors import BadCard
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from tests.chain import short_recipe
 from tests.screens import one_screen
 from workbench.cards.card_tables import CardFile, LimitsSection
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Sources
 from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
 from workbench.steps.axis_limits import Allowed, own_limits
 from workbench.steps.axis_test import (

@@ -18,6 +18,7 @@ from design.controllers.validate import validate, validation_document
 from design.loop import LoopRun
 from design.machine.documents import design_document
 from design.machine.model import Model
+from design.measured.predict import predict
 from design.tune import Asked, Goals
 from identification.arx.design_period import common_period, decimated, decimation
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
@@ -34,7 +35,7 @@ from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps.identify import _actuator, _force_error, arx_plant, closed_loop_remarks
-from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_frame
+from workbench.steps.predict import PREDICTION_COLUMNS, prediction_frame
 from workbench.steps.simulate import record, truth
 
 ACTUATOR = Actuator(19530.0, 10405.0)

@@ -10,6 +10,7 @@ import pytest
 from design.closed_loop.driven_loop import driven_loop, effects_left_out, in_the_loop, run_driven
 from design.machine.effect_values import exact
 from design.machine.model import Model
+from design.measured.predict import Prediction, predict
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog
@@ -30,7 +31,6 @@ from workbench.cards.recipe import (
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path
 from workbench.steps.demo import recipe_of, simulated_log
-from workbench.steps.predict import Prediction, predict
 from workbench.steps.simulate import record, truth
 
 PRESSURES = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=5e5)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from design.machine.source import Source
+from design.measured.predict import predict
 from identification.errors import NotIdentifiable
 from identification.log import Log, Rig
-from workbench.logs.sources import Source
 from workbench.steps.identify import NONE_IDENTIFIABLE, identify
-from workbench.steps.predict import predict
 
 
 def strokes(disturbance: float) -> Source:

@@ -7,6 +7,7 @@ import numpy as np
 
 from design.closed_loop.linear_loop import dead_time
 from design.machine.model import Model, used
+from design.measured.predict import refuse_missing
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting
 from identification.frequency.machine import Recording
@@ -16,7 +17,6 @@ from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING
 from identification.signals.differentiate import differentiate
 from identification.simulation.inverse_dynamics import of_body, opposing_force, with_motor_force
-from workbench.steps.predict import refuse_missing
 
 LINEAR_EFFECTS = frozenset({"compliance", "input_delay"})  # they stay in the response
 RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from design.machine.model import Model
+from design.machine.source import Source
+from design.measured import predict as predict_step
+from design.measured.predict import force_by_model, of_one_instant, seen_moving
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog
@@ -17,11 +20,9 @@ from identification.model.plant import Plant
 from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.cards.card import load_card
-from workbench.logs.sources import Source, Sources, card_path
+from workbench.logs.sources import Sources, card_path
 from workbench.report import friction
 from workbench.steps import drift
-from workbench.steps import predict as predict_step
-from workbench.steps.predict import force_by_model, of_one_instant, seen_moving
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
 

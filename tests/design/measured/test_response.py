@@ -11,6 +11,16 @@ import pytest
 import workbench as wb
 from benchmarks.response_rig import Machine, gains, machine, record
 from design.machine.model import Model
+from design.machine.source import Source
+from design.measured.linear_force import freed, of_load, of_model
+from design.measured.response import (
+    Responded,
+    curves_of,
+    degrees,
+    ranges,
+    respond,
+    response_document,
+)
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.frequency.estimate import Response
@@ -25,7 +35,6 @@ from tests.chain import model_of
 from tests.made import made_once
 from workbench.cards.card import card_from
 from workbench.interface.logs import ResponseResult
-from workbench.logs.sources import Source
 from workbench.report.response import (
     loop_line,
     over_frequency,
@@ -34,16 +43,7 @@ from workbench.report.response import (
     response_sentence,
     response_view,
 )
-from workbench.steps.linear_force import freed, of_load, of_model
-from workbench.steps.response import (
-    Responded,
-    curves_of,
-    degrees,
-    ranges,
-    respond,
-    response_document,
-    response_frame,
-)
+from workbench.steps.response import response_frame
 
 CARD: dict[str, Any] = {
     "card": {"name": "axis"},

@@ -1,0 +1,1 @@
+"""A model beside the logs of its machine: what it predicts of them, and frequency responses."""
