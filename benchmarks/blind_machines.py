@@ -19,7 +19,8 @@ from typing import cast
 import numpy as np
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import Cascade, ForcePI, LoopNoise, LoopRun
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, LoopRun
 from design.loop_signals import OfForce
 from design.pid import pid_to_rst
 from design.rst import RST

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from design.loop import Cascade, ForcePI, LoopNoise, loop_costs, prepared_loop, simulate_loop
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, loop_costs, prepared_loop, simulate_loop
 from design.loop_kernels import RECORDS, loop_kernel, loops_kernel
 from design.pid import pid_to_rst
 from identification.arrays import Array, IntArray

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import tf2ss
 
-from design.linear import ForceGains, force_loop, transfer, zoh_step
+from design.force_pi import ForcePI
+from design.linear import force_loop, transfer, zoh_step
 from design.polynomial import check_period
 from identification.arrays import Array
 from identification.errors import BadSpecification
@@ -55,7 +56,7 @@ class Swing:
 
 def elastic_plant(
     m: float, f: float, h: float, swings: Sequence[Swing], actuator: Actuator | None = None,
-    force: ForceGains | None = None, ratio: int = 1,
+    force: ForcePI | None = None, ratio: int = 1,
 ) -> tuple[Array, Array]:  # fmt: skip
     """(A, B) in z^-1 as of `design.linear.linear_plant`, of a body with elastic parts.
 

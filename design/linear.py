@@ -1,10 +1,9 @@
 """The plant that a position controller sees, sampled: sliding mass, actuator, force loop inside."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import expm
 
+from design.force_pi import ForcePI
 from design.polynomial import check_period, trim
 from identification.arrays import Array
 from identification.errors import BadSpecification
@@ -14,22 +13,14 @@ FORCE_LOOP = 0.3  # part of the force error that one sample of the force loop re
 FORCE_RESET = 10.0  # integral time of the force loop, in its own time constants
 
 
-@dataclass(frozen=True)
-class ForceGains:
-    """The force controller C_F(z) = k_i (1 + h z^-1/(T_i (1 - z^-1))); k_i [V/N], T_i [s]."""
-
-    k_i: float
-    T_i: float
-
-
-def force_gains(actuator: Actuator, h: float) -> ForceGains:
+def force_gains(actuator: Actuator, h: float) -> ForcePI:
     """A PI force loop for dF/dt = k1 u, sampled at h [s]: time constant h/0.3, ten of them T_i.
 
     Ours: the paper prints k_i = 0.02 V/N, T_i = 0.05 s for k1 = 19530 N/(V s), h = 1 ms, which is
     0.39 of the error a sample.
     """
     h = check_period(h)
-    return ForceGains(FORCE_LOOP / (actuator.k1 * h), FORCE_RESET * h / FORCE_LOOP)
+    return ForcePI(FORCE_LOOP / (actuator.k1 * h), FORCE_RESET * h / FORCE_LOOP)
 
 
 def linear_plant(
@@ -37,7 +28,7 @@ def linear_plant(
     f: float,
     h: float,
     actuator: Actuator | None = None,
-    force: ForceGains | None = None,
+    force: ForcePI | None = None,
     ratio: int = 1,
 ) -> tuple[Array, Array]:
     """(A, B) in z^-1 from the force reference [N] to the position [m] of a sliding body, held.
@@ -77,7 +68,7 @@ def _driven_body(m: float, f: float, actuator: Actuator) -> Array:
 
 
 def force_loop(
-    step: Array, entry: Array, h: float, force: ForceGains, ratio: int
+    step: Array, entry: Array, h: float, force: ForcePI, ratio: int
 ) -> tuple[Array, Array]:
     """`ratio` samples of a machine (n, n) under its force loop, and what the reference enters by.
 

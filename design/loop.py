@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from design.force_pi import ForcePI
 from design.loop_kernels import (
     RECORD_F,
     RECORD_MODE,
@@ -29,21 +30,6 @@ from identification.errors import BadModel
 from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.karnopp_lanes import WIDTH
 from identification.simulation.karnopp_step import kernel_parameters
-
-
-@dataclass(frozen=True)
-class ForcePI:
-    """Force controller k_i (1 + h z^-1/(T_i (1 - z^-1))); k_i [V/N], T_i [s]. Paper, eq. (9).
-
-    Raises BadModel where a value is not finite or T_i is not positive.
-    """
-
-    k_i: float
-    T_i: float
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.k_i) and math.isfinite(self.T_i) and self.T_i > 0):
-            raise BadModel(f"k_i = {self.k_i:g} V/N, T_i = {self.T_i:g} s: need T_i > 0, finite")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from design.compensator import Compensator
 from design.drive_law import forgetting
 from design.feed_forward import FeedForward
 from design.filters import PASS, CompensatorFilters, Sampled, sampled, settled
-from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, observer_form, prepared_loop
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, LoopRun, observer_form, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST

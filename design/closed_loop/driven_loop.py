@@ -9,7 +9,7 @@ from design.compensator import Compensator
 from design.drive_law import DriveLaw
 from design.feed_forward import FeedForward
 from design.filters import filters_at
-from design.loop import ForcePI, LoopNoise
+from design.loop import LoopNoise
 from design.loop_signals import OfForce, pressures
 from design.machine.design import Controller, Design, Structure
 from design.machine.drive import ForceLoop, Present
@@ -53,7 +53,7 @@ class DrivenLoop:
         """The loop as `simulate_servo` and `design.controller_program` take it."""
         return Servo(
             self.law.rst,
-            None if self.force is None else ForcePI(self.force.k_i, self.force.T_i),
+            None if self.force is None else self.force.pi,
             friction=self.compensation,
             control_limit=self.limit,
             W=self.law.W,

@@ -7,7 +7,7 @@ import numpy as np
 
 from design.drive_law import DriveLaw
 from design.elastic import Swing, elastic_plant
-from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
+from design.linear import commanded_plant, force_gains, linear_plant
 from design.machine.codec import Command
 from design.machine.design import From, Linear
 from design.machine.drive import ForceLoop
@@ -157,7 +157,7 @@ def sampled(
     actuator without one, or else the force. Raises BadSpecification where the loop is unstable."""
     if not isinstance(actuator, Actuator):
         return elastic_plant(m, f, h, swings) if swings else linear_plant(m, f, h)
-    gains = None if force is None else ForceGains(force.k_i, force.T_i)
+    gains = None if force is None else force.pi
     ratio = 1 if force is None else max(1, round(h / force.h))
     if swings:
         return elastic_plant(m, f, h, swings, actuator, gains, ratio)

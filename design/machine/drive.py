@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from design.drive_law import DriveLaw
+from design.force_pi import ForcePI
 from design.machine.codec import PLACEHOLDER, Around, InUnit, Output, Parameter, Through
 from design.machine.readable import Shown
 from identification.errors import BadModel, BadSpecification
@@ -22,6 +23,11 @@ class ForceLoop:
     k_i: Annotated[float, InUnit("force_gain")]
     T_i: Annotated[float, InUnit("s", above_0=True)]
     h: Annotated[float, InUnit("s", above_0=True)]
+
+    @property
+    def pi(self) -> ForcePI:
+        """Its controller, of any period."""
+        return ForcePI(self.k_i, self.T_i)
 
 
 @dataclass(frozen=True)

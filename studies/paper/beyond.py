@@ -15,7 +15,7 @@ import numpy as np
 from design.compensator import Compensator
 from design.controllers.design import NOISE_SHARE
 from design.filters import PASS, CompensatorFilters, rig_filters
-from design.linear import ForceGains, linear_plant
+from design.linear import linear_plant
 from design.margins import Margins, margins
 from design.servo import Compensation, Servo
 from design.tune import Asked, Goals, Tuned, tune_rst
@@ -96,8 +96,7 @@ def beyond(new: IdentifiedRig, seeds: Sequence[int], tuning_seed: int) -> Ours:
 
 def _linear(p: Karnopp, actuator: Actuator, set_up: SetUp) -> tuple[Array, Array]:
     """The sliding machine behind the set-up's force loop."""
-    gains = ForceGains(set_up.force.k_i, set_up.force.T_i)
-    return linear_plant(p.m, 0.5 * (p.F_vp + p.F_vn), set_up.h, actuator, gains)
+    return linear_plant(p.m, 0.5 * (p.F_vp + p.F_vn), set_up.h, actuator, set_up.force)
 
 
 def _goals(p: Karnopp) -> Goals:

@@ -15,7 +15,8 @@ import numpy as np
 
 from design.compensator import Compensator
 from design.filters import CompensatorFilters, rig_filters, simulation_filters
-from design.loop import ForcePI, LoopNoise
+from design.force_pi import ForcePI
+from design.loop import LoopNoise
 from design.pid import design_pid, pd_to_rst, pid_to_rst
 from design.rivals import IntegralPID
 from design.rst import RST

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST

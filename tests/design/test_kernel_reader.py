@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from design.compensator import INNERS, Compensator
 from design.controller_program import ProgramUnits, controller_program
 from design.filters import filters_at, rig_filters, simulation_filters
+from design.force_pi import ForcePI
 from design.kernel_reader import KernelReader, NamedArray
-from design.loop import ForcePI, LoopNoise
+from design.loop import LoopNoise
 from design.pid import pd_to_rst, pid_to_rst
 from design.program import Assign, Choice, Constant, Number, Program, Repeat, Variable, flat
 from design.program_run import ProgramRun, self_test

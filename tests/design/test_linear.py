@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from design.linear import ForceGains, force_gains, linear_plant
-from design.loop import Cascade, ForcePI
+from design.force_pi import ForcePI
+from design.linear import force_gains, linear_plant
+from design.loop import Cascade
 from design.rst import RST
 from design.two_rate import simulate_two_rate
 from identification.errors import BadSpecification
@@ -38,7 +39,7 @@ def test_it_moves_as_the_simulated_loop_without_coulomb_friction(
     feed_through = RST(np.zeros(1), np.ones(1), np.ones(1), h)
     body = Karnopp(m, 0.0, 0.0, f, f, 1e-9, -1e-9, 0.0, 0.0)
     r = np.repeat(np.linspace(5.0, 20.0, n), ratio)
-    cascade = Cascade(feed_through, ForcePI(gains.k_i, gains.T_i))
+    cascade = Cascade(feed_through, gains)
     run = simulate_two_rate(Plant(body, actuator), cascade, r, h / ratio)
     linear = lfilter(B, A, r[::ratio])
     assert run.y[::ratio] == pytest.approx(linear, rel=1e-6, abs=1e-9)
@@ -57,7 +58,7 @@ def test_the_force_loop_has_unit_static_gain_and_time_constant() -> None:
 
 def test_an_unstable_force_loop_is_refused() -> None:
     with pytest.raises(BadSpecification, match="force loop"):
-        linear_plant(1.0, 300.0, 0.01, ACTUATOR, ForceGains(0.02, 0.05))
+        linear_plant(1.0, 300.0, 0.01, ACTUATOR, ForcePI(0.02, 0.05))
 
 
 @pytest.mark.parametrize(("m", "f"), [(0.0, 1.0), (-1.0, 1.0), (1.0, -1.0)])

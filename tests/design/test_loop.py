@@ -6,15 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.loop import (
-    Cascade,
-    ForcePI,
-    LoopNoise,
-    LoopRun,
-    loop_costs,
-    simulate_loop,
-    simulate_loops,
-)
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, LoopRun, loop_costs, simulate_loop, simulate_loops
 from design.loop_kernels import force_command
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST

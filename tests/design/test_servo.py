@@ -8,8 +8,9 @@ from scipy.signal import lfilter
 
 from design.compensator import Compensator
 from design.filters import CompensatorFilters, rig_filters, simulation_filters
+from design.force_pi import ForcePI
 from design.linear import commanded_plant
-from design.loop import Cascade, ForcePI, LoopNoise, simulate_loop
+from design.loop import Cascade, LoopNoise, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
 from design.rivals import DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from design.loop import Cascade, ForcePI, LoopNoise, simulate_loop
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, simulate_loop
 from design.pid import pid_to_rst
 from design.rst import RST
 from design.two_rate import simulate_two_rate

@@ -9,7 +9,8 @@ from design.closed_loop.driven_loop import DrivenLoop
 from design.compensator import Compensator
 from design.effect_loop import simulate_effect_loop
 from design.filters import filters_at
-from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.machine.codec import written
 from design.machine.documents import around_of

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import Cascade, ForcePI, LoopNoise
+from design.force_pi import ForcePI
+from design.loop import Cascade, LoopNoise
 from design.pid import pid_to_rst
 from identification.arrays import Array
 from identification.effects._library import built_in

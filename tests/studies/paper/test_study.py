@@ -230,12 +230,11 @@ def test_figures_are_those_of_the_judged_samples() -> None:
 
 def test_the_rigs_actuator_follows_from_the_printed_model() -> None:
     """k1, k2: the pole pair of the printed RST model behind a mass of table 3."""
-    from design.linear import ForceGains, linear_plant
+    from design.linear import linear_plant
     from design.polynomial import roots
 
     set_up, p = rig(), friction_of(3)
-    force = ForceGains(set_up.force.k_i, set_up.force.T_i)
-    A, B = linear_plant(p.m, 0.5 * (p.F_vp + p.F_vn), set_up.h, set_up.actuator, force)
+    A, B = linear_plant(p.m, 0.5 * (p.F_vp + p.F_vn), set_up.h, set_up.actuator, set_up.force)
     pair = [max(roots(c), key=lambda z: z.imag) for c in (A, np.array(PRINTED_A))]
     assert abs(pair[0] - pair[1]) < 1e-4
     # The printed model in the sensor's volts is 63 to 64 times this one, to the sensor's 80.
@@ -249,9 +248,10 @@ def test_the_rigs_actuator_follows_from_the_printed_model() -> None:
 
 def test_both_readings_of_the_rigs_integral_time() -> None:
     """0.75 ms as printed cannot be: the force loop is unstable."""
-    from design.linear import ForceGains, linear_plant
+    from design.force_pi import ForcePI
+    from design.linear import linear_plant
     from identification.errors import BadSpecification
 
     p: Karnopp = friction_of(3)
     with pytest.raises(BadSpecification, match="unstable"):
-        linear_plant(p.m, 130.0, 0.01, rig().actuator, ForceGains(0.03, 0.75e-3))
+        linear_plant(p.m, 130.0, 0.01, rig().actuator, ForcePI(0.03, 0.75e-3))
