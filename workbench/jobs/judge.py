@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
+from design.challenge import Contender, Terms, challenge
 from design.controllers.design import design
 from design.controllers.validate import validate, validation_document
 from design.machine.documents import design_document, model_document
@@ -24,7 +25,6 @@ from identification.log import Log
 from workbench.cards.own_effects import library as installed
 from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_design, read_model
-from workbench.jobs.challenge import Contender, Terms, challenge
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps, strict

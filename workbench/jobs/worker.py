@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from design.challenge import Terms
 from workbench.cards.own_effects import library
 from workbench.jobs.alarms import Delivery, Webhook, send_alarms
-from workbench.jobs.challenge import Terms
 from workbench.jobs.events import reporter
 from workbench.jobs.judge import Chain
 from workbench.jobs.metrics import MachineFigures, write_metrics

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.challenge import Terms
 from design.machine.model import Model
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
@@ -18,7 +19,6 @@ from tests.chain import CARD, TABLES, designed
 from workbench.cards.card import Card, load_card
 from workbench.documents.result_files import read_model
 from workbench.jobs import judge
-from workbench.jobs.challenge import Terms
 from workbench.jobs.judge import Chain, Drift, divided, drift_by_chart
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Sources, read_sources
