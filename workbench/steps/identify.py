@@ -13,15 +13,9 @@ from typing import Any, Literal
 import numpy as np
 
 from design.machine.active_model import active_model
+from design.machine.arx_plant import ArxPlant, ArxTests
 from design.machine.effect_values import relabelled
-from design.machine.model import (
-    ArxPlant,
-    ArxTests,
-    FitSummary,
-    LogEntry,
-    Model,
-    ParameterCorrelation,
-)
+from design.machine.model import FitSummary, LogEntry, Model, ParameterCorrelation
 from design.machine.readable import friction_units
 from design.machine.source import Source
 from design.machine.versions import versions
