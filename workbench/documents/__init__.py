@@ -1,1 +1,1 @@
-"""What is written and read back: model.json and design.json."""
+"""Results read back: model.json, design.json, those of a valve, what a trace leaves open."""
