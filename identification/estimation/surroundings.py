@@ -18,12 +18,14 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
+from identification.estimation.latent_force import latent_forces
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
+from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
 from identification.estimation.regression.motion_rows import settled_rows
-from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.row_fit import first_stage, rms
 from identification.estimation.regression.weighted_rows import (
     OF_EQUATION,
     OVERLAP,
@@ -38,6 +40,7 @@ from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES
+from identification.model.plant import Plant
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import (
     NO_SURROUNDINGS,
@@ -106,7 +109,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         return NO_SURROUNDINGS
     found, used = looked
     lag, sampled = _lag(found, used, held), False
-    hold = _hold(moved, found.lags, lag) if rig.kind == "force" else None
+    hold = _hold(logs, lag.value) if rig.kind == "force" else None
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
@@ -343,20 +346,38 @@ def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
     return _significant(found, used)
 
 
-def _hold(moved: Sequence[MotionLog], lags: Array, lag: Size) -> Size | None:
+def _hold(logs: Sequence[Log], lag: float) -> Size | None:
     """By how many whole samples the motion follows a column of force that is constant from each row
-    to the next, nothing or -1 (until the row); None where it is no such column.
+    to the next, nothing or -1 (until the row); None where the position is not significantly
+    likelier so than by a line through the samples, at once or with the lag that the rows show.
 
     A line through the samples of a zero-order hold is half a sample ahead of it (Åström,
-    Wittenmark, Computer-Controlled Systems (1997), 8.2). By the changes from a window to the next,
-    of which what acts beside friction, unknown yet, makes little; where they show none, by the lag
-    that the rows themselves show.
+    Wittenmark, Computer-Controlled Systems (1997), 8.2), which passes for viscous friction; what
+    else acts is a latent force in all of them.
     """
-    changes = lagged_rows(moved, lags, False, False, changes=True)
-    by_changes = NOT_SHOWN if changes is None else _significant(changes, PLAIN)
-    behind = by_changes if by_changes.value else lag
-    nearest = LAG_STEP * round(behind.value / LAG_STEP)
-    return {0.5: NOT_SHOWN, -0.5: Size(-1.0, behind.sd)}.get(nearest)
+    half = LAG_STEP * round(lag / LAG_STEP) in (0.5, -0.5)  # as a hold shows in the rows
+    lines = [_likelihood(logs, at, held=False) for at in {0.0, 0.0 if half else lag}]
+    holds = {whole: _likelihood(logs, whole, held=True) for whole in (0.0, -1.0)}
+    whole = max(holds, key=lambda at: holds[at])
+    if not 2.0 * (holds[whole] - max(lines)) > BEYOND_CHANCE**2:
+        return None
+    return Size(whole, 0.0)
+
+
+def _likelihood(logs: Sequence[Log], lag: float, *, held: bool) -> float:
+    """Logarithm of the likelihood of the position measured while the body slides, by the equation's
+    own parameters and a latent force: with the force so many samples later, and held or a line
+    through them; no number where no inertia shows. Source: `latent_force`."""
+    late = Surroundings(Size(lag * logs[0].h), held=held)
+    moved = [
+        motion_log(replace(late.of_one_instant(log), held=held), held=False, by_command=False)
+        for log in logs
+    ]
+    stage, found = first_stage(moved, False, (MECHANICAL,))
+    if MECHANICAL not in found or inertia_has_no_part(moved):
+        return np.nan
+    plant, slowest = Plant(stage.friction), found[MECHANICAL].slowest
+    return latent_forces(plant, moved, slowest).log_likelihood
 
 
 def _significant(found: LaggedRows, used: Sequence[int]) -> Size:
