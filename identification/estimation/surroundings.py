@@ -18,14 +18,13 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
-from identification.estimation.latent_force import latent_forces
+from identification.estimation.held_force import whole_samples_late
 from identification.estimation.recorded_logs import chosen_drive
-from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
-from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
 from identification.estimation.regression.motion_rows import settled_rows
-from identification.estimation.regression.row_fit import first_stage, rms
+from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
     OF_EQUATION,
     OVERLAP,
@@ -40,7 +39,6 @@ from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES
-from identification.model.plant import Plant
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import (
     NO_SURROUNDINGS,
@@ -109,7 +107,11 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         return NO_SURROUNDINGS
     found, used = looked
     lag, sampled = _lag(found, used, held), False
-    hold = _hold(logs, lag.value) if rig.kind == "force" else None
+    hold = None
+    if rig.kind == "force":
+        nearest = LAG_STEP * round(lag.value / LAG_STEP)
+        of_a_hold = {0.5: 0.0, -0.5: 0.0}  # as which a hold shows in the rows: no line so late
+        hold = whole_samples_late(logs, of_a_hold.get(nearest, lag.value))
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
@@ -132,7 +134,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if bool(np.any(ways) and not np.all(ways)):
         usual = float(np.median(np.concatenate([one.speed for one in moved])))
         force = _constant_force(theta, each, usual)
-    lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold.value * h, hold.sd * h)
+    lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled, held=hold is not None)
 
 
@@ -344,40 +346,6 @@ def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
     if not (about or (apart(lag) and explains(without, float(left[best])))):
         return NOT_SHOWN
     return _significant(found, used)
-
-
-def _hold(logs: Sequence[Log], lag: float) -> Size | None:
-    """By how many whole samples the motion follows a column of force that is constant from each row
-    to the next, nothing or -1 (until the row); None where the position is not significantly
-    likelier so than by a line through the samples, at once or with the lag that the rows show.
-
-    A line through the samples of a zero-order hold is half a sample ahead of it (Åström,
-    Wittenmark, Computer-Controlled Systems (1997), 8.2), which passes for viscous friction; what
-    else acts is a latent force in all of them.
-    """
-    half = LAG_STEP * round(lag / LAG_STEP) in (0.5, -0.5)  # as a hold shows in the rows
-    lines = [_likelihood(logs, at, held=False) for at in {0.0, 0.0 if half else lag}]
-    holds = {whole: _likelihood(logs, whole, held=True) for whole in (0.0, -1.0)}
-    whole = max(holds, key=lambda at: holds[at])
-    if not 2.0 * (holds[whole] - max(lines)) > BEYOND_CHANCE**2:
-        return None
-    return Size(whole, 0.0)
-
-
-def _likelihood(logs: Sequence[Log], lag: float, *, held: bool) -> float:
-    """Logarithm of the likelihood of the position measured while the body slides, by the equation's
-    own parameters and a latent force: with the force so many samples later, and held or a line
-    through them; no number where no inertia shows. Source: `latent_force`."""
-    late = Surroundings(Size(lag * logs[0].h), held=held)
-    moved = [
-        motion_log(replace(late.of_one_instant(log), held=held), held=False, by_command=False)
-        for log in logs
-    ]
-    stage, found = first_stage(moved, False, (MECHANICAL,))
-    if MECHANICAL not in found or inertia_has_no_part(moved):
-        return np.nan
-    plant, slowest = Plant(stage.friction), found[MECHANICAL].slowest
-    return latent_forces(plant, moved, slowest).log_likelihood
 
 
 def _significant(found: LaggedRows, used: Sequence[int]) -> Size:
