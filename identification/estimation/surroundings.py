@@ -111,7 +111,8 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if rig.kind == "force":
         nearest = LAG_STEP * round(lag.value / LAG_STEP)
         of_a_hold = {0.5: 0.0, -0.5: 0.0}  # as which a hold shows in the rows: no line so late
-        hold = whole_samples_late(logs, of_a_hold.get(nearest, lag.value))
+        line = of_a_hold.get(nearest, lag.value)
+        hold = whole_samples_late(logs, line, rotary=rig.motion == "rotary")
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:

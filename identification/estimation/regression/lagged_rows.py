@@ -89,7 +89,7 @@ def lagged_rows(
     if not any(len(one.speed) for one in moved):
         return None
     own, cross, square, rows = [], [], [], 0
-    slow = _slow_of_each_way(moved)
+    slow = slow_of_each_way(moved)
     for one in moved:
         w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
         mean = w.held if held else w.mean
@@ -119,7 +119,7 @@ def lagged_rows(
     return LaggedRows(np.array(own), np.array(cross), np.array(square), lags, rows)
 
 
-def _slow_of_each_way(moved: Sequence[MotionLog]) -> tuple[float, float]:
+def slow_of_each_way(moved: Sequence[MotionLog]) -> tuple[float, float]:
     """The speed [m/s] of the slow windows that move up, and of those that move down, of which all
     may be slower than the others."""
     speed = np.concatenate([one.speed for one in moved])
