@@ -18,6 +18,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
+from identification.estimation.held_force import whole_samples_late
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
@@ -106,7 +107,12 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         return NO_SURROUNDINGS
     found, used = looked
     lag, sampled = _lag(found, used, held), False
-    hold = _hold(moved, found.lags, lag) if rig.kind == "force" else None
+    hold = None
+    if rig.kind == "force":
+        nearest = LAG_STEP * round(lag.value / LAG_STEP)
+        of_a_hold = {0.5: 0.0, -0.5: 0.0}  # as which a hold shows in the rows: no line so late
+        line = of_a_hold.get(nearest, lag.value)
+        hold = whole_samples_late(logs, line, rotary=rig.motion == "rotary")
     if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
         lag = NOT_SHOWN
     if held and lag.value:
@@ -129,7 +135,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     if bool(np.any(ways) and not np.all(ways)):
         usual = float(np.median(np.concatenate([one.speed for one in moved])))
         force = _constant_force(theta, each, usual)
-    lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold.value * h, hold.sd * h)
+    lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold * h)
     return Surroundings(lag, force, sine, cosine, (), gives, sampled, held=hold is not None)
 
 
@@ -341,22 +347,6 @@ def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
     if not (about or (apart(lag) and explains(without, float(left[best])))):
         return NOT_SHOWN
     return _significant(found, used)
-
-
-def _hold(moved: Sequence[MotionLog], lags: Array, lag: Size) -> Size | None:
-    """By how many whole samples the motion follows a column of force that is constant from each row
-    to the next, nothing or -1 (until the row); None where it is no such column.
-
-    A line through the samples of a zero-order hold is half a sample ahead of it (Åström,
-    Wittenmark, Computer-Controlled Systems (1997), 8.2). By the changes from a window to the next,
-    of which what acts beside friction, unknown yet, makes little; where they show none, by the lag
-    that the rows themselves show.
-    """
-    changes = lagged_rows(moved, lags, False, False, changes=True)
-    by_changes = NOT_SHOWN if changes is None else _significant(changes, PLAIN)
-    behind = by_changes if by_changes.value else lag
-    nearest = LAG_STEP * round(behind.value / LAG_STEP)
-    return {0.5: NOT_SHOWN, -0.5: Size(-1.0, behind.sd)}.get(nearest)
 
 
 def _significant(found: LaggedRows, used: Sequence[int]) -> Size:

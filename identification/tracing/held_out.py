@@ -21,7 +21,11 @@ from identification.tracing.model_errors import (
     row_noise,
     share_left,
 )
-from identification.tracing.parameter_drift import parameter_drift, with_changes
+from identification.tracing.parameter_drift import (
+    ParameterDrift,
+    parameter_drift,
+    with_changes,
+)
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.probability import Evidence, evidence
@@ -150,10 +154,16 @@ class HeldOut:
         return np.inf if left is None else left
 
     @cached_property
+    def drift(self) -> ParameterDrift:
+        """Parameters that are others on the test logs, and how far these then lie off."""
+        if not self.seen:
+            return ParameterDrift((), 0.0)
+        return parameter_drift(self.model, self.choice.steps, self.seen, self.plain.recorded.rig)
+
+    @property
     def changed(self) -> tuple[Change, ...]:
         """Parameters that are others on the test logs."""
-        rig = self.plain.recorded.rig
-        return parameter_drift(self.model, self.choice.steps, self.seen, rig) if self.seen else ()
+        return self.drift.changes
 
     @cached_property
     def lacking(self) -> bool:
@@ -163,14 +173,27 @@ class HeldOut:
     @cached_property
     def lacks_force(self) -> bool:
         """Whether the plain model, with the parameters that have changed, lacks a force of account
-        on the test logs, however noisy the rows of its equation are; with effects, whether they
-        leave one says their evidence."""
+        on the test logs, however noisy the rows of its equation are, or these leave more there than
+        of the training logs: then more has changed; with effects, whether they leave one says their
+        evidence."""
         if self.model is not self.plain.model:
             return False
+        if self.changed and self.drift.misfit > ADEQUATE:
+            return True
         found = self._missing(self.changed) if self.changed else self.missing
         if found is None or found.after.is_a_bound:
             return False
         return (found.after.share(self.coulomb) or 0.0) > OF_ACCOUNT
+
+    @property
+    def shows_more_than_training(self) -> bool:
+        """Whether the plain model lacks a force of account on the test logs, whatever parameters
+        have changed, and nothing on the training logs."""
+        force, floor = self.before["test"].force_rms, self.noise.force_rms or 0.0
+        if not self.seen or self.lacking or force is None:
+            return False
+        beyond = force**2 - floor**2 > (MATERIAL * self.coulomb) ** 2
+        return self.lacks_force or (beyond and self.drift.misfit > ADEQUATE)
 
     @property
     def hides_friction(self) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import norm
@@ -29,9 +30,18 @@ from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Change
 
 
+class ParameterDrift(NamedTuple):
+    """Parameters that differ between training and test logs; misfit: mean square that the rows of
+    the equations leave on the test logs with these, over that on the training logs or the noise,
+    whichever is more: about 1 where nothing else has changed."""
+
+    changes: tuple[Change, ...]
+    misfit: float
+
+
 def parameter_drift(
     after: FittedStructure, steps: Sequence[Step], seen: Sequence[MotionLog], rig: Rig
-) -> tuple[Change, ...]:
+) -> ParameterDrift:
     """Parameters that differ between training and test logs, fewest that bring the error down.
 
     One that the refined plant has as the test logs do has not changed: the equations, which the
@@ -41,6 +51,7 @@ def parameter_drift(
     stage = seen_by(after.stage, steps, seen)
     units = units_of(rig.motion, rig.command_unit)
     out: list[Change] = []
+    misfit = 0.0
     for equation, names in ((MECHANICAL, FIVE), (ACTUATOR, ("k1", "k2"))):
         if equation in after.outcomes:
             mine = after.outcomes[equation]
@@ -53,11 +64,29 @@ def parameter_drift(
                 # What a loop commands between the samples of slower logs differs with the motion.
                 unseen = any(one.noise.between for one in stage.logs)
                 slight = OF_ACCOUNT if unseen else MATERIAL
-                found = (Change(name, units[name], *change)
-                         for name, *change in changes(mine, rows, keep, names, blur, slight)
-                )  # fmt: skip
+                found = [
+                    Change(name, units[name], *change)
+                    for name, *change in changes(mine, rows, keep, names, blur, slight)
+                ]
+                misfit = max(misfit, _misfit(mine, rows, keep, names, found))
                 out += [one for one in found if not is_refined(one, after)]
-    return tuple(out)
+    return ParameterDrift(tuple(out), misfit)
+
+
+def _misfit(
+    mine: RowFit, rows: Rows, keep: BoolArray, names: Sequence[str], changed: Sequence[Change]
+) -> float:
+    """Mean square that other rows leave with the changed parameters, over that of the fit's own."""
+    theta = mine.fit.theta.copy()
+    for one in changed:
+        theta[names.index(one.name)] = one.after
+    left = ((rows.b - rows.X @ theta) / rows.sd)[keep]
+    return float(np.mean(left**2)) / _own_misfit(mine)
+
+
+def _own_misfit(mine: RowFit) -> float:
+    """Mean square that a fit leaves of its rows, at least that of the sensors' noise."""
+    return max(float(np.mean(mine.fit.residual[mine.rows.speed >= mine.slowest] ** 2)), 1.0)
 
 
 def is_refined(one: Change, after: FittedStructure) -> bool:
@@ -107,8 +136,7 @@ def changes(
     r = b - A @ theta
     # What is left of the test logs with every parameter free is noise to a drift too.
     every = b - A @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
-    own = float(np.mean(mine.fit.residual[mine.rows.speed >= mine.slowest] ** 2))
-    noise = max(own, float(np.mean(every**2)), 1.0)
+    noise = max(_own_misfit(mine), float(np.mean(every**2)))
     gram = A.T @ A - np.diag(blur)
     slope = A.T @ r + blur * theta
     free: list[int] = []

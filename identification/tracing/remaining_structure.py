@@ -58,13 +58,13 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
         return None
     every = signals_at(choice.end, equation)
     way = upward(choice.end, equation, every)[keep]
-    held = all(one.held for one in choice.end.logs)
+    motor = _by_motor(choice.end.logs)
     if equation == BREAKAWAY:  # force and command at breakaway are what is judged
         every = {k: v for k, v in every.items() if k not in ("F", "u", "v", "reversal")}
     if equation == MECHANICAL:
         # Of the measured force the residual is itself a part: the model's is judged.
         every["F"] = o.rows.b - o.fit.residual * o.rows.sd
-        if held:
+        if motor:
             every.pop("u", None)
     if equation == REST:  # as it is told there, it is the position's own noise
         every.pop("v")
@@ -82,7 +82,7 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
     names = found.depends_on
     if equation == REST and names:  # it is left since the body stands still, and not before
         names = (*names, "reversal")
-    named = replace(found, depends_on=_with_command(names, held))
+    named = replace(found, depends_on=_with_command(names, motor))
     return named, found.explained * float(np.mean(r**2))
 
 
@@ -101,9 +101,14 @@ def _mean(r: Array) -> float:
     return float(np.mean(r)) if len(r) else 0.0
 
 
-def _with_command(names: tuple[str, ...], held: bool) -> tuple[str, ...]:
+def _by_motor(logs: Sequence[MotionLog]) -> bool:
+    """Whether a motor drives the body, whose force is its command held."""
+    return all(one.held and "u" in one.log for one in logs)
+
+
+def _with_command(names: tuple[str, ...], motor: bool) -> tuple[str, ...]:
     """Signals named (k,), the command beside its rate and, where it makes the force, the force."""
-    also = {"du": ("u",), "F": ("u",) if held else (), "u": ("F",) if held else ()}
+    also = {"du": ("u",), "F": ("u",) if motor else (), "u": ("F",) if motor else ()}
     every = [each for name in names for each in (name, *also.get(name, ()))]
     return tuple(dict.fromkeys(every))[:MOST_SIGNALS]
 
@@ -173,8 +178,7 @@ def in_run(
     if not told:
         return Dependence((), 0.0)
     named = tuple(dict.fromkeys(name for one in told for name in one.depends_on))
-    held = all(one.held for one in logs)
-    return replace(told[0], depends_on=_with_command(named, held))
+    return replace(told[0], depends_on=_with_command(named, _by_motor(logs)))
 
 
 def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:

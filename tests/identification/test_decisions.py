@@ -12,7 +12,7 @@ from tests.test_lengths import ROOT, tree
 
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
-    "estimates", "fit", "imposed_motion", "late_position", "recorded_logs",
+    "estimates", "fit", "held_force", "imposed_motion", "late_position", "recorded_logs",
     "regressed_plant", "run_or_equation", "settling", "structure_fit",
     "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip

@@ -79,18 +79,17 @@ class LaggedRows:
 
 def lagged_rows(
     moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
-    known: Surroundings = NO_SURROUNDINGS, *, changes: bool = False,
+    known: Surroundings = NO_SURROUNDINGS,
 ) -> LaggedRows | None:  # fmt: skip
     """The equation's rows at every lag, by blocks of time; None where there are too few. Source:
     weak form, Messenger, Bortz, J. Comput. Phys. 443 (2021) 110525.
 
-    lags: in samples, ascending; held: the force's column is a zero-order hold; changes: of the
-    rows from each window to the next of the same way.
+    lags: in samples, ascending; held: the force's column is a zero-order hold.
     """
     if not any(len(one.speed) for one in moved):
         return None
     own, cross, square, rows = [], [], [], 0
-    slow = _slow_of_each_way(moved)
+    slow = slow_of_each_way(moved)
     for one in moved:
         w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
         mean = w.held if held else w.mean
@@ -106,11 +105,6 @@ def lagged_rows(
         inside = (w.start >= lags[-1]) & (w.start + w.length < len(F) + min(float(lags[0]), 0.0))
         up = one.up
         inside &= plain.speed >= np.where(up, *slow)
-        if changes:
-            apart_by = np.diff(w.start)
-            inside = inside[1:] & inside[:-1] & (apart_by == np.min(apart_by, initial=len(F)))
-            inside &= up[1:] == up[:-1]
-            X, B, up = np.diff(X, axis=0), np.diff(B, axis=0), up[1:]
         block = _blocks_of_each_way(up, inside)
         for k in range(BLOCKS):
             in_block = inside & (block == k)
@@ -125,7 +119,7 @@ def lagged_rows(
     return LaggedRows(np.array(own), np.array(cross), np.array(square), lags, rows)
 
 
-def _slow_of_each_way(moved: Sequence[MotionLog]) -> tuple[float, float]:
+def slow_of_each_way(moved: Sequence[MotionLog]) -> tuple[float, float]:
     """The speed [m/s] of the slow windows that move up, and of those that move down, of which all
     may be slower than the others."""
     speed = np.concatenate([one.speed for one in moved])

@@ -106,7 +106,7 @@ def test_a_force_that_is_explained_as_measured_is_not_outvoted_by_the_position(
     by_sensor = replace(step, candidate=replace(step.candidate, effect=shown))
     other = replace(held, choice=replace(held.choice, steps=(by_sensor,)))
     vars(other).update(
-        {name: getattr(held, name) for name in ("share", "before", "after", "changed")}
+        {name: getattr(held, name) for name in ("share", "before", "after", "drift")}
     )
     assert "position" in other.against
 

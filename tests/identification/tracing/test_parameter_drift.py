@@ -111,4 +111,4 @@ def test_a_slight_change_is_none_where_commands_are_unseen(
     found = parameter_drift.parameter_drift(
         model, (), [pushed], Rig("motor", force_per_command=1.0)
     )
-    assert [one.name for one in found] == named
+    assert [one.name for one in found.changes] == named

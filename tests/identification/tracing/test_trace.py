@@ -216,6 +216,35 @@ def test_a_slower_test_log_is_no_drift_of_the_mass() -> None:
 
 
 @pytest.mark.slow
+def test_an_effect_of_slow_motion_that_the_test_log_alone_has_is_no_drift() -> None:
+    """Friction that falls from 15 to 10 N over 30 mm/s: quick training strokes do not show it, and
+    the trace ended with "nothing is missing", or with friction that had "changed"."""
+    stribeck = {"stribeck": {"F_s": 5.0, "v_s": 0.03}}
+    even = Karnopp(2.5, 10.0, 10.0, 120.0, 120.0, 1e-3, -1e-3, 15.0, -15.0)
+    t = H * np.arange(15_000, dtype=np.float64)
+    swelling = 1.0 + 0.5 * np.sin(0.31 * t)
+    quick, slow = (
+        driven(seed, size * swelling * np.sin(2 * np.pi * f * t), even, stribeck)
+        for seed, size, f in ((61, 0.3, 0.9), (62, 0.04, 0.12))
+    )
+    found = traced(quick, slow)
+    (one,) = found.effects
+    assert one.effect.key == "stribeck" and not found.drift
+    assert one.params["F_s"].value == pytest.approx(5.0, rel=0.02)
+    assert any("first half" in remark for remark in found.remarks)
+
+
+def driven(seed: int, u: Array, plain: Karnopp, effects: Mapping[str, Mapping[str, float]]) -> Log:
+    """`made`, driven by another command."""
+    acting = tuple(built_in()[key].acting(values) for key, values in effects.items())
+    log = made(seed, n=len(u)).with_signals(u=u)
+    run = free_run(Plant(plain, ACTUATOR, acting), log, (0.0, 0.0, 0.0), "command")
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((2, len(u)))
+    return log.with_signals(y=run.shown + 1e-5 * noise[0], F=run.F + 1e-2 * noise[1])
+
+
+@pytest.mark.slow
 def test_scale_of_forces_is_as_exact_as_its_interval() -> None:
     found = traced(made(11))
     for name, true in (("k1", ACTUATOR.k1), ("k2", ACTUATOR.k2), ("m", PLAIN.m)):
