@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.random_plants import KINDS, drawn, logged
+from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
 from identification.estimation.regression.motion_log import motion_log
@@ -165,11 +166,11 @@ def test_a_hold_of_a_jittering_force_is_seen_behind_its_sensors_noise(held: bool
     show no lag there, and half a sample left in takes 0.3 to 0.6 N s/m off a viscous friction of
     50 (five deviations and more)."""
     h, nine = 1e-3, Karnopp(8.0, 20.0, 20.0, 50.0, 50.0, 1e-3, -1e-3, 22.0, -22.0)
-    rng, t = np.random.default_rng(1), 1e-3 * np.arange(15_000, dtype=np.float64)
+    rng, t = np.random.default_rng(1), np.asarray(1e-3 * np.arange(15_000.0), dtype=np.float64)
     F = sum(size * np.sin(2 * np.pi * f * t + f) for f, size in ((0.3, 30), (0.9, 25), (2.1, 20)))
     F = F + rng.standard_normal(len(t))
-    fine = np.arange(5 * len(t)) * 0.2 * h
-    acts = np.repeat(F, 5) if held else np.interp(fine, t, F)
+    fine = np.asarray(np.arange(5 * len(t)) * 0.2 * h, dtype=np.float64)
+    acts: Array = np.repeat(F, 5) if held else np.interp(fine, t, F)
     blank = Log("slide", {"t": fine, "y": np.zeros(len(fine)), "F": acts})
     run = free_run(Plant(nine), blank, (0.0, 0.0, float(F[0])), "force")
     noise = rng.standard_normal((2, len(t)))
