@@ -1,13 +1,15 @@
 """What was found beside the plain model, on logs that neither the choice nor the fit has seen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from identification.estimation.prediction_error import significant
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.row_fit import RowFit
+from identification.estimation.regression.weighted_rows import Rows, stacked
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.model.estimates import Drive
 from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT
@@ -19,6 +21,7 @@ from identification.tracing.model_errors import (
     on_test,
     rest_share_left,
     row_noise,
+    seen_by,
     share_left,
 )
 from identification.tracing.parameter_drift import (
@@ -190,10 +193,21 @@ class HeldOut:
         """Whether the plain model lacks a force of account on the test logs, whatever parameters
         have changed, and nothing on the training logs."""
         force, floor = self.before["test"].force_rms, self.noise.force_rms or 0.0
-        if not self.seen or self.lacking or force is None:
+        if not self.seen or self.choice.steps or self.lacking or force is None:
             return False
         beyond = force**2 - floor**2 > (MATERIAL * self.coulomb) ** 2
         return self.lacks_force or (beyond and self.drift.misfit > ADEQUATE)
+
+    @property
+    def choice_on_test(self) -> Choice:
+        """The choice with what it leaves of the test logs in place of the training logs."""
+        end = seen_by(self.choice.end, self.choice.steps, self.seen)
+        base = {
+            equation: _left_of(found, stacked(end.parts[equation]))
+            for equation, found in self.choice.base.items()
+            if equation in (MECHANICAL, ACTUATOR)
+        }
+        return replace(self.choice, end=end, base=base)
 
     @property
     def hides_friction(self) -> bool:
@@ -299,3 +313,9 @@ class HeldOut:
             if not one.is_a_bound
         ]
         return missing.share_left if max(lacked, default=0.0) > MATERIAL else None
+
+
+def _left_of(found: RowFit, rows: Rows) -> RowFit:
+    """What a fit leaves of other rows."""
+    residual = (rows.b - rows.X @ found.fit.theta) / rows.sd
+    return replace(found, rows=rows, fit=replace(found.fit, residual=residual))

@@ -32,8 +32,13 @@ def judgement(held: HeldOut) -> Trace:
     logs."""
     plain, choice, after, changed = held.plain, held.choice, held.model, held.changed
     before, rows, terms = plain.model, plain.rows, held.evidence
-    lacking = held.lacking or held.lacks_force
-    left = strongest(choice, after, held.logs, held.drive) if lacking else NOTHING
+    on_test = held.shows_more_than_training
+    lacking = held.lacking or held.lacks_force or on_test
+    left = NOTHING
+    if on_test:
+        left = strongest(held.choice_on_test, after, held.seen, held.drive)
+    elif lacking:
+        left = strongest(choice, after, held.logs, held.drive)
     doubts = [*_doubts(held)]
     known = not doubts and (bool(choice.steps) or not lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"

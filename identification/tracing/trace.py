@@ -165,8 +165,9 @@ def _traced(
     if not choice.steps:
         plain = settled_plain(plain, settle, report)
         held = HeldOut(plain, choice, plain.model, held.seen)
-    alone = halves and held.shows_more_than_training
-    if alone and not (choice.steps or halt.reached()):
+    with halt.closing():
+        alone = halves and held.shows_more_than_training
+    if alone and not halt.reached():
         found = _by_halves(train, test, rig, library, other, report, halt)
         if found is not None:
             return found
