@@ -57,11 +57,9 @@ from identification.thresholds import (
 )
 
 LAG_STEP = 0.25  # of a sample, between the lags that are tried
-LAG = 12.0  # samples, up to which they are
+LAG = 12.0  # samples, up to which they are, as a filtered force is before its motion
 FARTHER = (1.0, 2.0, 4.0, 8.0)  # times that, where the best is the last of them
 OF_A_STROKE = 0.25  # to which they are: in a sine a lag is as good as another inertia and friction
-# From which, of a measured force and of a motor, whose current may be as late as a position.
-EARLIEST_LAG = {False: -6.0, True: -LAG}
 TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
@@ -169,7 +167,7 @@ def _looked_far(
     strokes = sum(1 + int(np.sum(one.up[1:] != one.up[:-1])) for one in moved)
     most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
     for latest in (one * LAG for one in FARTHER if one == 1.0 or one * LAG < most):
-        lags = np.arange(EARLIEST_LAG[moved[0].held], latest + LAG_STEP / 2, LAG_STEP)
+        lags = np.arange(-LAG, latest + LAG_STEP / 2, LAG_STEP)
         found = lagged_rows(moved, lags, turns, held, known)
         if found is None:
             break

@@ -35,7 +35,7 @@ def late_log(seconds: float) -> Log:
     return Log("late", {"t": t, "y": np.interp(t - seconds, t, y) + noise, "F": torque})
 
 
-@pytest.mark.parametrize("samples", [0.0, 2.0])
+@pytest.mark.parametrize("samples", [-8.0, 0.0, 2.0])
 def test_a_lag_of_a_measured_force_is_found_to_a_fraction_of_a_sample(samples: float) -> None:
     found = what_acts_beside([late_log(samples * H)], Rig("force", motion="rotary"))
     assert abs(found.lag.value / H - samples) < 0.25
