@@ -131,7 +131,8 @@ def fit_beside(
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
     if shows and not (fit.adequate or beside.orders or halt.reached()):
-        resonance = two_masses(alone, rig) if chosen_drive(alone, rig, drive) == "force" else None
+        direct = rig.kind == "motor" or chosen_drive(alone, rig, drive) == "force"
+        resonance = two_masses(alone, rig) if direct else None
         if resonance is not None:
             beside, fit = replace(beside, resonance=resonance), of_two_masses(fit, resonance)
     if halt.reached():

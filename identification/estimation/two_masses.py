@@ -6,7 +6,8 @@ acts on it along the measured motion:
     G(s) = (w_r/w_a)^2 (s^2 + 2 z_a w_a s + w_a^2) / (s^2 (s^2 + 2 z w_r s + w_r^2)),
     w_a^2 = k/m_2 (the motor stands still), w_r^2 = k (1/m_1 + 1/m_2), z_a w_r = z w_a.
 All but the two frequencies and the damping are linear and solved within (variable projection), so
-these three alone are searched. One body in the same windows is what it has to beat.
+these three alone are searched. One body in the same windows is what it has to beat. Windows that
+leave three times the median square, in which the body stops, are left out of both.
 Sources: drives with an elastic shaft, Schroeder, Elektrische Antriebe - Regelung von
 Antriebssystemen, 4th ed., chapter 19; variable projection, Golub, Pereyra, SIAM J. Numer. Anal. 10
 (1973) 413.
@@ -34,7 +35,7 @@ from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
-from identification.thresholds import BEYOND_CHANCE, FAR_LESS, WORSE
+from identification.thresholds import ASTRAY, BEYOND_CHANCE, FAR_LESS, WORSE
 
 RUN_SECONDS = 0.5  # s
 LEAST_CYCLES = 2.0  # of the resonance in a window
@@ -45,6 +46,7 @@ APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
 FEWEST_RUNS = 8
+ONE_BODY = (np.ones(1), np.array([1.0, 0.0, 0.0]))  # y = F / (m s^2), for a unit mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,6 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     lowest, highest = LEAST_CYCLES / RUN_SECONDS, HIGHEST_SHARE / h
     if len(cut) < FEWEST_RUNS or not lowest < highest:
         return None
-    one_body = _left(cut, (np.ones(1), np.array([1.0, 0.0, 0.0])), h, _drift)[0]
-
     tried = [
         np.log([2.0 * np.pi * f / ratio, 2.0 * np.pi * f, BEGUN])
         for f in np.geomspace(lowest, highest, HERTZ_TRIED)
@@ -81,11 +81,21 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     starts = sorted(tried, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))[:SEARCHES_RUN]
     every = [_nearest(p, cut, h, 4 * EACH_SEARCH) for p in starts]
     found = min(every, key=lambda one: float(one.cost))
+    each = _of_windows(found.fun, cut)
+    cut = [one for one, left in zip(cut, each, strict=True) if left <= ASTRAY * np.median(each)]
+    found = _nearest(found.x, cut, h, 4 * EACH_SEARCH)
+    one_body = _left(cut, ONE_BODY, h, _drift)[0]
     w_a, w_r, damping = (float(x) for x in np.exp(found.x))
     inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
     if not inside or not are_two(float(one_body @ one_body), float(found.fun @ found.fun)):
         return None
     return _resonance(found.x, cut, h, damping)
+
+
+def _of_windows(left: Array, cut: Sequence[_Window]) -> Array:
+    """The square left of each window."""
+    ends = np.cumsum([len(one.y) for one in cut])[:-1]
+    return np.array([part @ part for part in np.split(left, ends)])
 
 
 def shows_a_load(resonance: float, anti_resonance: float) -> bool:

@@ -103,7 +103,8 @@ def trace(
     if beside.sampled:  # a measured current, which no period holds
         told = replace(told, command_period=0.0)
     elastic = told.verdict == "unknown" and not told.effects and not halt.reached()
-    if not elastic or chosen_drive(train, rig, None) != "force":
+    direct = rig.kind == "motor" or chosen_drive(train, rig, None) == "force"
+    if not (elastic and direct):
         return told
     resonance = two_masses(train, rig)
     if resonance is None:
