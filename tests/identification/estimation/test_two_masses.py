@@ -15,8 +15,8 @@ RIG = Rig("force", motion="rotary")
 def log_of(
     m_1: float, m_2: float, k: float, *, damping: float, seed: int, F_c: float = 0.05
 ) -> Log:
-    """A motor with Coulomb friction that turns a load through a spring (k = 0: alone); above 0.05 N m
-    it is left without a force for half a second of four, in which it stops."""
+    """A motor with Coulomb friction that turns a load through a spring (k = 0: alone); with more
+    than 0.05 N m of it left without a force for half a second of four, in which it stops."""
     rng, n = np.random.default_rng(seed), round(SECONDS / H)
     t = H * np.arange(n)
     steps = np.repeat(rng.uniform(-1.0, 1.0, n // 20), 20)
