@@ -14,9 +14,12 @@ from scipy.stats import norm
 from design.challenge import Contender, Terms, challenge
 from design.controllers.design import design
 from design.controllers.validate import validate, validation_document
+from design.identified.trace_logs import Traced
 from design.machine.documents import design_document, model_document
 from design.machine.model import Model
+from design.machine.slip_of_scale import moved_between, no_wear
 from design.machine.source import Source
+from design.measured.drift_of_logs import Stream, drift_of
 from identification.drift.drift_result import Shift
 from identification.drift.mewma import DriftState
 from identification.effects._library import Library
@@ -31,16 +34,9 @@ from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.drift import reason_sentence
 from workbench.report.trace_words import trace_sentence
-from workbench.steps.drift import (
-    Stream,
-    detectable_sizes,
-    drift_of,
-    model_key,
-    moved_between,
-    no_wear,
-)
+from workbench.steps.drift import detectable_sizes, model_key
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.trace import trace_sources
 
 TestedDrift = Literal["none", "drift", "structure", "not_judged"]
 
@@ -107,7 +103,7 @@ def drift_by_chart(
     """
     stream = Stream(_state(state), ()) if state else None
     seed = int(rng.integers(2**31))
-    found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
+    found = drift_of(model, model_key(model), sources.logs, stream=stream, seed=seed)
     worst = [one.test for one in found.tests if one.test.verdict == found.verdict][-1]
     state_now: Any = strict(found.stream.state)
     statistics = [one for one in (worst.single, worst.mean) if one is not None]

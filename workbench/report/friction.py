@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from design.identified.trace_logs import Traced
 from design.machine.model import Model, used
 from design.machine.readable import units_of
 from design.machine.source import Source
@@ -25,7 +26,6 @@ from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
 from workbench.report.chart_figure import evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
-from workbench.steps.trace import Traced
 
 POINTS = 80  # of a branch of the curve
 CURVE = 160  # of one in a trace

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.identified import trace_logs as tracing
+from design.identified.trace_logs import traced_model
 from design.machine.documents import model_document
 from identification.effects._library import built_in
 from identification.errors import BadLog
@@ -49,8 +51,7 @@ from workbench.report.trace_pictures import (
     share_inside,
 )
 from workbench.report.trace_words import percent, trace_sentence
-from workbench.steps import trace as tracing
-from workbench.steps.trace import named_logs, trace_document, trace_sources, traced_model
+from workbench.steps.trace import named_logs, trace_document, trace_sources
 
 CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
@@ -106,7 +107,7 @@ def test_the_model_after_is_read_back_with_its_effects(tmp_path: Path) -> None:
 
 
 def test_a_force_without_noise_is_no_fault() -> None:
-    model = traced_model(replace(trace_of(), noise_force=0.0), sources(), built_in())
+    model = traced_model(replace(trace_of(), noise_force=0.0), sources().logs, built_in())
     assert model.fit.chi_square == 1.0
 
 

@@ -8,6 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from identification.errors import BadLog
+from identification.signals.delays import are_exchanged
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import FEWEST_MOVING, force_law, lead, moving
 from identification.thresholds import OF_ACCOUNT, TWICE
@@ -90,11 +91,6 @@ def behind_reference(roles: Roles) -> float | None:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)
     return found.samples if follows(found) else None
-
-
-def are_exchanged(behind: float) -> bool:
-    """Whether a position so many samples behind its reference comes before it."""
-    return behind < -1.0
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:

@@ -2,11 +2,11 @@
 
 import pytest
 
+from design.machine.surrounding_lines import surrounding_lines, unequal_friction
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
-from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
 
 
 def levels(up: float | None, down: float | None, sd: float) -> dict[str, Estimate]:

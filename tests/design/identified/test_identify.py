@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from design.identified.identify import NONE_IDENTIFIABLE, identify
 from design.machine.source import Source
 from design.measured.predict import predict
 from identification.errors import NotIdentifiable
 from identification.log import Log, Rig
-from workbench.steps.identify import NONE_IDENTIFIABLE, identify
 
 
 def strokes(disturbance: float) -> Source:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from design.machine.model import Identifiable
+from design.machine.surrounding_lines import surrounding_lines
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.estimates import Events, silent_reason
@@ -36,7 +37,6 @@ from identification.thresholds import EVENTS_NEEDED
 from identification.velocity.fit import fit
 from identification.velocity.record import recorded
 from identification.velocity.valve_estimates import units, valve_estimates
-from workbench.steps.surrounding_lines import surrounding_lines
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
 MEND = {

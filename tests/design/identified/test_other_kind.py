@@ -1,12 +1,12 @@
 """Which kind a log looks like: said where it is taken for the other one, and only there."""
 
+from design.identified.velocity import looks_like_friction, looks_like_velocity
 from identification.log import Rig
 from identification.velocity.fit import fit
 from identification.velocity.record import recorded
 from identification.velocity.rivals import held_out
 from tests.identification.motor_logs import made as made_motor
 from tests.identification.velocity.made import made
-from workbench.steps.velocity import looks_like_friction, looks_like_velocity
 
 MOTOR, FORCE = Rig("motor", force_per_command=1.0), Rig("force")
 VALVE = made(90, duration=30.0)

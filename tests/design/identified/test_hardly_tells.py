@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS
+from design.identified.hardly_identifiable import braked_by_its_voltage, hardly_identifiable
 from identification.arrays import Array
 from identification.log import Log, Rig
-from workbench.steps.hardly_identifiable import braked_by_its_voltage, hardly_identifiable
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 FORCE = Rig("force", motion="rotary")

@@ -2,8 +2,8 @@
 
 import pytest
 
+from design.machine.slip_of_scale import Moved, no_wear, other_mass, slip_of_scale
 from tests.chain import TABLES
-from workbench.steps.drift import Moved, no_wear, other_mass, slip_of_scale
 
 NINE = {
     name: getattr(TABLES["paper_table1"], name) for name in ("m", "F_cp", "F_vn", "dv_p", "F_sn")

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from design.asked import Options
 from design.machine.active_model import active_model
 from design.machine.arx_plant import ArxPlant, ArxTests
 from design.machine.effect_values import relabelled
@@ -40,8 +41,8 @@ from identification.model.surroundings import Surroundings
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
-from workbench.steps.asked import Options as Options
-from workbench.steps.asked import Orders
+
+Orders = tuple[int, int, int]
 
 SPLIT = 0.6
 FAST = 0.99
