@@ -16,12 +16,13 @@ from design.compensation_tables import (
     is_of_place,
     is_of_speed,
 )
+from design.generated.exported import identifier
+from design.generated.filled import Filled
 from design.machine.model import Model
 from design.machine.readable import Unit, number, shown_unit, units_of
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
-from workbench.export.exported import filled, identifier
 
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
@@ -265,8 +266,9 @@ class Format:
     where: str
     content: Callable[[Compensation], Content]
 
-    def __call__(self, what: Compensation) -> TableFile:
-        """The file of a model; raises BadModel where a number that it needs is wanting."""
+    def __call__(self, what: Compensation, filled: Filled) -> TableFile:
+        """The file of a model; filled: fills in its template. Raises BadModel where a number that
+        it needs is wanting."""
         made = self.content(what)
         costs = [one.in_words(what.force_unit) for one in made.costs]
         lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}

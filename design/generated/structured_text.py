@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from importlib.metadata import version
 
+from design.generated.exported import Exported, Precision, heading_of, rows
+from design.generated.filled import Filled
+from design.generated.syntax import INDENT, Syntax, arrays_of
 from design.program import Kind
-from workbench.export.exported import Exported, Precision, filled, heading_of, rows
-from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Words of the standard, and operators of its Instruction List, that a name here may meet.
 RESERVED = ("s", "n", "d", "l", "p", "t", "in", "to", "by", "of", "on", "step", "limit", "mod")
@@ -88,7 +88,7 @@ class Block:
     body: tuple[str, ...]
 
 
-def st_file(what: Exported) -> dict[str, str]:
+def st_file(what: Exported, filled: Filled) -> dict[str, str]:
     """The controller's block and the one that tests it, in one file."""
     text = filled("blocks.st", **heading_of(what), blocks=blocks(what))
     return {f"{what.program.name}.st": text}
@@ -162,14 +162,17 @@ def _test(what: Exported, st: Syntax) -> Block:
 ELEMENTARY = ("BOOL", "DINT", "REAL", "LREAL")
 
 
-def plcopen_file(what: Exported, now: datetime) -> dict[str, str]:
-    """A project (TC6, version 2.01) with the controller's block and the one that tests it."""
+def plcopen_file(what: Exported, now: str, filled: Filled) -> dict[str, str]:
+    """A project (TC6, version 2.01) with the controller's block and the one that tests it.
+
+    now: date and time as ISO 8601 writes them, to the second.
+    """
     text = filled(
         "project.xml",
         markup=True,
         **heading_of(what),
         version=version("servo-workbench"),
-        now=now.isoformat(timespec="seconds"),
+        now=now,
         elementary=ELEMENTARY,
         blocks=blocks(what),
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.generated.exported import Precision
 from design.program import (
     Assign,
     Choice,
@@ -23,7 +24,6 @@ from design.program import (
     Variable,
 )
 from identification.errors import BadModel
-from workbench.export.exported import Precision
 
 INDENT = "    "
 AT_POSITION_1 = "_at_1"  # behind a state's name: its entries where it has stood at position 1

@@ -1,16 +1,15 @@
-"""A controller as C99: one header, one source, no allocation, no dependency; and as an FMU 3.0 for
-co-simulation with that source, which the importer compiles."""
+"""A controller as C99: one header, one source, no allocation, no dependency; and what an FMU 3.0
+for co-simulation holds beside that source, which the importer compiles."""
 
 import hashlib
-import io
-import zipfile
 from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
+from design.generated.exported import Exported, Precision, heading_of, rows
+from design.generated.filled import Filled
+from design.generated.syntax import INDENT, Syntax, arrays_of
 from design.program import Program, Variable
-from workbench.export.exported import Exported, Precision, filled, heading_of, rows
-from workbench.export.syntax import INDENT, Syntax, arrays_of
 
 # Python's names that are keywords of C, and one of a function of its library.
 C_KEYWORDS = (
@@ -44,7 +43,7 @@ def c_syntax(program: Program, precision: Precision) -> Syntax:
 TYPES = {"real": "real", "integer": "int", "boolean": "int"}
 
 
-def c_files(what: Exported) -> dict[str, str]:
+def c_files(what: Exported, filled: Filled) -> dict[str, str]:
     """The header and the source, by file name."""
     program = what.program
     c = c_syntax(program, what.precision)
@@ -103,7 +102,6 @@ def _declared_locals(variables: tuple[Variable, ...], c: Syntax) -> list[str]:
     return lines
 
 
-EPOCH = (1980, 1, 1, 0, 0, 0)  # of the files inside, so that the same design gives the same bytes
 # Units in powers of the SI's; others go without.
 BASE_UNITS: Mapping[str, Mapping[str, float]] = {
     "m": {"m": 1},
@@ -118,9 +116,9 @@ BASE_UNITS: Mapping[str, Mapping[str, float]] = {
 }
 
 
-def fmu_file(what: Exported) -> dict[str, bytes]:
-    """The FMU, which holds no binary."""
-    program, files = what.program, c_files(what)
+def fmu_texts(what: Exported, filled: Filled) -> dict[str, str]:
+    """The files inside the FMU, which holds no binary, by their paths."""
+    program, files = what.program, c_files(what, filled)
     variables = _variables(what)
     token = hashlib.sha256("".join(files.values()).encode()).hexdigest()
     common: dict[str, Any] = {
@@ -138,17 +136,12 @@ def fmu_file(what: Exported) -> dict[str, bytes]:
         version=version("servo-workbench"),
         units={unit: base for unit, base in BASE_UNITS.items() if unit in used},
     )
-    inside = {
+    return {
         "modelDescription.xml": description,
         "sources/buildDescription.xml": filled("buildDescription.xml", markup=True, **common),
         "sources/fmu.c": filled("fmu.c", **common, position=position),
         **{f"sources/{name}": text for name, text in files.items()},
     }
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in inside.items():
-            archive.writestr(zipfile.ZipInfo(name, EPOCH), text, zipfile.ZIP_DEFLATED)
-    return {f"{program.name}.fmu": packed.getvalue()}
 
 
 def _variables(what: Exported) -> list[dict[str, Any]]:

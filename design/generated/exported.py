@@ -1,14 +1,11 @@
-"""What is exported: a design's controller as a program, with the vector that tests it, and what
-`workbench validate` has said of the design."""
+"""What is exported: a design's controller as a program, with the vector that tests it."""
 
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -19,7 +16,6 @@ from design.controllers.cascade import filter_words
 from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.machine.design import Design, Structure
-from design.machine.documents import design_digest
 from design.machine.readable import shown
 from design.program import (
     Assign,
@@ -37,8 +33,6 @@ from design.program import (
 from design.program_run import SelfTest, self_test
 from design.servo import Compensation
 from identification.errors import BadModel
-from workbench.documents.reading import read_document
-from workbench.output import templates
 
 Precision = Literal["double", "single"]
 REAL: Mapping[Precision, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}
@@ -223,33 +217,8 @@ def identifier(name: str) -> str:
     return found if found[0].isalpha() else BEFORE_DIGIT + found
 
 
-def validation_line(found: Design, design_file: Path) -> str:
-    """What the newest validation of this very design says that whoever puts it on a machine has to
-    know; "" where it passed. Looked for beside its file and in the folders beside that one's."""
-    folder = design_file.resolve().parent
-    near = {*folder.glob("validation.json"), *folder.parent.glob("*/validation.json")}
-    own = design_digest(found)
-    for path in sorted(near, key=lambda one: one.stat().st_mtime, reverse=True):
-        validation = dict[str, Any]()
-        with suppress(BadModel):  # a file that may be anything
-            validation = read_document(path)
-        if validation.get("design") != own:
-            continue
-        if validation.get("passed"):
-            return ""
-        where = f"{path.parent.name}/{path.name}"
-        return f"its validation did NOT pass ({where}): do not run it on the machine before it does"
-    return "no validation of this design lies near it: workbench validate MODEL DESIGN checks it"
-
-
 WIDEST = 96  # characters of a line of numbers
 KEPT_BLANK = "\0"  # a blank within a value, at which no line ends
-
-
-def filled(template: str, *, markup: bool = False, **values: Any) -> str:
-    """The template `<template>.j2` filled in; with `markup`, values are escaped for XML."""
-    found = templates("workbench.export", escaped=markup, keep_trailing_newline=True)
-    return found.get_template(f"{template}.j2").render(**values)
 
 
 def rows(values: Iterable[str]) -> list[str]:

@@ -13,11 +13,7 @@ from design.compensation_tables import (
     summed,
     table_points,
 )
-from design.machine.readable import number, shown_unit
-from identification.arrays import Array
-from identification.errors import BadModel
-from identification.model.estimates import Estimate
-from workbench.export.compensation import (
+from design.generated.compensation import (
     IDENTIFIED_BY_SLIDING,
     Compensation,
     Content,
@@ -25,6 +21,10 @@ from workbench.export.compensation import (
     Format,
     friction_costs,
 )
+from design.machine.readable import number, shown_unit
+from identification.arrays import Array
+from identification.errors import BadModel
+from identification.model.estimates import Estimate
 
 NEUTRAL_POINTS = 40
 CNC_POINTS = 20  # P-COMP-00062: the default upper limit, of which (0, 0) takes one

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from design.generated.exported import exported, identifier, lead_of, rows, title_of
 from design.machine.compensator import CompensatorValues
 from design.machine.drive import Present
 from identification.errors import BadModel
 from tests.workbench.export.designs import case
-from workbench.export.exported import exported, identifier, lead_of, rows, title_of
 
 
 @given(st.text(max_size=60))
