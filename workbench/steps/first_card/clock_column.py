@@ -10,10 +10,11 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
+from identification.signals.stamps import MOST_STARTS
+from identification.signals.summed import summed
 from identification.thresholds import TWICE
 from workbench.cards.headers import read_header
 from workbench.logs.layout import says_period
-from workbench.logs.times import MOST_STARTS, summed
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.column import Column
 

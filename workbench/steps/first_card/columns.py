@@ -13,10 +13,10 @@ from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
+from identification.signals.stamps import even_stamps, sound_rows, stretches, told_of_starts
 from identification.thresholds import HALF, OF_ACCOUNT, TWICE
 from workbench.cards.headers import words_of
 from workbench.cards.written_units import Quantity
-from workbench.logs.times import even_stamps, sound_rows, stretches, told_of_starts
 from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import SAME_MOTION, axes_of, correlation, is_position
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks

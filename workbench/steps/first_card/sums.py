@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from identification.signals.relations import lead
+from identification.signals.summed import summed
 from identification.thresholds import HALF
-from workbench.logs.times import summed
 from workbench.steps.first_card.axes import as_position
 from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
