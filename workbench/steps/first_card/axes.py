@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from identification.arrays import Array
-from workbench.cards.headers import Header, meaning, says_purpose, words_of
-from workbench.cards.written_units import WrittenUnit
+from identification.columns.header import Header, WrittenUnit, words_of
+from workbench.cards.headers import meaning, says_purpose
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 WORDS_OF_A_NAME = 3  # of an axis's name
@@ -108,21 +106,3 @@ def as_position(head: Header) -> Header:
         number = unit.card.removesuffix(unit.plain)
         unit = WrittenUnit(number + whole, "position", unit.rotary)
     return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
-
-
-def stem(head: Header) -> tuple[str, ...]:
-    """What a header says beside what its signal is for: "theta" of "target_theta"."""
-    return tuple(word for word in words_of(head.name) if not says_purpose(word))
-
-
-def normed(x: Array) -> Array:
-    """Columns (n, k) without their mean, of length one."""
-    a = x - x.mean(axis=0)
-    size = np.sqrt(np.sum(a**2, axis=0))
-    return np.asarray(a / np.where(size > 0.0, size, 1.0))
-
-
-def correlation(x: Array) -> Array:
-    """Correlation of the columns of x (n, k), (k, k)."""
-    a = normed(x)
-    return np.asarray(a.T @ a)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import Column
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
@@ -16,7 +17,6 @@ from identification.thresholds import TWICE
 from workbench.cards.headers import read_header
 from workbench.logs.layout import says_period
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.column import Column
 
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock

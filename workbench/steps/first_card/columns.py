@@ -8,6 +8,9 @@ from itertools import combinations, pairwise, product
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import MOST_ROWS_READ, Column, read_register
+from identification.columns.header import Header, Quantity, words_of
+from identification.columns.pairs import correlation
 from identification.log import Log
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
@@ -15,12 +18,10 @@ from identification.signals.offsets import OF_TURN, unwrapped
 from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
 from identification.signals.stamps import even_stamps, sound_rows, stretches, told_of_starts
 from identification.thresholds import HALF, OF_ACCOUNT, TWICE
-from workbench.cards.headers import words_of
-from workbench.cards.written_units import Quantity
+from workbench.cards.units import conversion
 from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import SAME_MOTION, axes_of, correlation, is_position
+from workbench.steps.first_card.axes import SAME_MOTION, axes_of, is_position
 from workbench.steps.first_card.clock_column import clock_of, gone_back, is_second, ticks
-from workbench.steps.first_card.column import MOST_ROWS_READ, Column, read_register
 from workbench.steps.first_card.names import read_together
 
 MOST_MISSING = 0.1  # of a column that is used
@@ -64,7 +65,8 @@ def columns_of(log: UnknownLog) -> Columns:
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
         values = raw.values if register is None else register.values
-        read.append(_with_sign(Column(raw, header, values, values, register)))
+        one = Column(raw, header, values, values, register, pascals=_pascals(header))
+        read.append(_with_sign(one))
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     usable, said = _at_sound_rows([one for one in read if one.raw.number not in left_out])
     clock = clock_of(log, usable, [one for one in read if one.raw.number in left_out])
@@ -96,6 +98,14 @@ def columns_of(log: UnknownLog) -> Columns:
     distinct, twice = _without_doubles([one for one in signals if one not in phases])
     own = tuple(_with_axes(_of_a_scope(distinct)))
     return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+
+
+def _pascals(head: Header) -> float | None:
+    """What one of the header's unit is in Pa; None where that is no pressure's."""
+    if head.unit is None or head.unit.quantity != "pressure":
+        return None
+    found = conversion(head.unit.card, "Pa")
+    return None if found is None else found.factor
 
 
 def _with_sign(one: Column) -> Column:

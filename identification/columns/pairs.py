@@ -7,10 +7,9 @@ from itertools import permutations
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import MOST_ROWS_READ, Column
 from identification.signals.differentiate import Motion, low_pass
 from identification.signals.relations import ForceLaw, Lead, beside, changed_by, force_laws, lead
-from workbench.steps.first_card.axes import correlation, normed, stem
-from workbench.steps.first_card.column import MOST_ROWS_READ, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
@@ -37,7 +36,7 @@ class Pairs:
         self.x = np.column_stack([one.x for one in signals])
         self.alike = correlation(self.x)
         self.rate, self.rate_but_constant = _rates(self.x)
-        self.stems = [stem(one.header) for one in signals]
+        self.stems = [one.header.stem for one in signals]
         self.bodies = dict[int, Seen]()
 
     @cached_property
@@ -82,6 +81,19 @@ class Pairs:
             elif i not in out and (part := _added(self.signals, i, j)) is not None:
                 out |= {i: j, part: j}
         return out
+
+
+def normed(x: Array) -> Array:
+    """Columns (n, k) without their mean, of length one."""
+    a = x - x.mean(axis=0)
+    size = np.sqrt(np.sum(a**2, axis=0))
+    return np.asarray(a / np.where(size > 0.0, size, 1.0))
+
+
+def correlation(x: Array) -> Array:
+    """Correlation of the columns of x (n, k), (k, k)."""
+    a = normed(x)
+    return np.asarray(a.T @ a)
 
 
 def follows(found: Lead) -> bool:

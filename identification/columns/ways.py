@@ -7,13 +7,13 @@ from itertools import combinations
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns import weights
+from identification.columns.column import Column
+from identification.columns.header import words_of
+from identification.columns.pairs import Pairs, Seen
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, force_laws
 from identification.thresholds import HALF
-from workbench.cards.headers import words_of
-from workbench.steps.first_card import weights
-from workbench.steps.first_card.column import Column
-from workbench.steps.first_card.pairs import Pairs, Seen
 
 MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike

@@ -11,6 +11,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from identification.columns import weights
+from identification.columns.column import Column
+from identification.columns.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, follows
+from identification.columns.ways import (
+    HEADER_SAYS,
+    SAME_POSITION,
+    Way,
+    bodies,
+    gain_of_reference,
+    moves_rather,
+    ways_of,
+    with_reference,
+)
 from identification.log import RigKind
 from identification.signals.differentiate import differentiate
 from identification.signals.relations import (
@@ -22,19 +35,6 @@ from identification.signals.relations import (
     force_law,
 )
 from identification.thresholds import TWICE
-from workbench.steps.first_card import weights
-from workbench.steps.first_card.column import Column
-from workbench.steps.first_card.pairs import MOST_CONSTANT, SURELY_TURNED, Pairs, follows
-from workbench.steps.first_card.ways import (
-    HEADER_SAYS,
-    SAME_POSITION,
-    Way,
-    bodies,
-    gain_of_reference,
-    moves_rather,
-    ways_of,
-    with_reference,
-)
 
 MOST_WAYS = 14  # ways to drive a body, that every other role is asked about
 FRICTION_GIVES_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same

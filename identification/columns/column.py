@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.header import Header, words_of
 from identification.signals.differentiate import Motion, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
-from workbench.cards.headers import Header, words_of
-from workbench.logs.unknown import RawColumn
 
 BITS = (16, 32)  # of a register that counts below zero as two's complement
 FEWEST_BITS = 8  # of a magnitude beside its sign
@@ -100,11 +99,27 @@ FEW_LEVELS = 8  # values at most, of a flag, mode or state
 
 
 @dataclass(frozen=True, eq=False)
+class RawColumn:
+    """One column: its number from 0, what a card calls it, its header and the unit below it, its
+    values (n,) (NaN where there is no number), why they cannot be used (else empty), and its group,
+    where the file has several."""
+
+    number: int
+    key: str | int
+    header: str
+    unit_below: str
+    values: Array
+    unusable: str = ""
+    group: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Column:
     """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
     as its register means them; axis: which of several machines of the log it is of ("": of all);
     renewed: samples of `x` from one new value to the next of a column that is held, else 1;
-    summed: whether `values` or `x` are the sum of what the file has."""
+    summed: whether `values` or `x` are the sum of what the file has; pascals: what one of the unit
+    of a pressure is in Pa, None of what has no such unit."""
 
     raw: RawColumn
     header: Header
@@ -114,6 +129,7 @@ class Column:
     axis: str = ""
     renewed: float = 1.0
     summed: bool = False
+    pascals: float | None = None
 
     @property
     def bits(self) -> int | None:

@@ -9,12 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import FEW_LEVELS, Column, halved_counts
+from identification.columns.header import Quantity
+from identification.columns.pairs import SURELY_TURNED, Pairs, Seen
 from identification.signals.relations import ForceLaw
 from identification.thresholds import OF_ACCOUNT
-from workbench.cards.units import conversion
-from workbench.cards.written_units import Quantity
-from workbench.steps.first_card.column import FEW_LEVELS, Column, halved_counts
-from workbench.steps.first_card.pairs import SURELY_TURNED, Pairs, Seen
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
@@ -158,10 +157,9 @@ def among_derivatives(pairs: Pairs) -> Array:
 
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
     """Factors of two pressures to [Pa] where both headers give units of pressure, else 1."""
-    units = [column.header.unit for column in (one, other)]
-    factors = [conversion(u.card, "Pa") for u in units if u and u.quantity == "pressure"]
-    found = [one.factor for one in factors if one is not None]
-    return (found[0], found[1]) if len(found) == len(units) else (1.0, 1.0)
+    if one.pascals is None or other.pascals is None:
+        return 1.0, 1.0
+    return one.pascals, other.pascals
 
 
 def of_a_motor(one: Column) -> float:
