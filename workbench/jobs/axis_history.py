@@ -7,10 +7,11 @@ import numpy as np
 
 from design.measured.axis_limits import FEWEST_EARLIER, MEANING_OF
 from design.measured.axis_test import Earlier
+from identification.drift.readings import Reading
 from identification.model.estimates import Estimate
 from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_model
-from workbench.jobs.judge import Reading, drift_by_chart
+from workbench.jobs.judge import drift_by_chart
 from workbench.logs.sources import Sources
 from workbench.registry import results
 from workbench.registry.results import (

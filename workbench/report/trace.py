@@ -12,6 +12,7 @@ from design.machine.readable import as_shown, in_digits, number, shown, shown_un
 from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
+from identification.tracing.residual_rows import in_equation
 from identification.tracing.result import FoundEffect, Trace
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart
@@ -22,7 +23,6 @@ from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import (
     against_signal,
     free_curves,
-    in_equation,
     over_time,
     pictures,
     signal_chart,

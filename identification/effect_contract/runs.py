@@ -2,28 +2,20 @@
 finer step. On the plant of the paper's table 1, behind its actuator and behind a motor.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
 from identification.arrays import Array
+from identification.effect_contract.declaration import Broken
 from identification.effects._base import Acting, Effect
-from identification.errors import BadModel
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.karnopp_step import SLIP_N, SLIP_P
-from workbench.cards.effect_contract import (
-    Broken,
-    check_declaration,
-    check_depends_on,
-    check_equation,
-    check_linear,
-    check_units,
-)
 
 TABLE_1 = Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0)  # the paper's
 HYDRAULIC = Plant(TABLE_1, Actuator(19530.0, 10405.0))  # section 3.2
@@ -131,37 +123,6 @@ def check_sampling(effect: Effect) -> None:
     off = float(np.max(np.abs(one.y - two.y[::2])))
     if off >= 1e-5:
         raise Broken(f"with half the step the run differs by {off:.3g} m: it changes too quickly")
-
-
-Check = Callable[[Effect], None]
-CHECKS: Mapping[str, Check] = MappingProxyType(
-    {
-        "declaration is complete": check_declaration,
-        "equation, Python and compiled kernel agree": check_equation,
-        "linear where declared": check_linear,
-        "units multiply out": check_units,
-        "signals and parameters are those declared": check_depends_on,
-        "signals can be simulated": check_signals,
-        "friction never drives": check_never_drives,
-        "vanishes with its size": check_vanishes,
-        "shows at its typical size": check_shows,
-        "needs no finer step": check_sampling,
-    }
-)
-LAST_WITHOUT_A_RUN = "signals can be simulated"
-
-
-def failures(effect: Effect) -> dict[str, str]:
-    """What the effect does not hold to: name of the check and what it found; empty where none."""
-    out: dict[str, str] = {}
-    for name, check in CHECKS.items():
-        try:
-            check(effect)
-        except (Broken, BadModel) as error:
-            out[name] = str(error)
-        if name == LAST_WITHOUT_A_RUN and name in out:
-            break
-    return out
 
 
 def _said(values: Mapping[str, float]) -> str:

@@ -1,14 +1,13 @@
 """What every effect must hold to, checked on its declaration and its kernels alone.
 
-Each check raises `Broken` with what it found; `workbench/cards/effect_runs.py` has those that
-need a run. The equation is read by a computer-algebra package, so it is no copy of the kernel:
-where the two differ, one of them is wrong.
+Each check raises `Broken` with what it found; `runs` has those that need a run. The equation is
+read by a computer-algebra package, so it is no copy of the kernel: where the two differ, one of
+them is wrong.
 """
 
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import AT_REST, MAX_PARAMS, MAX_SIGNALS, Effect
 from identification.errors import UserError
-from workbench.cards.units import si_unit
 
 STATE_NAMES = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
-STATE_UNITS = dict(t="s", y="m", v="m/s", F="N", u="V", d="1", c="N", f="N")
-USUAL_STATES = ("N", "m", "s", "m/s")  # units of a state that does not say its own
 HISTORY = frozenset({"rest", "reversal"})  # names of what a state may keep of the motion before
 POINTS_DRAWN = 120
 PARTS = ("value", "evolve", "initial")
@@ -171,35 +167,6 @@ def check_depends_on(effect: Effect) -> None:
             raise Broken(f"{name} does nothing")
 
 
-def check_units(effect: Effect) -> None:
-    """The written equation multiplies out to the unit of what the effect gives."""
-    import pint
-    import sympy  # type: ignore[import-untyped]
-
-    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
-    equation, errors = _parsed(effect), []
-    units = {**STATE_UNITS, **{name: si_unit(name, "linear") or "1" for name in effect.signals}}
-    for p in effect.params:
-        units[p.name] = p.unit.replace("**n", "**2")  # a unit with the exponent's own value
-    remembers = equation.has(sympy.Symbol("z", real=True))
-    own = USUAL_STATES if effect.state_unit is None else (effect.state_unit,)
-    for unit in own if remembers else ("1",):
-        names = (*STATE_NAMES, *effect.signals, *effect.names)
-        try:
-            values = [registry.Quantity(2.0, {**units, "z": unit}[n]) for n in names]
-            numbers = [2 if n == "n" else a for n, a in zip(names, values, strict=True)]
-            function = sympy.lambdify(
-                [sympy.Symbol(n, real=True) for n in names], equation, [_quantities(), "math"]
-            )
-            registry.Quantity(function(*numbers)).to(effect.place.unit)
-        except (pint.PintError, TypeError, AttributeError) as error:
-            errors.append(" ".join(str(error).split()))
-        else:
-            return
-    advice = "" if not remembers or effect.state_unit else "; say the state's unit as state_unit"
-    raise Broken(f"units do not multiply out to {effect.place.unit}: {errors[0]}{advice}")
-
-
 def moved_by(effect: Effect, name: str, part: str = "value") -> bool:
     """Whether an argument of the state, a signal or a parameter moves the contribution, or another
     kernel's answer."""
@@ -222,9 +189,9 @@ def moved_by(effect: Effect, name: str, part: str = "value") -> bool:
     return False
 
 
-def _parsed(effect: Effect) -> Any:
+def parsed(effect: Effect) -> Any:
     """The written equation; its names are those of the state, the signals and the parameters."""
-    import sympy
+    import sympy  # type: ignore[import-untyped]
 
     names = (*STATE_NAMES, *effect.signals, *effect.names)
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -247,7 +214,7 @@ def _written(effect: Effect) -> Callable[[Draw], float]:
     import sympy
 
     names = (*STATE_NAMES, *effect.signals, *effect.names)
-    function = sympy.lambdify([sympy.Symbol(n, real=True) for n in names], _parsed(effect), "math")
+    function = sympy.lambdify([sympy.Symbol(n, real=True) for n in names], parsed(effect), "math")
 
     def of(one: Draw) -> float:
         signals, p = one.s[: len(effect.signals)], one.p[: len(effect.params)]
@@ -260,25 +227,3 @@ def _shown(effect: Effect, one: Draw) -> str:
     """The arguments at which two ways differ, in short."""
     values = {**one.x, **dict(zip(effect.names, one.p.tolist(), strict=False))}
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
-
-
-@cache
-def _quantities() -> dict[str, Callable[..., Any]]:
-    """Functions that an equation may use, of quantities with units."""
-    return {
-        "exp": np.exp, "sin": np.sin, "cos": np.cos, "Abs": abs,
-        "copysign": lambda a, b: float(np.copysign(a, b.magnitude)),
-        "Max": _with_unit(max), "Min": _with_unit(min),
-    }  # fmt: skip
-
-
-def _with_unit(choose: Callable[..., Any]) -> Callable[..., Any]:
-    """max or min of quantities, in which a plain 0 is a 0 of the others' unit."""
-    import pint
-
-    def of(*given: Any) -> Any:
-        unit = next((a.units for a in given if isinstance(a, pint.Quantity)), None)
-        same = [a if unit is None or isinstance(a, pint.Quantity) else a * unit for a in given]
-        return choose(*same)
-
-    return of
