@@ -64,6 +64,18 @@ class Header:
         return self.means.get("velocity", 0.0) >= SAYS_WHAT_IT_IS and "position" not in self.means
 
 
+def is_position(head: Header) -> bool:
+    """Whether a header speaks of a position that is measured."""
+    if head.purpose in ("reference", "error", "model"):
+        return False
+    if head.unit is not None:
+        counts = head.unit.quantity == "count" and (not head.means or "position" in head.means)
+        return counts or head.unit.quantity == "position"
+    if not head.means:
+        return head.purpose == "measured" and head.unit is None
+    return max(head.means, key=lambda what: head.means[what]) == "position"
+
+
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters: at case, digits and signs it is parted; addresses, as
     0x6064, are none."""

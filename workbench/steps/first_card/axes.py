@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from identification.arrays import Array
-from identification.columns.header import Header, WrittenUnit, words_of
+from identification.columns.comparable import SAME_MOTION
+from identification.columns.header import Header, WrittenUnit, is_position, words_of
 from workbench.cards.headers import meaning, says_purpose
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 WORDS_OF_A_NAME = 3  # of an axis's name
-SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
 
 def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, str]:
@@ -84,18 +84,6 @@ def _positions(
         if elsewhere > 1 or all(abs(alike[k, j]) < SAME_MOTION for _, j in apart):
             apart.append((word, k))
     return tuple(word for word, _ in apart)
-
-
-def is_position(head: Header) -> bool:
-    """Whether a header speaks of a position that is measured."""
-    if head.purpose in ("reference", "error", "model"):
-        return False
-    if head.unit is not None:
-        counts = head.unit.quantity == "count" and (not head.means or "position" in head.means)
-        return counts or head.unit.quantity == "position"
-    if not head.means:
-        return head.purpose == "measured" and head.unit is None
-    return max(head.means, key=lambda what: head.means[what]) == "position"
 
 
 def as_position(head: Header) -> Header:

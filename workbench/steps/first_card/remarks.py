@@ -8,7 +8,8 @@ from itertools import permutations
 import numpy as np
 
 from identification.columns.column import Column
-from identification.columns.header import words_of
+from identification.columns.comparable import NEARLY_ALIKE
+from identification.columns.header import is_position, words_of
 from identification.columns.pairs import follows
 from identification.columns.roles import MOSTLY_ITS_LAW, Roles, are_constant
 from identification.columns.weights import SURE, said, together
@@ -17,8 +18,7 @@ from identification.signals.delays import are_exchanged
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import FEWEST_MOVING, force_law, lead, moving
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.steps.first_card.axes import is_position
-from workbench.steps.first_card.columns import NEARLY_ALIKE, PHASE_CURRENT, Columns
+from workbench.steps.first_card.columns import PHASE_CURRENT, Columns
 from workbench.steps.first_card.motion_guess import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import contradicted_clock
 

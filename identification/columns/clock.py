@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.stamps import MOST_STARTS
 from identification.signals.summed import summed
 from identification.thresholds import TWICE
-from workbench.cards.headers import read_header
-from workbench.logs.layout import says_period
-from workbench.logs.unknown import UnknownLog
 
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
@@ -24,21 +20,20 @@ ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 
 
-def clock_of(log: UnknownLog, usable: Sequence[Column], others: Sequence[Column]) -> Column:
+def clock_of(
+    where: str, usable: Sequence[Column], others: Sequence[Column], single: Sequence[Column]
+) -> Column:
     """The column that holds the time, or the sum of the time from row to row; others: those that
-    are no signals.
+    are no signals; single: columns of one value that is called a period.
 
-    Raises BadLog where there is none.
+    where: what the log is called by. Raises BadLog where there is none.
     """
     steady = [one for one in others if "time" in one.header.means]
     rows = len(usable[0].values) if usable else 0
-    single = [] if any(map(ticks, usable)) else log.scalars
-    for one in (one for one in single if says_period(one.header)):
-        values = np.full(rows, one.values[0])
-        steady.append(Column(one, read_header(one.header, one.unit_below), values, values))
+    steady += [] if any(map(ticks, usable)) else single
     steady = [one for one in steady if len(one.values) == rows]
     texts = [one for one in others if one.raw.unusable]
-    return _of_steps(usable, steady) or _rising_one(log.path, usable, texts)
+    return _of_steps(usable, steady) or _rising_one(where, usable, texts)
 
 
 def ticks(one: Column) -> bool:
@@ -85,7 +80,7 @@ def _rises(one: Column) -> bool:
     return bool(np.all(np.isfinite(one.values)) and np.all(np.diff(one.values) > 0.0))
 
 
-def _rising_one(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Column:
+def _rising_one(where: str, columns: Sequence[Column], texts: Sequence[Column]) -> Column:
     """The column that holds the time; texts: columns that hold no numbers.
 
     Raises BadLog where there is none.
@@ -103,7 +98,7 @@ def _rising_one(path: Path, columns: Sequence[Column], texts: Sequence[Column]) 
         elif texts:
             found = f"column {texts[0].shown} holds {texts[0].raw.unusable}"
         raise BadLog(
-            f"{path}: no clock: {found}; log a column of times, or of sample numbers, that"
+            f"{where}: no clock: {found}; log a column of times, or of sample numbers, that"
             " increases from row to row"
         )
 
