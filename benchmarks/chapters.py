@@ -18,13 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
+from design.identified.trace_logs import Traced, effect_estimates
 from identification.effects._library import built_in
 from identification.errors import UserError
 from identification.log import Log, Rig
 from identification.tracing.result import Errors, FoundEffect, Trace
 from workbench.cards.card import load_card
 from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
-from workbench.steps.trace import Traced, effect_estimates, trace_sources
+from workbench.steps.trace import trace_sources
 
 ROOT = Path(__file__).parents[1]
 HEAD = (

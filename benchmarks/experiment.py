@@ -41,6 +41,7 @@ from design.effect_loop import simulate_effect_loop
 from design.experiment.limits import MotionLimits, Peaks, peaks
 from design.experiment.plan import experiment
 from design.experiment.planned import Experiment
+from design.identified.identify import identify
 from design.loop import Cascade, LoopNoise
 from design.machine.model import Model
 from design.machine.source import Source
@@ -55,7 +56,6 @@ from identification.model.plant import Motor, Plant
 from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
 from workbench.cards.controller import CardController, CardForceLoop
-from workbench.steps.identify import identify
 from workbench.steps.present import present
 
 POOR, WORSE = 6.0, 10.0  # s of the poor log, and times its noise

@@ -27,6 +27,8 @@ from design.closed_loop.driven_loop import run_driven
 from design.controller_program import ProgramUnits, controller_program
 from design.controllers.design import design
 from design.drive_law import drive_law
+from design.generated.c import c_files
+from design.generated.exported import Exported, Precision, exported
 from design.machine.design import Design
 from design.machine.model import Model
 from design.machine.source import Source
@@ -47,8 +49,7 @@ from design.rst import RST
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.cards.card import load_card
-from workbench.export.c import c_files
-from workbench.export.exported import Exported, Precision, exported
+from workbench.export.filled import filled
 from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.simulate import record
@@ -147,7 +148,7 @@ def simulated(one: Made, what: Exported) -> tuple[Array, Array, float]:
 def library(what: Exported, folder: Path, build: str) -> ctypes.CDLL:
     """The exported code with a driver, compiled."""
     name, width = what.program.name, len(what.program.inputs)
-    for file, text in c_files(what).items():
+    for file, text in c_files(what, filled).items():
         (folder / file).write_text(text)
     given = ", ".join(f"in[{width} * k + {at}]" for at in range(width))
     (folder / "driver.c").write_text(DRIVER.format(name=name, given=given))

@@ -16,11 +16,11 @@ import numpy as np
 
 from benchmarks.blind_machines import random_machine, simulated
 from benchmarks.experiment import poor_log
+from design.identified.identifiable_by_log import identifiability_of_runs
 from identification.errors import UserError
 from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
-from workbench.steps.identifiable_by_log import identifiability_of_runs
 
 RICH = 15.0  # s
 TWICE = 2.0

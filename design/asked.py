@@ -1,11 +1,12 @@
-"""What is asked of a loop: each number with its default and what it means, as the option says it.
+"""What is asked of a fit and of a loop: each number with its default and what it means, as the
+option says it.
 
 Light to import, since every `--help` asks for it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 
 def asked(default: object, meaning: str) -> Any:
@@ -70,3 +71,16 @@ class Wanted:
     seconds: float = asked(20.0, "How long the run lasts [s].")
     seed: int = asked(0, "")
     rivals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to identify; orders (na, nb, nk) and period [s] of the ARX plant, None: chosen."""
+
+    drive: Literal["force", "command"] | None = asked(
+        None, "What drives the fitted run.  [default: the command where it explains the force]"
+    )
+    orders: tuple[int, int, int] | None = asked(None, "Orders of the ARX plant.  [default: chosen]")
+    design_period: float | None = asked(
+        None, "Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]"
+    )

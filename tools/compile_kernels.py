@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 import workbench as wb
+from identification.effect_contract.runs import HYDRAULIC, run_with, trial_log, typical
 from identification.effects._library import built_in
-from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
 from workbench.steps.kernels_ahead import fits_compiled_ahead
 
 PLAIN, RICH = "paper_table1_rich", "demo"

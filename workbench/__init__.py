@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from design.asked import Limits as Limits
+    from design.asked import Options as Options
     from design.asked import RobustAsked as RobustAsked
     from design.asked import Wanted as Wanted
     from design.tune import Goals as Goals
@@ -32,10 +33,9 @@ if TYPE_CHECKING:
     from workbench.interface.models import identify as identify
     from workbench.interface.models import load_model as load_model
     from workbench.interface.models import trace as trace
-    from workbench.steps.asked import Options as Options
 
 _HOMES = {
-    "design.asked": "Limits RobustAsked Wanted",
+    "design.asked": "Limits Options RobustAsked Wanted",
     "design.tune": "Goals",
     "identification.drift.drift_test": "DriftSettings",
     "identification.errors": "NotIdentifiable UserError",
@@ -43,7 +43,6 @@ _HOMES = {
     "workbench.interface.logs": "axis_test drift predict read_logs response simulate",
     "workbench.interface.loops": "design experiment robust_design validate",
     "workbench.interface.models": "identify load_model trace",
-    "workbench.steps.asked": "Options",
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import sympy  # type: ignore[import-untyped]
 
 from docs._ext.effect_pictures import draw
+from identification.effect_contract.declaration import STATE_NAMES
 from identification.effects._base import Effect, Param
 from identification.effects._library import built_in
-from workbench.cards.effect_contract import STATE_NAMES
 
 GREEK = ("tau", "mu", "sigma", "delta")
 HEAD = """# Effects

@@ -9,6 +9,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from identification.effect_contract.declaration import (
+    check_depends_on,
+    check_equation,
+    check_linear,
+)
 from identification.effects._base import Effect, Param
 from identification.effects._library import built_in, declared, joined_library
 from identification.errors import BadModel
@@ -16,12 +21,7 @@ from identification.log import Log
 from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
 from tests.identification.plants import table
-from workbench.cards.effect_contract import (
-    check_depends_on,
-    check_equation,
-    check_linear,
-    check_units,
-)
+from workbench.cards.effect_checks import check_units
 
 MAGNET = '''"""A magnet at the end of the stroke."""
 

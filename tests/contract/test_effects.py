@@ -5,16 +5,15 @@ from dataclasses import replace
 
 import pytest
 
-from identification.effects._base import Effect, R, Rs
-from identification.effects._library import built_in
-from workbench.cards.effect_contract import (
+from identification.effect_contract.declaration import (
     Broken,
     check_depends_on,
     check_equation,
     check_linear,
-    check_units,
 )
-from workbench.cards.effect_runs import CHECKS, Check
+from identification.effects._base import Effect, R, Rs
+from identification.effects._library import built_in
+from workbench.cards.effect_checks import CHECKS, Check, check_units
 
 KEYS = list(built_in())
 

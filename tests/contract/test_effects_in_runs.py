@@ -1,4 +1,4 @@
-"""Effects in a run, beside what `workbench.cards.effect_runs` checks; mutants that must fail."""
+"""Effects in a run, beside what `effect_contract.runs` checks; mutants that must fail."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,24 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.effects._base import Effect, R, Rs
-from identification.effects._library import built_in
-from identification.errors import BadModel
-from identification.simulation.free_run import free_run
-from workbench.cards.effect_contract import Broken
-from workbench.cards.effect_runs import (
-    CHECKS,
+from identification.effect_contract.declaration import Broken
+from identification.effect_contract.runs import (
     HYDRAULIC,
     START_AT_REST,
     check_never_drives,
     check_sampling,
     check_shows,
     check_vanishes,
-    failures,
     run_with,
     trial_log,
     typical,
 )
+from identification.effects._base import Effect, R, Rs
+from identification.effects._library import built_in
+from identification.errors import BadModel
+from identification.simulation.free_run import free_run
+from workbench.cards.effect_checks import CHECKS, failures
 
 # Parameters as large as they may well be, of a sign that would drive if it were not held back.
 DRIVING: Mapping[str, Mapping[str, float]] = {

@@ -10,11 +10,12 @@ import pytest
 
 from design.asked import Limits
 from design.controllers.validate import validate
+from design.identified.trace_logs import Traced
 from identification.effects import spring as spring_module
 from tests.chain import CARD
 from workbench.cli import COMMANDS, main
 from workbench.steps import demo as demonstration
-from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.trace import trace_sources
 
 WITHOUT_FILES = (
     "reidentify",

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from design.identified.trace_logs import Traced
 from identification.errors import UserError
 from tests.verdicts.entries import Entry, Right, Within, with_amplitudes
 from tests.verdicts.logs import sources
 from workbench.cards.own_effects import library
-from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.trace import trace_sources
 
 NOT_NAMED, IN_VAIN, NOT_TOLD = "not named", "named in vain", "not told"
 DIGITS = 4

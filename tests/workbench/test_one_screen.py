@@ -20,6 +20,9 @@ from design.controllers.validate import Validation
 from design.experiment.planned import Experiment, Promised, Safety
 from design.machine.design import Recommendation
 from design.machine.model import Model
+from design.measured.drift_of_logs import Drifted
+from design.measured.drift_of_logs import Tested as OneTested
+from design.measured.predicted_logs import Predicted
 from design.measured.response import respond
 from design.robust.outcomes import MEASURES, Outcomes
 from design.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
@@ -52,11 +55,8 @@ from workbench.report.trace_words import words
 from workbench.report.validation import demo_view, validation_view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
-from workbench.steps.drift import Drifted
-from workbench.steps.drift import Tested as OneTested
 from workbench.steps.first_card.proposal import proposed
 from workbench.steps.installation import check_installation
-from workbench.steps.predict import Predicted
 
 LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
 OUT = Path("results") / ("a folder with a long name " * 4)
@@ -251,11 +251,11 @@ def doctor() -> Iterator[Screen]:
 def axis_test() -> Iterator[Screen]:
     """Every number beyond its limits, of a log of many runs."""
     from design.machine.source import Source
+    from design.measured.axis_limits import MEANING_OF
     from tests.chain import short_recipe
     from workbench.logs.sources import Sources
     from workbench.report.axis_test import axis_view
-    from workbench.steps import axis_test as step
-    from workbench.steps.axis_limits import MEANING_OF
+    from workbench.steps.axis_test import axis_test_of_sources
     from workbench.steps.simulate import record
 
     card, recipe = short_recipe()
@@ -264,7 +264,7 @@ def axis_test() -> Iterator[Screen]:
     limits = dict.fromkeys(MEANING_OF, (1e6, 2e6))
     for given in ({}, limits):
         found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
-        yield axis_view(step.axis_test(found)).screen(OUT)
+        yield axis_view(axis_test_of_sources(found)).screen(OUT)
 
 
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (

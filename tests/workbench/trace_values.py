@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from design.identified.trace_logs import Traced, traced_model
 from design.machine.source import Source
 from identification.arrays import Array
 from identification.effects._library import built_in
@@ -28,7 +29,6 @@ from identification.tracing.result import (
 from tests.chain import TABLES, short_recipe
 from workbench.logs.sources import Sources
 from workbench.steps.simulate import record
-from workbench.steps.trace import Traced, traced_model
 
 ROWS = 400
 NINE = TABLES["paper_table1"]
@@ -144,4 +144,6 @@ def traced(found: Trace, *, rotary: bool = False, tested: bool = True) -> Traced
     if rotary:
         train = replace(train, rig=replace(train.rig, motion="rotary"))
     test = sources("b.csv", "b").runs if tested else ()
-    return Traced(found, traced_model(found, train, built_in()), train.runs, test, train.remarks)
+    return Traced(
+        found, traced_model(found, train.logs, built_in()), train.runs, test, train.remarks
+    )

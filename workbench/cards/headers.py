@@ -8,47 +8,24 @@ is evidence only, which the column's own numbers may outweigh.
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
+from identification.columns.header import (
+    SAYS_WHAT_IT_IS,
+    Header,
+    Purpose,
+    Quantity,
+    WrittenUnit,
+    words_of,
+)
 from identification.errors import BadCard
 from identification.log import Rig
 from workbench.cards.card_tables import SignalSpec
 from workbench.cards.units import scale_or_none
-from workbench.cards.written_units import LOG_WORDS, Quantity, WrittenUnit, written_unit
-
-Purpose = Literal["reference", "demand", "measured", "error", "model", "filtered", ""]
-
-
-@dataclass(frozen=True)
-class Header:
-    """A header read: its text, the name without the unit, the unit (None: none), the quantities
-    that its words mean with their weight, what the signal is for ("model": what another model
-    says; "filtered": a smoothed copy), and whether it speaks of an angle.
-
-    doubtful: the unit may as well belong to the name, as the m of "y_m"; turning: log-odds of a
-    machine that turns, by words that others have too.
-    """
-
-    text: str
-    name: str
-    unit: WrittenUnit | None
-    means: Mapping[Quantity, float]
-    purpose: Purpose
-    angle: bool
-    doubtful: bool = False
-    turning: float = 0.0
-
-    @property
-    def speed(self) -> bool:
-        """Whether it says that the column is a speed, and no position."""
-        if self.unit is not None and not self.doubtful:
-            return self.unit.quantity == "velocity"
-        return self.means.get("velocity", 0.0) >= _TWO_WEIGHTS and "position" not in self.means
-
+from workbench.cards.written_units import LOG_WORDS, written_unit
 
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
@@ -57,7 +34,6 @@ _VOLTS = ("V", "mV", "A", "mA")
 _OF_TWO_LETTERS = ("Ms", "Us", "Mm", "Nm")  # units at the end of a name in humps
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]")
 _INDEX = re.compile(r"\w\[\d+\]$")
-_ADDRESS = re.compile(r"(?<!\w)0x[0-9a-f]+", re.I)
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+|%\s.+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
@@ -79,13 +55,10 @@ def _short_words() -> dict[str, dict[Quantity, float]]:
 
 
 _SHORT_WORDS = _short_words()
-_GREEK = str.maketrans({"θ": "theta", "φ": "phi", "ω": "omega", "τ": "tau", "α": "alpha",
-                        "β": "beta", "ψ": "psi"})  # fmt: skip
 _PARTS = re.compile(r"/|(?<=\w)[\"']?\.(?=[^\W\d])")  # of a path, and of a variable in a structure
 _PATH, _SPOKEN = 2, 3  # strokes in a path, and letters of a word in it
 _MEASURED = {"position", "velocity", "force", "pressure"}  # of these a letter beside is an index
 _PLACES = {"joint", "gelenk", "motor"}  # words of what a quantity is of
-_TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
 
 def read_header(text: str, unit_below: str = "") -> Header:
@@ -130,7 +103,8 @@ def _read(text: str, unit_below: str) -> Header:
         means = {"position": 1.5}
     angle = _holds(whole, "angles") or bool(unit and unit.rotary)
     turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
-    return Header(text, name, unit, means, purpose, angle, doubtful, turning)
+    stem = tuple(word for word in words_of(name) if not says_purpose(word))
+    return Header(text, name, unit, means, purpose, angle, doubtful, turning, stem)
 
 
 def _unambiguous(words: list[str]) -> list[str]:
@@ -184,20 +158,6 @@ def _around(text: str, bracket: re.Match[str], inside: str) -> str:
     return " ".join(one for one in parts if one)
 
 
-def words_of(name: str) -> list[str]:
-    """The words of a name in small letters: at case, digits and signs it is parted; addresses, as
-    0x6064, are none."""
-    parted = re.sub(
-        r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", _ADDRESS.sub(" ", name)
-    )
-    parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
-    parted = unicodedata.normalize("NFD", parted).replace("\u0307", "dot")  # above a letter
-    small = unicodedata.normalize("NFC", parted).casefold().translate(_GREEK)
-    for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
-        small = small.replace(umlaut, two)
-    return [one for one in re.split(r"[\W_]+", small) if one]
-
-
 def _holds(text: str, *kinds: str) -> bool:
     """Whether the text holds a part of a word of one of these kinds."""
     return any(part in text for kind in kinds for part in LOG_WORDS["parts"][kind])
@@ -231,20 +191,20 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
                 if part in word and (best is None or len(part) > best[0]):
                     best = (len(part), quantity)
         if best is not None:
-            found[best[1]] = max(found.get(best[1], 0.0), _TWO_WEIGHTS)
+            found[best[1]] = max(found.get(best[1], 0.0), SAYS_WHAT_IT_IS)
     wrong = _holds(whole, "errors") or {"err", "e"} & set(words)
     if ("other" in found and not wrong) or _holds(whole, "supplies") or "bus" in words:
-        return {"other": _TWO_WEIGHTS}
-    if found.get("temperature", 0.0) >= _TWO_WEIGHTS:
-        return {"temperature": _TWO_WEIGHTS}
+        return {"other": SAYS_WHAT_IT_IS}
+    if found.get("temperature", 0.0) >= SAYS_WHAT_IT_IS:
+        return {"temperature": SAYS_WHAT_IT_IS}
     if "load" in words and "position" not in found:
         found["force"] = max(found.get("force", 0.0), 1.0)
     if "input" in words and not found:
         found["command"] = 2.0
     if any(one.startswith(("ddot", "dotdot")) or one.endswith("ddot") for one in words):
-        return {"acceleration": _TWO_WEIGHTS}
+        return {"acceleration": SAYS_WHAT_IT_IS}
     if any(one == "dot" or (one.endswith("dot") and len(one) < 9) for one in words):
-        return {"velocity": _TWO_WEIGHTS}
+        return {"velocity": SAYS_WHAT_IT_IS}
     of_it = words[:1] in (["current"], ["cur"])
     of_it = of_it or {"motor"} == {one for one in words if _commands(one)}
     if of_it and {"position", "velocity"} & set(found):  # the present one, or that of the motor

@@ -4,29 +4,10 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.resources import files
-from typing import Literal
 
-Quantity = Literal[
-    "time", "position", "velocity", "acceleration", "force", "pressure", "command", "temperature",
-    "count", "other",
-]  # fmt: skip
-
-
-@dataclass(frozen=True)
-class WrittenUnit:
-    """A unit as cards write it, what it measures, and whether of a turning machine."""
-
-    card: str
-    quantity: Quantity
-    rotary: bool = False
-
-    @property
-    def plain(self) -> str:
-        """The unit without a number before it: rpm of "0.1 rpm"."""
-        return self.card.lstrip("0123456789. ") or self.card
-
+from identification.columns.header import WrittenUnit
 
 LOG_WORDS = tomllib.loads((files("workbench.cards") / "log_words.toml").read_text("utf-8"))
 

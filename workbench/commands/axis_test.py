@@ -10,7 +10,7 @@ from workbench.output import Step, results, step
 from workbench.signature import option
 
 if TYPE_CHECKING:
-    from workbench.steps.axis_test import AxisTest
+    from design.measured.axis_test import AxisTest
 
 
 @options.command(

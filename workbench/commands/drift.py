@@ -43,13 +43,14 @@ def command(
     Every log is tested alone and, with those before it, by their mean, which finds what changes
     slowly. Writes drift.json and report.html.
     """
+    from design.measured.drift_of_logs import drift_of
     from identification.drift.drift_test import DriftSettings
     from workbench.course import working
     from workbench.interface.models import load_model
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_view
     from workbench.report.next_steps import after_drift, check_of_refused
-    from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
+    from workbench.steps.drift import model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
     model = load_model(model_file, effects)
@@ -58,7 +59,7 @@ def command(
     with results("drift", out, check_of_refused(logs, card)) as folder:
         with working("testing"):
             found = drift_of(
-                model, model_key(model), sources, stream=stream, settings=settings, seed=seed
+                model, model_key(model), sources.logs, stream=stream, settings=settings, seed=seed
             )
         view = drift_view(found, str(model_file))
         view.write(folder)

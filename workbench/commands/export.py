@@ -13,8 +13,8 @@ from workbench.output import OutputFolder, emit, results
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
-    from workbench.export.compensation import Encoder
-    from workbench.export.exported import Exported
+    from design.generated.compensation import Encoder
+    from design.generated.exported import Exported
     from workbench.screen import Screen
 
 TARGETS = ("c", "st", "plcopen", "fmu", "json", "mat")
@@ -106,9 +106,10 @@ def command(given: ExportOptions) -> int:
         options.refuse_given(NO_MEANING, "controller", "compensator", "schedule", "precision")
         return _tables(given)
     options.refuse_given(NO_MEANING, "controls", "speed", "per_turn", "rated", "encoder")
+    from design.generated.exported import exported
     from workbench.documents.result_files import read_design
-    from workbench.export.exported import exported, validation_line
     from workbench.export.targets import writers
+    from workbench.export.validated import validation_line
 
     targets, precision = dict.fromkeys(given.targets), given.precision
     wide = [target for target in targets if target not in SINGLE]
@@ -165,16 +166,18 @@ def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
 
 
 def _tables(given: ExportOptions) -> int:
+    from design.generated.compensation import Compensation
+    from design.generated.tables import tables
     from workbench.documents.result_files import read_model
-    from workbench.export.compensation import Compensation
-    from workbench.export.table_targets import tables, tables_asked, tables_document, tables_view
+    from workbench.export.filled import filled
+    from workbench.export.table_targets import tables_asked, tables_document, tables_view
 
     model = read_model(given.file)
     asked = tables_asked(
         model.rotary, given.name, given.speed, given.per_turn, given.rated, given.encoder
     )
     what = Compensation(model, asked)
-    found = tables(what, given.targets, given.controls)
+    found = tables(what, given.targets, given.controls, filled)
     with results("export", given.out) as folder:
         for one in found.files:
             folder.write(one.name, one.text)
@@ -187,7 +190,7 @@ def _view(
     what: "Exported", targets: Mapping[str, None], files: tuple[str, ...], folder: Path
 ) -> "Screen":
     """What was written and what to do with it, for a terminal."""
-    from workbench.export.exported import title_of
+    from design.generated.exported import title_of
     from workbench.output import written
     from workbench.report.design_tables import of_the_model
     from workbench.screen import listed, screen

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import click
 
+from design.asked import Options
 from workbench import options
 from workbench.course import running
 from workbench.output import results
 from workbench.signature import option
-from workbench.steps.asked import IDENTIFY_STAGES, Options
+from workbench.steps.asked import FIT_OPTIONS, IDENTIFY_STAGES
 
 
 @options.command(
@@ -16,7 +17,7 @@ from workbench.steps.asked import IDENTIFY_STAGES, Options
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
 def command(
-    wanted: Options,
+    wanted: Options = FIT_OPTIONS,
     logs: tuple[str, ...] = options.LOGS_ARGUMENT,
     card: str = options.CARD_OPTION,
     budget: float = options.BUDGET_OPTION,
@@ -48,15 +49,15 @@ def command(
 
 def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None) -> None:
     """The same of a rig whose velocity follows the command."""
+    from design.identified.velocity import identify_velocity
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
     from workbench.report.velocity import after_velocity, velocity_view
-    from workbench.steps.velocity import identify_velocity
 
     with results("identify", out, check_of_refused(logs, card)) as folder:
         sources = read_sources(logs, card, velocity=True)
         with running("identifying", IDENTIFY_STAGES, budget) as course:
-            valve = identify_velocity(sources, keep_going=course.keep_going)
+            valve = identify_velocity(sources.logs, keep_going=course.keep_going)
         view = velocity_view(valve)
         view.write(folder)
     view.show(folder.final, after_velocity(valve, logs, card, folder.final))

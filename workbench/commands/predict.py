@@ -54,14 +54,14 @@ def command(
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":
     """The same of a rig whose velocity follows the command."""
+    from design.identified.velocity import predict_velocity
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_model
     from workbench.logs.sources import read_sources
     from workbench.report.velocity import velocity_prediction_view
-    from workbench.steps.velocity import predict_velocity
 
     valve = read_velocity_model(model_file)
     sources = read_sources([log], card, velocity=True)
     with working("predicting"):
-        runs = predict_velocity(valve, sources, window)
+        runs = predict_velocity(valve, sources.logs, str(sources.card.path), window)
     return velocity_prediction_view(runs, window, valve.rotary)

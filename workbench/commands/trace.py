@@ -59,12 +59,12 @@ def _of_velocity(
     names: tuple[str, ...], held_out: tuple[str, ...], card: str, budget: float
 ) -> tuple["View", str, tuple[str, ...]]:
     """The same of a rig whose velocity follows the command."""
+    from design.identified.velocity import trace_velocity
     from workbench.logs.sources import read_sources
     from workbench.report.velocity import velocity_view
-    from workbench.steps.velocity import trace_velocity
 
-    train = read_sources(names, card, velocity=True)
-    test = read_sources(held_out, card, velocity=True) if held_out else None
+    train = read_sources(names, card, velocity=True).logs
+    test = read_sources(held_out, card, velocity=True).logs if held_out else None
     with running("trace", TRACE_STAGES, budget) as course:
         found = trace_velocity(train, test, keep_going=course.keep_going)
         return velocity_view(found), found.left.verdict, tuple(found.model.effects)

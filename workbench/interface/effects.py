@@ -39,7 +39,7 @@ def check_effects(
     `holds` and what is `broken`, and the names of the `checks`. advance: takes shares of the whole.
     """
     from identification.effects._library import built_in
-    from workbench.cards.effect_runs import CHECKS, failures
+    from workbench.cards.effect_checks import CHECKS, failures
 
     own = {key: one for key, one in effects_of(folder).items() if key not in built_in()}
     found = {}

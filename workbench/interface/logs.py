@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from design.machine.model import Model
+from design.measured.axis_test import AxisTest
+from design.measured.drift_of_logs import Drifted, drift_of
+from design.measured.predicted_logs import Predicted, predict_logs
 from design.measured.response import Curve, Responded, curve_of, respond
 from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
@@ -36,11 +39,10 @@ from workbench.report.response import response_view
 from workbench.report.templating import render
 from workbench.report.view import View
 from workbench.steps.asked import IDENTIFY_STAGES
-from workbench.steps.axis_test import AxisTest
-from workbench.steps.axis_test import axis_test as test_of_axis
-from workbench.steps.drift import Drifted, drift_of, model_key, read_stream, write_stream
+from workbench.steps.axis_test import axis_test_of_sources
+from workbench.steps.drift import model_key, read_stream, write_stream
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.predict import Predicted, predict_sources, prediction_frame
+from workbench.steps.predict import prediction_frame
 from workbench.steps.present import present_of_card
 from workbench.steps.response import response_frame
 from workbench.steps.simulate import as_columns, record, truth
@@ -171,7 +173,8 @@ def predict(
     known = model_of(model)
     found = sources(log, *_machine(model, card, rig, signals))
     with working("predicting"):
-        predicted = predict_sources(known, found, drive=drive, window=window)
+        where = str(found.card.path)
+        predicted = predict_logs(known, found.logs, where, drive=drive, window=window)
     return PredictResult(predicted, known.rotary)
 
 
@@ -228,7 +231,7 @@ def drift(
     found = sources(logs, *_machine(model, card, rig, signals))
     with working("testing"):
         tested = drift_of(
-            known, model_key(known), found, stream=stream, settings=settings, seed=seed
+            known, model_key(known), found.logs, stream=stream, settings=settings, seed=seed
         )
     if state is not None:
         write_stream(Path(state), tested.stream)
@@ -255,7 +258,7 @@ def axis_test(
 
             with Registry(registry, create=False) as where:
                 earlier = earlier_of(where, name, found, seed)
-        return AxisTestResult(test_of_axis(found, earlier, name))
+        return AxisTestResult(axis_test_of_sources(found, earlier, name))
 
 
 def simulate(

@@ -17,6 +17,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
+from design.asked import Options
+from design.identified.trace_logs import Traced
 from design.machine.model import Model
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
@@ -37,9 +39,8 @@ from workbench.report.reports import identified_view
 from workbench.report.trace import traced_view
 from workbench.report.view import View
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
-from workbench.steps.identify import Options
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.trace import Traced, named_logs, trace_sources
+from workbench.steps.trace import named_logs, trace_sources
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,10 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from design.measured.axis_limits import FEWEST_EARLIER, MEANING_OF
+from design.measured.axis_test import Earlier
+from identification.drift.readings import Reading
 from identification.model.estimates import Estimate
 from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_model
-from workbench.jobs.judge import Reading, drift_by_chart
+from workbench.jobs.judge import drift_by_chart
 from workbench.logs.sources import Sources
 from workbench.registry import results
 from workbench.registry.results import (
@@ -20,8 +23,6 @@ from workbench.registry.results import (
     left_out,
 )
 from workbench.registry.store import Registry
-from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
-from workbench.steps.axis_test import Earlier
 
 LAST_LOGS_READ = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see

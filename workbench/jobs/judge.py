@@ -9,16 +9,18 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
-from scipy.stats import norm
 
 from design.challenge import Contender, Terms, challenge
 from design.controllers.design import design
 from design.controllers.validate import validate, validation_document
+from design.identified.trace_logs import Traced
 from design.machine.documents import design_document, model_document
 from design.machine.model import Model
+from design.machine.slip_of_scale import moved_between, no_wear
 from design.machine.source import Source
-from identification.drift.drift_result import Shift
+from design.measured.drift_of_logs import Stream, drift_of
 from identification.drift.mewma import DriftState
+from identification.drift.readings import Moved, Reading, moved_by, reading_of
 from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
@@ -31,46 +33,11 @@ from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.drift import reason_sentence
 from workbench.report.trace_words import trace_sentence
-from workbench.steps.drift import (
-    Stream,
-    detectable_sizes,
-    drift_of,
-    model_key,
-    moved_between,
-    no_wear,
-)
+from workbench.steps.drift import detectable_sizes, model_key
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.trace import trace_sources
 
 TestedDrift = Literal["none", "drift", "structure", "not_judged"]
-
-
-@dataclass(frozen=True)
-class Moved:
-    """A parameter that has changed: its unit, active value and now, p-value of the change."""
-
-    name: str
-    unit: str
-    before: float
-    after: float
-    p_value: float
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A parameter by one log, with its 95 % interval, beside its active value.
-
-    change: relative to that, with its standard deviation.
-    """
-
-    name: str
-    unit: str
-    before: float
-    after: float
-    low: float
-    high: float
-    change: float
-    sd: float
 
 
 @dataclass(frozen=True)
@@ -107,19 +74,19 @@ def drift_by_chart(
     """
     stream = Stream(_state(state), ()) if state else None
     seed = int(rng.integers(2**31))
-    found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
+    found = drift_of(model, model_key(model), sources.logs, stream=stream, seed=seed)
     worst = [one.test for one in found.tests if one.test.verdict == found.verdict][-1]
     state_now: Any = strict(found.stream.state)
     statistics = [one for one in (worst.single, worst.mean) if one is not None]
     return Drift(
         verdict=found.verdict,
         reason=reason_sentence(worst, found.settings.to_be_seen),
-        moved=tuple(_moved(one) for one in worst.moved),
+        moved=tuple(moved_by(one) for one in worst.moved),
         p_value=min((one.p_value for one in statistics), default=None),
         state=state_now,
         unsure=worst.unsure,
         could_have_seen=detectable_sizes(worst),
-        parameters=tuple(_reading(one) for one in worst.shifts.values()),
+        parameters=tuple(reading_of(one) for one in worst.shifts.values()),
     )
 
 
@@ -129,19 +96,6 @@ def _state(state: Mapping[str, Any]) -> DriftState:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise BadModel(f"stored drift state: {first['loc']}: {first['msg']}") from None
-
-
-def _reading(shift: Shift) -> Reading:
-    half = float(norm.ppf(0.975)) * shift.after_sd
-    low, high = shift.after - half, shift.after + half
-    return Reading(
-        shift.name, shift.unit, shift.before, shift.after, low, high, shift.change, shift.sd
-    )
-
-
-def _moved(shift: Shift) -> Moved:
-    p_value = float(2.0 * norm.sf(abs(shift.change) / shift.sd)) if shift.sd > 0 else 0.0
-    return Moved(shift.name, shift.unit, shift.before, shift.after, p_value)
 
 
 HELD_OUT_SHARE = 0.35  # of a log's time that a challenger is not fitted on

@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from identification.columns.header import words_of
 from identification.thresholds import HALF
-from workbench.cards.headers import words_of
 from workbench.cards.written_units import written_unit
 from workbench.logs.times import is_time
 

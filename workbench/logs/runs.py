@@ -16,24 +16,23 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
+from identification.signals.one_clock import on_one_clock
 from identification.signals.renewal import held_drives, renewed
+from identification.signals.stamps import (
+    at_rows,
+    even_stamps,
+    sound_rows,
+    stretches,
+    told_of_starts,
+)
+from identification.signals.summed import summed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
-from workbench.logs.clocks import on_one_clock
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
-from workbench.logs.times import (
-    at_rows,
-    even_stamps,
-    numbers_in,
-    seconds,
-    sound_rows,
-    stretches,
-    summed,
-    told_of_starts,
-)
+from workbench.logs.times import numbers_in, seconds
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")

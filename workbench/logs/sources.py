@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from design.machine.nearest import nearest
-from design.machine.source import Source
+from design.machine.source import MachineLogs, Source
 from identification.errors import BadCard, BadLog
 from identification.log import Rig
 from identification.signals.bad_samples import BadSamples
@@ -29,6 +29,12 @@ class Sources:
     runs: tuple[Source, ...]
     remarks: tuple[str, ...]
     bad: tuple[BadSamples, ...] = ()
+
+    @property
+    def logs(self) -> MachineLogs:
+        """The same but for the card, of which they have the name and the logs kept for tests."""
+        kept = tuple(self.card.split.get("test", ()))
+        return MachineLogs(self.card.name, self.rig, self.runs, self.remarks, self.bad, kept)
 
 
 @dataclass(frozen=True)
@@ -99,17 +105,6 @@ def _discriminated(source: Source, path: Path) -> Source:
     """The run named with its folder, as another file has the same name."""
     name = source.log.name.replace(path.name, f"{path.parent.name}/{path.name}", 1)
     return replace(source, log=replace(source.log, name=name))
-
-
-def refuse_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
-    """Raises BadLog where a test file has the bytes of a training file."""
-    names = {source.sha256: source.file for source in train}
-    for source in test:
-        if source.sha256 in names:
-            raise BadLog(
-                f"--test {source.file}: the same bytes as the training log"
-                f" {names[source.sha256]}; test on a log that the fit has not used"
-            )
 
 
 DATA_VARIABLE = "WORKBENCH_DATA"

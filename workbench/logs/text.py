@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog
+from identification.signals.stamps import are_few
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.blocks import Block, are_runs, block_table, blocks_of
@@ -20,7 +21,7 @@ from workbench.logs.layout import Layout, find_layout, is_number, period_above
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.rewritten import as_table
 from workbench.logs.table import Table
-from workbench.logs.times import are_few, with_one_clock
+from workbench.logs.times import with_one_clock
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _BETWEEN_NAMES = re.compile(r"\t|\s{2,}")  # between names of several words

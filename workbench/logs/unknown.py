@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import RawColumn
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
@@ -25,21 +26,6 @@ from workbench.logs.times import numbers_in, seconds
 
 FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
 LEAST_COMMON = 0.5  # of the clock's span, that another one shares
-
-
-@dataclass(frozen=True, eq=False)
-class RawColumn:
-    """One column: its number from 0, what a card calls it, its header and the unit below it, its
-    values (n,) (NaN where there is no number), why they cannot be used (else empty), and its group,
-    where the file has several."""
-
-    number: int
-    key: str | int
-    header: str
-    unit_below: str
-    values: Array
-    unusable: str = ""
-    group: str = ""
 
 
 def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) -> list[RawColumn]:

@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 
 from design.machine.readable import number as written
+from design.measured.axis_limits import LEAST_ROOM
 from workbench.jobs.options import clock
 from workbench.output import templates
 from workbench.page.dropped import Drop
@@ -26,7 +27,6 @@ from workbench.registry.bench import Bench
 from workbench.registry.database import Database
 from workbench.registry.store import Registry
 from workbench.registry.values import BadRegistry, Role
-from workbench.steps.axis_limits import LEAST_ROOM
 from workbench.verdicts import in_words
 
 STATE_WORDS = {

@@ -205,7 +205,7 @@ class LoopsFound:
 
 def export_files(design: str, target: str) -> dict[str, bytes]:
     """The files of the target, by name, of a design's document as text; raises UserError."""
-    from workbench.export.exported import exported
+    from design.generated.exported import exported
     from workbench.export.targets import writers
 
     made = writers(datetime.now(UTC))[target](exported(_design(design)))

@@ -9,6 +9,14 @@ from typing import Any, Literal, NamedTuple
 from sqlalchemy import and_, select
 
 from design.machine.readable import shown_unit
+from design.measured.axis_limits import (
+    FEWEST_EARLIER,
+    MEANING_OF,
+    Allowed,
+    Light,
+    light_of,
+    limits_of,
+)
 from workbench.registry.database import Database
 from workbench.registry.rows import accepted_version, judged_now
 from workbench.registry.tables import (
@@ -20,14 +28,6 @@ from workbench.registry.tables import (
     VersionRow,
 )
 from workbench.registry.values import ALARMING
-from workbench.steps.axis_limits import (
-    FEWEST_EARLIER,
-    MEANING_OF,
-    Allowed,
-    Light,
-    light_of,
-    limits_of,
-)
 
 Delivered = Literal["", "sent", "waiting", "given up"]
 

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from design.machine.readable import force, length, units_of
+from design.measured.predicted_logs import Predicted
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes
-from workbench.steps.predict import Predicted, prediction_frame
+from workbench.steps.predict import prediction_frame
 
 if TYPE_CHECKING:
     import pandas as pd

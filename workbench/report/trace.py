@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.identified.trace_logs import Traced, effect_estimates
 from design.machine.documents import model_document
 from design.machine.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
 from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
+from identification.tracing.residual_rows import in_equation
 from identification.tracing.result import FoundEffect, Trace
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart
@@ -21,7 +23,6 @@ from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import (
     against_signal,
     free_curves,
-    in_equation,
     over_time,
     pictures,
     signal_chart,
@@ -29,7 +30,7 @@ from workbench.report.trace_pictures import (
 from workbench.report.trace_words import advice, percent, trace_sentence, words
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, Row, more, tabled
-from workbench.steps.trace import Traced, effect_estimates, trace_document
+from workbench.steps.trace import trace_document
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
 RIVAL_HEAD = ("rival", "force left", "why not")

@@ -1,8 +1,7 @@
 """Pictures of a trace: the residual before and after over time and against what explains it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,14 +9,22 @@ from design.machine.readable import units_of
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting, Effect
 from identification.model.karnopp import Karnopp
-from identification.simulation.effect_along_motion import contribution
+from identification.signals.running_median import running_median
+from identification.tracing.residual_rows import (
+    effect_at_rows,
+    folded_at,
+    in_equation,
+    log_starts,
+    share_inside,
+    shown_residuals,
+    signal_of,
+)
 from identification.tracing.result import FreeCurve, Residual, Trace
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, parts_of
 from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
 
-Equation = Literal["mechanical", "actuator"]
 LEVELS = 30  # of a signal, over which the running median is taken
 A_PERIOD = 12  # levels at least, of an effect that repeats
 FINE = 90  # of a signal, for the curve of what the effect takes away, which has no noise
@@ -37,7 +44,6 @@ SIGNALS = {
     "du": ("rate of the command", "{command}/s"),
 }
 PASCALS = 1e-5  # bar
-GAP = 0.2  # of a signal's range, over which a running median is not drawn
 EQUATION_TITLES = {
     "mechanical": "equation of motion",
     "actuator": "actuator equation",
@@ -77,13 +83,6 @@ class Picture:
         return max(LEVELS, min(round(A_PERIOD * travel / self.period), len(self.residual.t) // 8))
 
 
-def in_equation(effect: Effect) -> Equation | None:
-    """The equation in whose residual an effect shows; None where in neither while sliding."""
-    if effect.place.in_actuator:
-        return "actuator"
-    return None if effect.place.in_stops else "mechanical"
-
-
 def pictures(found: Trace) -> list[Picture]:
     """What to draw: each effect against its signal, and what is left against those unexplained."""
     residuals = {r.equation: r for r in shown_residuals(found)}
@@ -103,14 +102,6 @@ def pictures(found: Trace) -> list[Picture]:
     return list({one.place: one for one in reversed(out)}.values())[::-1]
 
 
-def shown_residuals(found: Trace) -> list[Residual]:
-    """What is left of each equation: of motion, the force that is missing while the body slides."""
-    if found.missing_force is None:
-        return list(found.residuals)
-    others = (one for one in found.residuals if one.equation != "mechanical")
-    return [found.missing_force.sliding, *others]
-
-
 def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> Picture:
     """The picture of one effect; not alone in its equation, it is taken out by its own equation."""
     effect = acting.effect
@@ -125,20 +116,6 @@ def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> P
     period = None if repeats is None else acting.values[repeats]
     curve = taken if single else None
     return Picture(residual, signal, effect, residual.after + taken, how, curve, period)
-
-
-def effect_at_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | None:
-    """What an effect contributes at each row, (r,); None where it is no function of the signals."""
-    effect = acting.effect
-    if effect.place.sign is None or effect.evolve is not None or "v" not in residual.signals:
-        return None
-    blank = np.zeros(len(residual.t) + 1)  # a first row at t = 0, from which kernels count
-    rows = {k: np.concatenate([[0.0], x]) for k, x in residual.signals.items()}
-    signals = {"t": blank, "y": blank, "F": blank, "u": blank, **rows}
-    signals["d"] = np.sign(signals["v"])
-    value = contribution(effect, acting.values, signals, 1e-3, p)[1:]
-    sign = effect.place.sign
-    return np.asarray(value * (signals["d"][1:] if sign == 0.0 else sign))
 
 
 def _unexplained(found: Trace) -> Picture | None:
@@ -157,27 +134,6 @@ def _unexplained(found: Trace) -> Picture | None:
         return Picture(folded, "phase", None, folded.before, "before", None)
     named = [name for name in (*wanted, "v", "y", *residual.signals) if name in residual.signals]
     return Picture(residual, named[0], None, residual.before, "before", None) if named else None
-
-
-def folded_at(residual: Residual, rate: float) -> Residual:
-    """The first log's rows, with the part of a swing's period [1] at `rate` [Hz] as a signal.
-
-    A swing keeps its rate from log to log, not its phase.
-    """
-    own = residual.log == residual.log[0]
-    signals = {k: v[own] for k, v in residual.signals.items()}
-    signals["phase"] = signals["t"] * rate % 1.0
-    rows = {k: getattr(residual, k)[own] for k in ("t", "log", "before", "after", "noise")}
-    return replace(residual, **rows, signals=signals)
-
-
-def signal_of(effect: Effect, residual: Residual) -> str:
-    """The signal against which an effect shows."""
-    wanted = [*effect.depends_on, "v", "y"]
-    for name in ["du", *wanted] if effect.place.delays else wanted:
-        if name in residual.signals:
-            return name
-    return next(iter(residual.signals))
 
 
 def over_time(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Section:
@@ -217,16 +173,6 @@ def _both(residual: Residual) -> list[tuple[Array, Colour, str]]:
     if np.array_equal(residual.before, residual.after):
         return [(residual.after, "model", "model")]
     return [(residual.before, "before", "before"), (residual.after, "model", "after")]
-
-
-def share_inside(values: Array, noise: Array) -> float:
-    """Points within two standard deviations of the noise [%]."""
-    return 100 * float(np.mean(np.abs(values) <= 2 * noise))
-
-
-def log_starts(residual: Residual) -> Array:
-    """Time of each log's first row [s]."""
-    return np.array([residual.t[residual.log == k].min() for k in np.unique(residual.log)])
 
 
 def against_signal(picture: Picture, rotary: bool, command: str = "V") -> Section:
@@ -294,18 +240,6 @@ def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, Colour]]:
         "moving towards −": (v < 0, "other"),
     }
     return {name: way for name, way in ways.items() if np.count_nonzero(way[0]) > LEVELS}
-
-
-def running_median(x: Array, values: Array, levels: int) -> tuple[Array, Array]:
-    """Medians of `values` over equally filled stretches of `x`, at most `levels` of them.
-
-    A NaN in the medians parts them where `x` has a wide gap, across which no line is to be drawn.
-    """
-    parts = np.array_split(np.argsort(x), min(levels, len(x)))
-    at = np.array([np.median(x[p]) for p in parts])
-    found = np.array([np.median(values[p]) for p in parts])
-    gaps = 1 + np.flatnonzero(np.diff(at) > GAP * max(float(np.ptp(x)), 1e-300))
-    return np.insert(at, gaps, (at[gaps - 1] + at[gaps]) / 2), np.insert(found, gaps, np.nan)
 
 
 def axis_of(signal: str, rotary: bool, command: str = "V") -> tuple[str, float]:

@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from design.identified.trace_logs import Traced
 from design.machine.readable import force, length, number, shown_unit
 from identification.estimation.latent_force import LatentForces
 from identification.thresholds import OF_ACCOUNT
 from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
 from identification.tracing.verdict import listed
-from workbench.steps.trace import Traced
 
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]

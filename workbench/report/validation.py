@@ -26,6 +26,7 @@ from design.controllers.recommend import (
     settling_words,
 )
 from design.controllers.validate import Validation, validation_document
+from design.identified.trace_logs import effect_estimates
 from design.loop import LoopRun
 from design.machine.readable import Shown, length, number, shown, shown_unit, units_of
 from identification.arrays import Array
@@ -40,7 +41,6 @@ from workbench.report.trace_words import trace_sentence, words
 from workbench.report.view import Section, View, notes
 from workbench.screen import Part, Row, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
-from workbench.steps.trace import effect_estimates
 
 LOOP_COLOURS: dict[str, Colour] = {
     "rst": "reference", "pid": "model", "p-pi": "measured", PRESENT: "before",

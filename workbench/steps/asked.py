@@ -1,39 +1,23 @@
-"""What is asked of a computation: each number with its default, and the option that says it.
+"""The options that say what is asked of a computation, whose numbers `design.asked` has, and which
+part of a command's bar each stage takes.
 
-Of these the commands make their options, and the functions of Python take them as they are; of what
-is asked of a loop, `design.asked` has the numbers. And which part of a command's bar each stage
-takes. Light to import, since every `--help` asks for it.
+Light to import, since every `--help` asks for it.
 """
 
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import fields
 
 import click
 
-from design.asked import Limits, RobustAsked, Wanted
+from design.asked import Limits, Options, RobustAsked, Wanted
 from workbench.options import POSITIVE, SEEDS, Finite, Parsed, listed_names, parse_orders
-from workbench.signature import asked, options_of
+from workbench.signature import options_of
 
-Orders = tuple[int, int, int]
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to identify; orders (na, nb, nk) and period [s] of the ARX plant, None: chosen."""
-
-    drive: Literal["force", "command"] | None = asked(
-        None, "What drives the fitted run.  [default: the command where it explains the force]"
-    )
-    orders: Orders | None = asked(
-        None, "Orders of the ARX plant.  [default: chosen]",
-        type=Parsed(parse_orders), metavar="NA,NB,NK",
-    )  # fmt: skip
-    design_period: float | None = asked(
-        None, "Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
-        type=POSITIVE, metavar="S",
-    )  # fmt: skip
-
-
+FIT_OPTIONS = options_of(
+    Options,
+    drive={},
+    orders={"type": Parsed(parse_orders), "metavar": "NA,NB,NK"},
+    design_period={"type": POSITIVE, "metavar": "S"},
+)
 LIMIT_OPTIONS = options_of(Limits, **{one.name: {"type": POSITIVE} for one in fields(Limits)})
 ROBUST_OPTIONS = options_of(
     RobustAsked,

@@ -10,6 +10,7 @@ import numpy as np
 from design.closed_loop.loop_figures import Traces
 from design.controllers.design import design
 from design.controllers.validate import Validation, validate
+from design.identified.trace_logs import Traced
 from design.machine.design import Design
 from identification.effects._library import built_in
 from identification.errors import BadCard
@@ -20,7 +21,7 @@ from workbench.cards.recipe import Recipe
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.steps.simulate import as_columns, record, truth
-from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.trace import trace_sources
 
 HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees
 

@@ -1,31 +1,29 @@
 """The chain, each link callable alone: runs -> model -> design -> validation."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from design.asked import Options
+from design.identified.broken_promises import broken_promises
+from design.identified.hardly_identifiable import braked_by_its_voltage
+from design.identified.identifiable_by_log import identifiability_of_runs
+from design.identified.identify import identify
+from design.identified.sampled_posterior import posterior_document, posterior_of
+from design.identified.velocity import looks_like_velocity
 from design.machine.model import Model
-from design.machine.plain import plain
 from design.machine.plausible import model_remarks
 from design.machine.source import Source
+from design.machine.surrounding_lines import surrounding_lines, unequal_friction
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import reported_estimate
-from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
-from identification.model.karnopp import NEGATIVE
+from identification.model.estimates import KarnoppFit
 from identification.progress import KeepGoing, Progress, quiet, without_end
 from workbench.logs.sources import Sources
-from workbench.steps.hardly_identifiable import braked_by_its_voltage
-from workbench.steps.identifiable_by_log import identifiability_of_runs
-from workbench.steps.identify import Options, identify
 from workbench.steps.present import present_of_card
-from workbench.steps.surrounding_lines import surrounding_lines, unequal_friction
-from workbench.steps.velocity import looks_like_velocity
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
-
-BROKEN = 2.0  # times what a log promised before the fit, above which an interval is reported
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def identify_sources(
     Raises NotIdentifiable where nothing is identifiable, BadLog where a signal is missing.
     """
     options = options or Options()
-    logs = [source.log for source in sources.runs]
+    logs = sources.logs.logs
     try:
         model, fit = identify(
             sources.runs,
@@ -74,9 +72,9 @@ def identify_sources(
     model = replace(
         model, bad_samples=sources.bad, controller=now, identifiability=gate.identifiability
     )
-    posterior_samples = _posterior_samples(sources, fit, seed, on_progress) if posterior else None
+    posterior_samples = posterior_of(sources.logs, fit, seed, on_progress) if posterior else None
     if posterior_samples is not None:
-        model = replace(model, posterior=_posterior(posterior_samples, fit))
+        model = replace(model, posterior=posterior_document(posterior_samples, fit))
     remarks = (
         *looks_like_velocity(logs, sources.rig, model), *braked_by_its_voltage(logs, sources.rig),
         *surrounding_lines(fit.surroundings, sources.rig),
@@ -84,64 +82,3 @@ def identify_sources(
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip
     return Identified(model, fit, sources.runs, remarks, posterior_samples)
-
-
-def broken_promises(model: Model) -> tuple[str, ...]:
-    """A line where intervals are far wider than the logs promised before the fit."""
-    wider, known = [], {**model.friction, **(model.actuator or {})}
-    for one in model.identifiability:
-        found = known.get(one.name)
-        if not found or one.within is None or not found.value or found.sd is None:
-            continue
-        half = NORMAL_95 * found.sd / abs(found.value)
-        if half > BROKEN * one.within:
-            wider.append(f"{one.name} {100 * half:.2g} % ({100 * one.within:.2g} %)")
-    if not wider:
-        return ()
-    why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
-    return (
-        f"intervals are wider than predicted from the logs (in brackets): {', '.join(wider)};"
-        f" {why}, or their noise is not the sensors' alone",
-    )
-
-
-def _posterior_samples(
-    sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress
-) -> "Posterior":
-    from identification.estimation.posterior import sample_posterior
-
-    around = fit.surroundings
-    return sample_posterior(
-        replace(fit, effects=() if not around.none else fit.effects),
-        [around.taken_out(source.log) for source in sources.runs],
-        np.random.default_rng(seed),
-        rig=sources.rig,
-        on_progress=lambda share: on_progress("posterior", share),
-    )
-
-
-def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
-    """What the ensembles found, as model.json holds it: no intervals unless they agree."""
-    units = {name: fit.estimates[name].unit for name in found.names}
-    estimates = {name: Estimate(None, unit, reason=found.verdict) for name, unit in units.items()}
-    spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
-    bounds = {n: (-np.inf, 0.0) if n in NEGATIVE else (0.0, np.inf) for n in fit.estimates}
-    for acting in fit.effects:
-        bounds |= {f"{acting.key}.{p.name}": (p.low, p.high) for p in acting.effect.params}
-    for name, (low, median, high) in found.interval().items():
-        estimates[name] = reported_estimate(
-            median, units[name], spread[name], interval=(low, high), bounds=bounds[name]
-        )
-    return {
-        "converged": found.converged,
-        "verdict": found.verdict,
-        "likelihood": found.way,
-        "ensembles": found.ensembles,
-        "walkers": found.walkers,
-        "steps": found.steps,
-        "evaluations": found.evaluations,
-        "acceptance": found.acceptance,
-        "r_hat": dict(found.r_hat),
-        "ess": dict(found.ess),
-        "parameters": plain(estimates),
-    }

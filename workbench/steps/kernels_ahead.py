@@ -21,13 +21,13 @@ def compile_fits() -> None:
     """A short log through a fit, an ARX fit, a run with an effect, whose kernels this leaves in the
     cache. The effect's is last: most of what it calls has come from the simulated loop by then."""
     from identification.arx.model import fit_arx
+    from identification.effect_contract.runs import HYDRAULIC, run_with, trial_log, typical
     from identification.effects._library import built_in
     from identification.estimation.fit import fit_plant
     from identification.estimation.latent_force import latent_forces
     from identification.estimation.regression.motion_log import motion_log
     from identification.log import Log, Rig
     from identification.model.plant import Plant
-    from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
 
     driven = trial_log(LONG, h=SAMPLE)
     run = run_with(HYDRAULIC, driven)

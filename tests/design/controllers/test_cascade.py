@@ -14,6 +14,7 @@ from design.closed_loop.linear_loop import plants_of
 from design.controllers.cascade import beside_resonance, filter_words, unseen_lag
 from design.controllers.design import design, usual_structures
 from design.controllers.validate import validate, with_resonance
+from design.generated.exported import exported
 from design.machine.design import Design
 from design.machine.documents import design_document
 from design.machine.model import Model, used
@@ -23,7 +24,6 @@ from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
 from workbench.documents.result_files import read_design
 from workbench.export.data import json_file
-from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import cascade_lines, design_lines, design_sentence
 from workbench.report.reports import bode_chart

@@ -14,6 +14,7 @@ from design.controllers import schedule
 from design.controllers.clear_win import Contest, contest, strokes, that_may_be
 from design.controllers.schedule import scheduled
 from design.controllers.validate import validate
+from design.generated.exported import exported
 from design.machine.documents import design_document
 from design.machine.model import Model
 from identification.errors import BadModel
@@ -21,7 +22,6 @@ from identification.model.estimates import Estimate
 from tests.chain import EMPS, model_of
 from tests.workbench.export.designs import RUBS, case
 from workbench.documents.result_files import read_design
-from workbench.export.exported import exported
 from workbench.output import dumps
 from workbench.report.design_tables import schedule_lines, schedule_rows
 from workbench.report.validation import validation_view

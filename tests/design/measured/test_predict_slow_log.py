@@ -7,11 +7,11 @@ import pytest
 
 from design.measured.predict import predict
 from identification.arrays import Array
+from identification.effect_contract.runs import START_AT_REST, TABLE_1
 from identification.log import Log
 from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
 from tests.chain import model_of
-from workbench.cards.effect_runs import START_AT_REST, TABLE_1
 
 LOOP, K_A = 2.5e-4, 900.0  # s, N/V
 

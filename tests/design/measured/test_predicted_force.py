@@ -7,7 +7,9 @@ import pytest
 
 from design.machine.model import Model
 from design.machine.source import Source
+from design.measured import drift_of_logs
 from design.measured import predict as predict_step
+from design.measured.friction_curve import friction_samples
 from design.measured.predict import force_by_model, of_one_instant, seen_moving
 from identification.arrays import Array
 from identification.effects._library import built_in
@@ -21,8 +23,6 @@ from identification.simulation.inverse_dynamics import force_needed
 from tests.chain import model_of
 from workbench.cards.card import load_card
 from workbench.logs.sources import Sources, card_path
-from workbench.report import friction
-from workbench.steps import drift
 
 WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
 
@@ -128,8 +128,8 @@ def test_the_friction_of_a_log_is_that_of_the_instants_at_which_its_force_acts()
     log, model = swing(), late_model()
     F = np.sin(40.0 * log["t"])
     behind = log.with_signals(F=np.append(F[3:], np.full(3, F[-1])))  # 3 ms before its position
-    _, on_time = friction._friction_data(replace(model, lag=None), log.with_signals(F=F))
-    _, late = friction._friction_data(model, behind)
+    _, on_time = friction_samples(replace(model, lag=None), log.with_signals(F=F))
+    _, late = friction_samples(model, behind)
     assert late[50:-50] == pytest.approx(on_time[50:-50], abs=1e-3)
 
 
@@ -141,10 +141,10 @@ def test_a_log_is_tested_for_drift_at_the_lag_of_the_model(monkeypatch: pytest.M
         seen.append(log)
         raise BadLog("enough")
 
-    monkeypatch.setattr(drift, "drift_test", test)
+    monkeypatch.setattr(drift_of_logs, "drift_test", test)
     model, log = late_model(), swing().with_signals(F=np.arange(4000.0))
     card = load_card(card_path("paper_table1"))
     sources = Sources(card, model.rig, (Source(log, "a.csv", "0" * 64, len(log)),), ())
     with pytest.raises(BadLog, match="enough"):
-        drift.drift_of(model, "key", sources)
+        drift_of_logs.drift_of(model, "key", sources.logs)
     assert seen[0]["F"][100] == pytest.approx(97.0)

@@ -2,9 +2,10 @@
 
 import pytest
 
+from identification.columns.header import Quantity
 from workbench.cards.headers import read_header
 from workbench.cards.units import conversion
-from workbench.cards.written_units import Quantity, written_unit
+from workbench.cards.written_units import written_unit
 
 READ = [
     ("pos [mm]", "mm", "position", ""),

@@ -7,6 +7,7 @@ import numpy as np
 
 from design.controllers.design import design
 from design.controllers.schedule import scheduled
+from design.generated.exported import Exported
 from design.loop import LoopNoise
 from design.machine.design import Design
 from design.machine.model import Model
@@ -16,7 +17,6 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.export.exported import Exported
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 RUBS = Karnopp(4.0, 15.0, 16.0, 40.0, 42.0, 3e-3, -3e-3, 18.0, -19.0)

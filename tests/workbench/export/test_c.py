@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from benchmarks.exported import BUILDS
+from design.generated.c import c_files
+from design.generated.exported import Exported, Precision, exported
 from identification.arrays import Array
 from tests.workbench.export.designs import NAMES, START, case, simulated
-from workbench.export.c import c_files
-from workbench.export.exported import Exported, Precision, exported
+from workbench.export.filled import filled
 
 MANY, FEWER = 1_000_000, 100_000
 MILLION = ("limited", "emps")  # benchmarks/exported.py takes as many steps of every shipped set
@@ -41,7 +42,7 @@ def library(what: Exported, folder: Path, build: str) -> ctypes.CDLL:
     if shutil.which(command[0]) is None:
         pytest.skip(f"no {command[0]} on PATH")
     name, count = what.program.name, len(what.program.inputs)
-    for file, text in c_files(what).items():
+    for file, text in c_files(what, filled).items():
         (folder / file).write_text(text)
     given = ", ".join(f"in[{count} * k + {at}]" for at in range(count))
     (folder / "driver.c").write_text(DRIVER.format(name=name, given=given))
@@ -145,7 +146,7 @@ def test_a_lost_sample_is_taken_as_it_last_was(lost: float, tmp_path: Path) -> N
         assert np.array_equal(driven(code, holed), held)
     holed[0] = lost  # before any good one: at rest where it was begun
     assert np.all(np.isfinite(driven(code, holed)))
-    header = " ".join(c_files(what)[f"{what.program.name}.h"].replace(" * ", "").split())
+    header = " ".join(c_files(what, filled)[f"{what.program.name}.h"].replace(" * ", "").split())
     assert "An input that is infinite or no number (NaN: a lost sample) is taken as it" in header
 
 
@@ -157,7 +158,7 @@ def test_what_is_nowhere_read_is_not_in_the_code(tmp_path: Path) -> None:
 
 
 def test_it_needs_no_header_and_allocates_nothing(tmp_path: Path) -> None:
-    files = c_files(exported(case("limited").design, compensated=True))
+    files = c_files(exported(case("limited").design, compensated=True), filled)
     for text in files.values():
         included = [line for line in text.splitlines() if line.startswith("#include")]
         assert all("<" not in line for line in included)
@@ -169,7 +170,7 @@ def test_c_plus_plus_takes_the_header(tmp_path: Path) -> None:
     if shutil.which("g++") is None:
         pytest.skip("no g++ on PATH")
     what = exported(case("emps").design, compensated=True)
-    for file, text in c_files(what).items():
+    for file, text in c_files(what, filled).items():
         (tmp_path / file).write_text(text)
     (tmp_path / "main.cpp").write_text(f'#include "{what.program.name}.h"\n')
     subprocess.run(

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from design.generated.exported import exported
 from design.servo import Compensation
 from tests.workbench.export.designs import NAMES, case
 from workbench.export.data import json_file, mat_file
-from workbench.export.exported import exported
 
 OPERATORS: dict[str, Any] = {
     "+": lambda a, b: a + b,

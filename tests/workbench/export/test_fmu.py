@@ -11,9 +11,9 @@ from fmpy import extract, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
+from design.generated.exported import exported
 from tests.workbench.export.designs import START, case, simulated
-from workbench.export.c import fmu_file
-from workbench.export.exported import exported
+from workbench.export.fmu import fmu_file
 
 N = 3000
 

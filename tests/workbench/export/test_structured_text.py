@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
+from design.generated.exported import Precision, exported
+from design.generated.structured_text import st_file, st_syntax
 from design.program_run import ProgramRun
 from tests.workbench.export.designs import NAMES, case, simulated
 from tests.workbench.export.structured_text_runner import Blocks
-from workbench.export.exported import Precision, exported
-from workbench.export.structured_text import st_file, st_syntax
+from workbench.export.filled import filled
 
 
 def blocks(name: str, precision: Precision = "double", controller: str = "rst") -> Blocks:
     (source,) = st_file(
-        exported(case(name).design, controller, compensated=True, precision=precision)
+        exported(case(name).design, controller, compensated=True, precision=precision), filled
     ).values()
     return Blocks(source)
 
@@ -46,7 +47,7 @@ def test_the_block_passes_its_own_test(name: str, precision: Precision) -> None:
 
 def test_its_own_test_finds_a_changed_constant() -> None:
     what = exported(case("limited").design, compensated=True)
-    (source,) = st_file(what).values()
+    (source,) = st_file(what, filled).values()
     line = next(one for one in source.splitlines() if "F_sp : LREAL" in one)
     changed = source.replace(line, "F_sp : LREAL := 20.8;")
     test = Blocks(changed).made(f"FB_{what.program.name}_test")
@@ -89,7 +90,7 @@ def test_the_block_of_a_cascade_or_schedule_gives_what_the_simulation_gave(
     one = case(machine)
     what = exported(one.design, controller, scheduled=scheduled)
     run, inputs = simulated(one, what, samples)
-    (source,) = st_file(what).values()
+    (source,) = st_file(what, filled).values()
     block = Blocks(source).made(f"FB_{what.program.name}")
     found = []
     for r, y in inputs.tolist():

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.generated.compensation import Compensation, TableFile, TablesAsked
+from design.generated.tables import Tables, tables
 from design.machine.model import Model
 from identification.errors import BadModel, UserError
 from identification.model.estimates import Estimate
@@ -18,8 +20,8 @@ from identification.model.karnopp import slip_friction
 from tests.workbench.export import table_readers as read
 from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear, lost, rotary
 from tests.workbench.export.structured_text_runner import Blocks
-from workbench.export.compensation import Compensation, TableFile, TablesAsked
-from workbench.export.table_targets import Tables, tables, tables_asked
+from workbench.export.filled import filled
+from workbench.export.table_targets import tables_asked
 
 ONE_PER_CENT = 0.01
 UNTOLD = Estimate(None, "N", reason="too weak; log longer", assumed=0.02)
@@ -27,7 +29,7 @@ SCREW = 0.01  # m a turn
 
 
 def made(model: Model, *targets: str, controls: tuple[str, ...] = (), **asked: Any) -> Tables:
-    return tables(Compensation(model, TablesAsked(**asked)), targets, controls)
+    return tables(Compensation(model, TablesAsked(**asked)), targets, controls, filled)
 
 
 def one(found: Tables, ending: str) -> TableFile:

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from workbench.export import exported as module
-from workbench.export.exported import validation_line
+from workbench.export import validated as module
+from workbench.export.validated import validation_line
 
 DESIGN: Any = object()
 

@@ -9,13 +9,13 @@ import pytest
 
 from design.machine.documents import model_document
 from design.machine.source import Source
+from identification.drift.readings import Reading
 from identification.effects._library import built_in
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
 from workbench.cards.written_effect import written_effect
 from workbench.jobs.axis_history import by_quantity, earlier_of
-from workbench.jobs.judge import Reading
 from workbench.logs.sources import Sources
 from workbench.output import strict
 from workbench.registry.queue import Queue

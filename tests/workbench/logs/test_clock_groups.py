@@ -77,7 +77,8 @@ def test_pairs_are_read_on_one_clock(tmp_path: Path) -> None:
 
 
 def test_clocks_without_a_time_in_common_are_said_to_be(tmp_path: Path) -> None:
-    from workbench.logs.unknown import RawColumn, on_clock_of_most
+    from identification.columns.column import RawColumn
+    from workbench.logs.unknown import on_clock_of_most
 
     columns = [
         RawColumn(0, "a/t", "t", "", T, group="a"), RawColumn(1, "a/y", "y", "", Y, group="a"),

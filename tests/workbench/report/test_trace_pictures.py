@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.tracing.residual_rows import folded_at
 from identification.tracing.result import Residual
 from tests.workbench.trace_values import trace_of
 from workbench.report.fit import missing_chart
-from workbench.report.trace_pictures import folded_at, pictures
+from workbench.report.trace_pictures import pictures
 
 
 def test_a_swing_is_drawn_over_its_period_in_the_first_log() -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from design.machine.source import Source
+from design.measured.axis_limits import Allowed, own_limits
+from design.measured.axis_test import AxisTest, Earlier, judged
 from identification.errors import BadCard
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -16,14 +18,7 @@ from tests.screens import one_screen
 from workbench.cards.card_tables import CardFile, LimitsSection
 from workbench.logs.sources import Sources
 from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
-from workbench.steps.axis_limits import Allowed, own_limits
-from workbench.steps.axis_test import (
-    AxisTest,
-    Earlier,
-    axis_document,
-    axis_test,
-    judged,
-)
+from workbench.steps.axis_test import axis_document, axis_test_of_sources
 from workbench.steps.simulate import record
 
 
@@ -49,14 +44,14 @@ def lights(test: AxisTest) -> dict[str, str]:
 
 
 def test_within_the_limits_it_is_green() -> None:
-    test = axis_test(sources({"F_cp": (11.0, 13.0), "F_cn": (14.0, 16.0)}))
+    test = axis_test_of_sources(sources({"F_cp": (11.0, 13.0), "F_cn": (14.0, 16.0)}))
     assert test.light == "green" and test.reasons == ()
     assert lights(test)["F_cp"] == "green" and lights(test)["F_vp"] == ""
     assert axis_sentence(test).startswith("GREEN: paper_table1_rich is within its limits in 3 of 3")
 
 
 def test_surely_beyond_a_limit_it_is_red_and_says_by_which() -> None:
-    test = axis_test(sources({"F_cp": (8.0, 10.0), "F_cn": (14.0, 16.0)}))
+    test = axis_test_of_sources(sources({"F_cp": (8.0, 10.0), "F_cn": (14.0, 16.0)}))
     assert test.light == "red"
     (why,) = test.reasons
     assert why.startswith("Coulomb friction in positive direction is 1")
@@ -107,15 +102,15 @@ def test_few_logs_seldom_raise_a_light_without_reason() -> None:
 
 def test_a_past_of_other_friction_is_red_and_the_card_goes_first() -> None:
     past = earlier(F_cp=10.0, F_cn=15.0)
-    test = axis_test(sources(), past)
+    test = axis_test_of_sources(sources(), past)
     assert test.light == "red" and lights(test)["F_cn"] == "green"
     assert "above its last 30 sound logs' limit" in test.reasons[0]
     assert "% of their mean" in test.reasons[0]
-    assert axis_test(sources({"F_cp": (11.0, 13.0)}), past).light == "green"
+    assert axis_test_of_sources(sources({"F_cp": (11.0, 13.0)}), past).light == "green"
 
 
 def test_unequal_friction_is_not_called_a_constant_force() -> None:
-    test = axis_test(sources({"constant_force": (-0.5, 0.5)}))
+    test = axis_test_of_sources(sources({"constant_force": (-0.5, 0.5)}))
     one = test.of("constant_force")
     assert one.meaning.startswith("half the difference of F_cn and F_cp: unequal friction or")
     assert one.light == "red" and test.reasons[0].startswith(
@@ -125,10 +120,10 @@ def test_unequal_friction_is_not_called_a_constant_force() -> None:
 
 
 def test_without_limits_it_is_yellow_and_says_what_to_give() -> None:
-    test = axis_test(sources())
+    test = axis_test_of_sources(sources())
     assert test.light == "yellow" and "give --registry, or the card [limits]" in test.reasons[0]
     few = Earlier("short", {"F_cp": [(0.0, 12.0)]}, 1, None, "short has 1 tested logs")
-    assert "short has 1 tested logs" in axis_test(sources(), few).reasons[0]
+    assert "short has 1 tested logs" in axis_test_of_sources(sources(), few).reasons[0]
 
 
 def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:
@@ -136,7 +131,7 @@ def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:
     log = found.runs[0].log
     rough = 60.0 * np.sin(40.0 * log["t"])
     other = Log(log.name, {**log.signals, "F": log["F"] + rough})
-    test = axis_test(replace(found, runs=(replace(found.runs[0], log=other),)))
+    test = axis_test_of_sources(replace(found, runs=(replace(found.runs[0], log=other),)))
     assert test.light in ("red", "yellow")
     assert test.of("explained").light == "red" or test.of("F_cp").estimate.value is None
 
@@ -144,13 +139,15 @@ def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:
 def test_a_fit_of_the_model_in_force_goes_before_the_equation() -> None:
     own = {"F_cp": Estimate(9.0, "N", None, 8.9, 9.1), "backlash": Estimate(1e-4, "m")}
     past = replace(earlier(F_cp=9.0), estimates=own, remarks=("by the fit of version 3",))
-    test = axis_test(sources(), past)
+    test = axis_test_of_sources(sources(), past)
     assert test.of("F_cp").estimate.value == 9.0 and test.of("backlash").estimate.value == 1e-4
     assert test.light == "green" and test.remarks[0] == "by the fit of version 3"
 
 
 def test_its_document_page_and_screen(tmp_path: Path) -> None:
-    test = axis_test(sources({"F_cp": (8.0, 10.0)}), earlier(F_cp=12.0, F_cn=15.0, m=1.0))
+    test = axis_test_of_sources(
+        sources({"F_cp": (8.0, 10.0)}), earlier(F_cp=12.0, F_cn=15.0, m=1.0)
+    )
     document = axis_document(test)
     assert (
         document["light"] == "red" and document["quantities"]["F_cp"]["limits"]["source"] == "card"
@@ -164,7 +161,7 @@ def test_its_document_page_and_screen(tmp_path: Path) -> None:
     assert len(along.panels) == 1 and len(past.panels) == 2
     assert list(past.panels[0].lines[0].x) == [float(k) for k in range(-30, 1)]
     assert past.panels[0].bands[0].low == 8.0
-    assert len(axis_charts(axis_test(sources()))) == 1
+    assert len(axis_charts(axis_test_of_sources(sources()))) == 1
     text = one_screen(axis_view(test).screen(tmp_path))
     assert text.startswith("RED: ") and "written: " in text
 

@@ -15,6 +15,7 @@ from design.closed_loop.driven_loop import driven_loop, run_driven
 from design.closed_loop.linear_loop import corners, linear_of
 from design.controllers.design import effort_limit
 from design.controllers.validate import validate, validation_document
+from design.identified.identify import _actuator, _force_error, arx_plant, closed_loop_remarks
 from design.loop import LoopRun
 from design.machine.documents import design_document
 from design.machine.model import Model
@@ -34,7 +35,6 @@ from workbench.cards.recipe import RecipePID
 from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
-from workbench.steps.identify import _actuator, _force_error, arx_plant, closed_loop_remarks
 from workbench.steps.predict import PREDICTION_COLUMNS, prediction_frame
 from workbench.steps.simulate import record, truth
 

@@ -12,6 +12,8 @@ import pytest
 from design.machine.active_model import active_model
 from design.machine.documents import model_document
 from design.machine.model import ParameterCorrelation
+from design.measured.drift_of_logs import Drifted, Stream
+from design.measured.drift_of_logs import Tested as OneRun
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.drift.drift_test import DriftSettings
 from identification.drift.mewma import fresh_state
@@ -24,10 +26,7 @@ from workbench.cli import main
 from workbench.documents.result_files import read_model
 from workbench.output import dumps
 from workbench.report.drift import drift_sentence, reason_sentence
-from workbench.steps.drift import Drifted, Stream, model_key, read_stream
-from workbench.steps.drift import (
-    Tested as OneRun,
-)
+from workbench.steps.drift import model_key, read_stream
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification.columns.column import read_register
 from identification.errors import BadLog
 from workbench.logs.unknown import read_unknown
-from workbench.steps.first_card.column import read_register
 from workbench.steps.first_card.columns import columns_of
 from workbench.steps.first_card.proposal import Proposal, proposed
 from workbench.steps.first_card.remarks import no_body

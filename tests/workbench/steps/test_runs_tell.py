@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.identified.broken_promises import BROKEN, broken_promises
 from design.machine.documents import model_document
 from design.machine.model import Model
 from identification.model.karnopp import NAMES
@@ -16,7 +17,7 @@ from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines, runs_to_add
 from workbench.steps.doctor import examine
-from workbench.steps.identify_sources import BROKEN, Identified, broken_promises, identify_sources
+from workbench.steps.identify_sources import Identified, identify_sources
 
 CARD = f"""
 [card]

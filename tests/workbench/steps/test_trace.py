@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.identified import trace_logs as tracing
+from design.identified.trace_logs import traced_model
 from design.machine.documents import model_document
+from design.measured.friction_curve import sliding_friction
 from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.estimation.estimates import HELD, of_effect
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.signals.running_median import running_median
+from identification.tracing.residual_rows import effect_at_rows, log_starts, share_inside
 from identification.tracing.result import (
     Change,
     Dependence,
@@ -31,7 +36,6 @@ from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.result_files import read_model
 from workbench.output import dumps
-from workbench.report.friction import sliding_friction
 from workbench.report.trace import (
     changes_table,
     differences_table,
@@ -40,17 +44,9 @@ from workbench.report.trace import (
     rivals_table,
     traced_view,
 )
-from workbench.report.trace_pictures import (
-    axis_of,
-    effect_at_rows,
-    log_starts,
-    pictures,
-    running_median,
-    share_inside,
-)
+from workbench.report.trace_pictures import axis_of, pictures
 from workbench.report.trace_words import percent, trace_sentence
-from workbench.steps import trace as tracing
-from workbench.steps.trace import named_logs, trace_document, trace_sources, traced_model
+from workbench.steps.trace import named_logs, trace_document, trace_sources
 
 CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
@@ -106,7 +102,7 @@ def test_the_model_after_is_read_back_with_its_effects(tmp_path: Path) -> None:
 
 
 def test_a_force_without_noise_is_no_fault() -> None:
-    model = traced_model(replace(trace_of(), noise_force=0.0), sources(), built_in())
+    model = traced_model(replace(trace_of(), noise_force=0.0), sources().logs, built_in())
     assert model.fit.chi_square == 1.0
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from design.machine.nearest import nearest
+from identification.columns.column import COLUMN, Column
 from identification.errors import BadCard, UserError
 from workbench.cards.card import NEEDED_SIGNALS
 from workbench.cards.units import column_scale, over_time
 from workbench.cards.written_units import written_unit
-from workbench.steps.first_card.column import COLUMN, Column
 from workbench.steps.first_card.motion_guess import parts_of, written_gain
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
 

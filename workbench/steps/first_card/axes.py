@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from identification.arrays import Array
-from workbench.cards.headers import Header, meaning, says_purpose, words_of
-from workbench.cards.written_units import WrittenUnit
+from identification.columns.comparable import SAME_MOTION
+from identification.columns.header import Header, WrittenUnit, is_position, words_of
+from workbench.cards.headers import meaning, says_purpose
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 WORDS_OF_A_NAME = 3  # of an axis's name
-SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
 
 def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, str]:
@@ -88,18 +86,6 @@ def _positions(
     return tuple(word for word, _ in apart)
 
 
-def is_position(head: Header) -> bool:
-    """Whether a header speaks of a position that is measured."""
-    if head.purpose in ("reference", "error", "model"):
-        return False
-    if head.unit is not None:
-        counts = head.unit.quantity == "count" and (not head.means or "position" in head.means)
-        return counts or head.unit.quantity == "position"
-    if not head.means:
-        return head.purpose == "measured" and head.unit is None
-    return max(head.means, key=lambda what: head.means[what]) == "position"
-
-
 def as_position(head: Header) -> Header:
     """The header of a speed, as one of what the speed sums up to."""
     unit = head.unit
@@ -108,21 +94,3 @@ def as_position(head: Header) -> Header:
         number = unit.card.removesuffix(unit.plain)
         unit = WrittenUnit(number + whole, "position", unit.rotary)
     return replace(head, unit=unit, means={"position": head.means.get("velocity", 1.0)})
-
-
-def stem(head: Header) -> tuple[str, ...]:
-    """What a header says beside what its signal is for: "theta" of "target_theta"."""
-    return tuple(word for word in words_of(head.name) if not says_purpose(word))
-
-
-def normed(x: Array) -> Array:
-    """Columns (n, k) without their mean, of length one."""
-    a = x - x.mean(axis=0)
-    size = np.sqrt(np.sum(a**2, axis=0))
-    return np.asarray(a / np.where(size > 0.0, size, 1.0))
-
-
-def correlation(x: Array) -> Array:
-    """Correlation of the columns of x (n, k), (k, k)."""
-    a = normed(x)
-    return np.asarray(a.T @ a)

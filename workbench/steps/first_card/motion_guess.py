@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import Column, halved_counts
+from identification.columns.header import words_of
+from identification.columns.roles import Roles
 from identification.errors import BadCard
 from identification.log import Motion
 from identification.signals.relations import of_a_weight
-from workbench.cards.headers import words_of
 from workbench.cards.units import conversion
-from workbench.steps.first_card.column import Column, halved_counts
-from workbench.steps.first_card.roles import Roles
 
 USUAL: Mapping[str, Mapping[str, float]] = {  # signal: unit and how usual it is
     "t": {"s": 0.0, "ms": 0.0, "us": -0.7, "ns": -1.5},

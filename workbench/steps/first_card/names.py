@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import takewhile
 
-from workbench.cards.headers import Header, meaning, read_header, words_of
+from identification.columns.header import Header, words_of
+from workbench.cards.headers import meaning, read_header
 
 RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
 SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point

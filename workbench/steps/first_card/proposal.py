@@ -6,21 +6,22 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from design.identified.hardly_identifiable import ALL_FOLLOWED
+from identification.columns.column import Column
+from identification.columns.roles import Roles, known_roles, sign_shown_by
+from identification.columns.weights import SURE, said
 from identification.log import Motion, RigKind
+from identification.signals.delays import are_exchanged
 from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import read_header
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card import remarks
-from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns, columns_of
 from workbench.steps.first_card.motion_guess import UnitGuess, known_motion
 from workbench.steps.first_card.rig_guess import DRIVEN_BY, RigGuess, area_of, kind_guess, rig_of
-from workbench.steps.first_card.roles import Roles, known_roles, sign_shown_by
 from workbench.steps.first_card.sums import with_position, without_names
 from workbench.steps.first_card.unit_guess import guessed_units
-from workbench.steps.first_card.weights import SURE, said
-from workbench.steps.hardly_identifiable import ALL_FOLLOWED
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
@@ -220,7 +221,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
     out = []
     found = {"t": columns.clock, **roles.columns}
     behind = remarks.behind_reference(roles)
-    exchanged = {"r": "y", "y": "r"} if behind is not None and remarks.are_exchanged(behind) else {}
+    exchanged = {"r": "y", "y": "r"} if behind is not None and are_exchanged(behind) else {}
     for name in (name for name in CARD_ORDER if name in found):
         one, unit = found[name], units[name]
         sign = roles.signs.get(name, 1.0)

@@ -7,19 +7,20 @@ from itertools import permutations
 
 import numpy as np
 
+from identification.columns.column import Column
+from identification.columns.comparable import NEARLY_ALIKE
+from identification.columns.header import is_position, words_of
+from identification.columns.pairs import follows
+from identification.columns.roles import MOSTLY_ITS_LAW, Roles, are_constant
+from identification.columns.weights import SURE, said, together
 from identification.errors import BadLog
+from identification.signals.delays import are_exchanged
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import FEWEST_MOVING, force_law, lead, moving
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.cards.headers import words_of
-from workbench.steps.first_card.axes import is_position
-from workbench.steps.first_card.column import Column
-from workbench.steps.first_card.columns import NEARLY_ALIKE, PHASE_CURRENT, Columns
+from workbench.steps.first_card.columns import PHASE_CURRENT, Columns
 from workbench.steps.first_card.motion_guess import UnitGuess, factor
-from workbench.steps.first_card.pairs import follows
-from workbench.steps.first_card.roles import MOSTLY_ITS_LAW, Roles, are_constant
 from workbench.steps.first_card.unit_guess import contradicted_clock
-from workbench.steps.first_card.weights import SURE, said, together
 
 CONTROLLERS = {"controller", "pid", "pi", "pd", "regler", "regulator"}  # in a header
 DRIVING = ("F", "u", "p_p", "p_n")
@@ -90,11 +91,6 @@ def behind_reference(roles: Roles) -> float | None:
         return None
     found = lead(roles.columns["r"].x, roles.columns["y"].x)
     return found.samples if follows(found) else None
-
-
-def are_exchanged(behind: float) -> bool:
-    """Whether a position so many samples behind its reference comes before it."""
-    return behind < -1.0
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:

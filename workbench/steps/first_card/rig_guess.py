@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.columns.column import Column
+from identification.columns.roles import Roles
+from identification.columns.weights import SURE
 from identification.log import Motion
-from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import UnitGuess, factor
-from workbench.steps.first_card.roles import Roles
-from workbench.steps.first_card.weights import SURE
 
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.arrays import Array
+from identification.columns.column import BITS, Column
+from identification.columns.roles import Roles
 from identification.log import Motion
 from identification.signals.relations import derivative, lead
 from identification.thresholds import TWICE
-from workbench.steps.first_card.column import BITS, Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
     USUAL,
@@ -21,7 +22,6 @@ from workbench.steps.first_card.motion_guess import (
     metre,
     written_gain,
 )
-from workbench.steps.first_card.roles import Roles
 
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have

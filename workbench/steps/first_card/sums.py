@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.columns.column import Column
+from identification.columns.pairs import follows
+from identification.columns.roles import WORK_GIVES_SIGN, Roles, known_roles
+from identification.columns.ways import HEADER_SAYS
+from identification.columns.weights import EXPLAINED, NO_FRICTION, said
 from identification.signals.relations import lead
+from identification.signals.summed import summed
 from identification.thresholds import HALF
-from workbench.logs.times import summed
 from workbench.steps.first_card.axes import as_position
-from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
-from workbench.steps.first_card.pairs import follows
-from workbench.steps.first_card.roles import WORK_GIVES_SIGN, Roles, known_roles
-from workbench.steps.first_card.ways import HEADER_SAYS
-from workbench.steps.first_card.weights import EXPLAINED, NO_FRICTION, said
 
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 

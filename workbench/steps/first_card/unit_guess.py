@@ -12,10 +12,11 @@ from itertools import product
 
 import numpy as np
 
+from identification.columns.column import Column
+from identification.columns.roles import Roles
 from workbench.cards.headers import read_header
 from workbench.cards.units import force_unit
 from workbench.logs.layout import NUMBER, says_period
-from workbench.steps.first_card.column import Column
 from workbench.steps.first_card.columns import Columns
 from workbench.steps.first_card.motion_guess import (
     USUAL,
@@ -29,7 +30,6 @@ from workbench.steps.first_card.motion_guess import (
     unit_by_turn,
     written_gain,
 )
-from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.scale_guess import (
     DATA_SHEET,
     SENSOR_OUTPUTS,

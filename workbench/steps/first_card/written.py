@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.identified.hardly_identifiable import hardly_identifiable
 from identification.errors import UserError
 from identification.signals.renewal import HELD_FOR, RENEWED_AT
 from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal, SignalGuess
-from workbench.steps.hardly_identifiable import hardly_identifiable
 
 LEGEND = (
     '"sure" and "guess" say how well a line follows from the log; check each guess before you use',

@@ -1,0 +1,54 @@
+"""Model + logs -> what the model predicts of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from design.machine.model import Model
+from design.machine.plausible import refuse_other_machine, refuse_other_units
+from design.machine.source import MachineLogs
+from design.measured.predict import Prediction, pooled, predict
+from identification.model.estimates import Drive
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """The predictions of a log's runs, and what is said of them together, as `--json` prints it."""
+
+    runs: tuple[Prediction, ...]
+    summary: Mapping[str, Any]
+
+
+def predict_logs(
+    model: Model,
+    logs: MachineLogs,
+    where: str,
+    *,
+    drive: Drive | None = None,
+    window: float | None = None,
+) -> Predicted:
+    """What the model says of the runs of the logs; see `predict`.
+
+    where: what their card is called by. Raises BadModel where model and card are of unlike
+    machines, BadLog where a run is in other units than the model's logs, and as `predict` does.
+    """
+    refuse_other_machine(model.rig, logs.rig, where, "motion")
+    refuse_other_units(logs.logs, model.log, logs.rig)
+    found = tuple(predict(model, s.log, drive=drive, window=window) for s in logs.runs)
+    of_runs = dict.fromkeys(line for one in found for line in one.remarks)
+    refused = dict.fromkeys(one.refused for one in found if one.refused is not None)
+    names = ("position_rms", "force_predicted_rms", "force_simulated_rms")
+    other = []
+    if model.card != logs.card:
+        other = [f"the model is of {model.card}, the log of {logs.card}"]
+    return Predicted(
+        found,
+        {
+            "drive": found[0].drive,
+            "window": window,
+            "samples": sum(len(one.t) for one in found),
+            **{name: pooled((getattr(one, name), len(one.t)) for one in found) for name in names},
+            "run_refused": "; ".join(refused) or None,
+            "remarks": (*model.read, *logs.remarks, *other, *of_runs),
+        },
+    )
