@@ -67,7 +67,7 @@ def test_the_load_of_a_motor_is_found_by_its_command() -> None:
     motor = log.with_signals(u=log["F"])
     rig = Rig("motor", motion="rotary", force_per_command=1.0)
     fit = fit_plant([motor], np.random.default_rng(0), rig=rig)
-    assert fit.surroundings is not None and fit.surroundings.resonance is not None
+    assert fit.surroundings.resonance is not None
     assert fit.estimates["m"].value == pytest.approx(4e-3, rel=0.02)
 
 
