@@ -44,13 +44,16 @@ class Log:
     rig's command_unit], `r` reference [m]; any further
     name is a signal that effects may use. lost (n,): rows that the logger has lost, whose values
     lie between those of their neighbours. held: F is a zero-order hold, constant from each row to
-    the next. Arrays are read-only copies. Raises BadLog where the lengths differ or `t` is missing.
+    the next. of_place (n,): the part of F [N] that acts at a place, over each sample, and is not
+    commanded (gravity, cogging), None for none. Arrays are read-only copies. Raises BadLog where
+    the lengths differ or `t` is missing.
     """
 
     name: str
     signals: Mapping[str, Array]
     lost: BoolArray | None = None
     held: bool = False
+    of_place: Array | None = None
 
     def __post_init__(self) -> None:
         signals = {key: frozen(values) for key, values in self.signals.items()}
@@ -91,5 +94,12 @@ class Log:
 
     def part(self, start: int, stop: int) -> "Log":
         """Samples `start` to `stop` (exclusive) as a log of its own."""
+        own = {k: v[start:stop] for k, v in self.signals.items()}
         lost = None if self.lost is None else self.lost[start:stop]
-        return replace(self, signals={k: v[start:stop] for k, v in self.signals.items()}, lost=lost)
+        of_place = None if self.of_place is None else self.of_place[start:stop]
+        return replace(self, signals=own, lost=lost, of_place=of_place)
+
+    @property
+    def commanded(self) -> Array:
+        """F without what acts at a place, (n,) [N]."""
+        return self["F"] if self.of_place is None else self["F"] - self.of_place

@@ -103,14 +103,16 @@ class Surroundings:
         # What a measured current is until the next sample is its mean between both.
         behind, n = self.lag.value / log.h - 0.5 * self.sampled, len(log)
         y, at = np.asarray(log["y"]), np.arange(n)
-        force = np.interp(at - behind, at, log["F"]) + self.force.value + self.of_angle(y)
+        of_place = self.of_angle(y)
+        force = np.interp(at - behind, at, log["F"]) + self.force.value + of_place
         signals = {"F": force}
         if self.gives:
             signals["u"] = force / self.gives
         elif "u" in log:  # of an actuator: its force and command are of one instant
             signals["u"] = np.interp(at - behind, at, log["u"])
         whole = log.with_signals(**signals)
-        return replace(whole, held=log.held or self.held), behind
+        known = of_place if log.of_place is None else log.of_place + of_place
+        return replace(whole, held=log.held or self.held, of_place=known), behind
 
     @property
     def effects(self) -> tuple[Acting, ...]:

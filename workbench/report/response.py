@@ -125,6 +125,8 @@ def friction_line(found: Responded) -> str:
     if found.left_in is not None:
         return f"friction: left in the force, {found.left_in}"
     every = found.found
+    if not np.any(every.body.seen):
+        return "friction: subtracted from the force; no frequency is seen surely enough"
     upto = float(every.f[every.body.seen][-1])
     with_, without = (sure_share(one, upto) for one in (every.with_friction, every.body))
     return (

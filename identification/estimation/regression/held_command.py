@@ -80,7 +80,7 @@ def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
     """What a whole step to the next sample would add to the rows of a log, (r,); windows: of a
     motor's, by default those of sliding one way."""
     if one.held:
-        return np.asarray((windows or one.sliding).held @ _steps(one.log["F"]))
+        return np.asarray((windows or one.sliding).held @ _steps(one.log.commanded))
     assert one.whole is not None
     return np.asarray(one.whole.first @ (one.log.h * one.log["u"]))
 
@@ -100,18 +100,24 @@ def significant_share(share: float, sd: float, gain: float) -> float:
 def between_samples(log: Log, share: float, held: bool) -> Log:
     """The log with the mean command until the next sample in place of the logged one.
 
-    held: a motor's, so that its force is that mean too. Ours: `README.md`, (13).
+    held: a motor's, so that its force is that mean too, beside what acts at a place, which is of
+    each sample. Ours: `README.md`, (13).
     """
     if share == 0.0:
         return log
-    keys = ("u", "F") if held else ("u",)
     kernel = _mean_until_next(share)
-    means = {
-        key: np.convolve(np.pad(np.asarray(log[key], dtype=np.float64), (1, 2), "edge"), kernel,
-                         "valid")
-        for key in keys
-        if key in log
-    }  # fmt: skip
+
+    keys = [key for key in (("u", "F") if held else ("u",)) if key in log]
+    force, means = np.asarray(log["F"], dtype=np.float64), dict[str, Array]()
+    for key in keys:
+        x = np.asarray(log[key], dtype=np.float64)
+        of_place = np.zeros(len(x))
+        if (
+            log.of_place is not None
+        ):  # in the unit of a motor's command, which is its force over k_a
+            of_place = log.of_place * float(x @ x) / max(float(x @ force), 1e-300)
+        commanded = np.pad(x - of_place, (1, 2), "edge")
+        means[key] = np.convolve(commanded, kernel, "valid") + of_place
     return log.with_signals(**means)
 
 
@@ -151,7 +157,7 @@ def unseen(log: Log, share: float) -> float:
         return 0.0
     kernel = _mean_until_next(share)
     means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), kernel)
-    white = float(np.mean(np.diff(np.asarray(log["F"]), 3) ** 2)) / float(means @ means)
+    white = float(np.mean(np.diff(log.commanded, 3) ** 2)) / float(means @ means)
     R = min(1.0 / max(1.0 - 2.0 * share, 1e-9), FAR_FASTER)
     of_samples = kernel - np.array([0.0, 0.0, 1.0 / R, 0.0])
     return float(np.sqrt(white * ((R - 1.0) / R**2 + of_samples @ of_samples)))
