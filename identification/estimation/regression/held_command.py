@@ -108,14 +108,14 @@ def between_samples(log: Log, share: float, held: bool) -> Log:
     kernel = _mean_until_next(share)
 
     keys = [key for key in (("u", "F") if held else ("u",)) if key in log]
-    force, means = np.asarray(log["F"], dtype=np.float64), dict[str, Array]()
+    means = dict[str, Array]()
     for key in keys:
         x = np.asarray(log[key], dtype=np.float64)
         of_place = np.zeros(len(x))
         if (
             log.of_place is not None
         ):  # in the unit of a motor's command, which is its force over k_a
-            of_place = log.of_place * float(x @ x) / max(float(x @ force), 1e-300)
+            of_place = log.of_place * float(x @ x) / max(float(x @ log["F"]), 1e-300)
         commanded = np.pad(x - of_place, (1, 2), "edge")
         means[key] = np.convolve(commanded, kernel, "valid") + of_place
     return log.with_signals(**means)
