@@ -7,34 +7,39 @@ Computer-Controlled Systems (1997), 8.2), which passes for viscous friction.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from identification.estimation.sliding_likelihood import sliding_likelihoods
 from identification.log import Log
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
 from identification.thresholds import BEYOND_CHANCE
 
-UNTIL_ITS_ROW = -1.0  # samples, by which the motion follows a force that is constant until its row
+# Samples, by which the motion follows the force, and whether that is held: constant from its row
+# on, or until its row; a line through its samples that looks like either.
+HOLDS = ((0.0, True), (-1.0, True))
+HALF_A_SAMPLE_LATE = ((0.5, False), (-0.5, False))
 
 
 def whole_samples_late(logs: Sequence[Log], lag: float, *, rotary: bool) -> float | None:
     """By how many whole samples the motion follows a column of force [N] that is constant from each
     row to the next: 0 or -1 (until its row); None where the position measured while the body slides
-    is not significantly likelier so than by a line through the samples.
+    is not significantly likelier so than by a line through the samples, or significantly less than
+    by one that is half a sample late, as which a smooth force that is held looks.
 
-    lag: in samples, at which such a line is tried too. Source: `sliding_likelihood`.
+    lag: in samples, at which a line is tried too. Source: `sliding_likelihood`.
     """
-    lines = tuple(dict.fromkeys([(0.0, False), (lag, False)]))
-    tried = (*lines, (0.0, True), (UNTIL_ITS_ROW, True))
+    tried = ((0.0, False), (lag, False), *HOLDS, *HALF_A_SAMPLE_LATE)
     variants = []
-    for behind, held in tried:
+    for behind, held in dict.fromkeys(tried):
         late = Surroundings(Size(behind * logs[0].h), held=held)
         variants.append([replace(late.of_one_instant(log), held=held) for log in logs])
-    likely = sliding_likelihoods(variants, motor=False, rotary=rotary)
-    if likely is None:
+    found = sliding_likelihoods(variants, motor=False, rotary=rotary)
+    if found is None:
         return None
-    gain = 2.0 * float(np.max(likely) - np.max(likely[: len(lines)]))
-    if gain <= BEYOND_CHANCE**2:
+    likely = dict(zip(dict.fromkeys(tried), found.tolist(), strict=True))
+    best = max(HOLDS, key=lambda one: likely[one])
+    surely = 0.5 * BEYOND_CHANCE**2  # nats
+    line = max(likely[one] for one in tried[:2])
+    half = max(likely[one] for one in HALF_A_SAMPLE_LATE)
+    if likely[best] - line <= surely or half - likely[best] > surely:
         return None
-    return tried[int(np.argmax(likely))][0]
+    return best[0]

@@ -30,7 +30,7 @@ RULE = "identification/estimation/estimates.py"
 # turns the interval that the rule gave.
 DIFFERENCES = {
     "workbench/steps/drift.py",
-    "workbench/steps/axis_test.py",
+    "design/measured/axis_test.py",
     "workbench/jobs/axis_history.py",
 }
 PARAMS = [(key, p) for key, effect in sorted(built_in().items()) for p in effect.params]
