@@ -42,7 +42,8 @@ def judgement(held: HeldOut) -> Trace:
     doubts = [*_doubts(held)]
     known = not doubts and (bool(choice.steps) or not lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
-    if held.lacking and held.seen and not (doubts or choice.steps or after.imposed):
+    levels_alone = held.lacking and not held.lacks_force  # a force of account is no other level
+    if levels_alone and held.seen and not (doubts or choice.steps or after.imposed):
         told = before.plant.friction if after.fit is None else after.fit.friction
         levels, how = levels_refitted(
             before.plant, told, held.logs, held.seen, held.drive, plain.recorded.rig
