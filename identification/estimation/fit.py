@@ -28,7 +28,7 @@ from identification.estimation.imposed_motion import (
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import (
     RecordedLogs,
-    chosen_drive,
+    acts_directly,
     commanded,
     led_by_rig,
     recorded_logs,
@@ -131,8 +131,7 @@ def fit_beside(
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
     if shows and not (fit.adequate or beside.orders or halt.reached()):
-        direct = rig.kind == "motor" or chosen_drive(alone, rig, drive) == "force"
-        resonance = two_masses(alone, rig) if direct else None
+        resonance = two_masses(alone, rig) if acts_directly(alone, rig, drive) else None
         if resonance is not None:
             beside, fit = replace(beside, resonance=resonance), of_two_masses(fit, resonance)
     if halt.reached():

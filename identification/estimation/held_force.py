@@ -27,18 +27,19 @@ def whole_samples_late(logs: Sequence[Log], lag: float, *, rotary: bool) -> floa
 
     lag: in samples, at which a line is tried too. Source: `sliding_likelihood`.
     """
-    tried = ((0.0, False), (lag, False), *HOLDS, *HALF_A_SAMPLE_LATE)
+    lines = ((0.0, False), (lag, False))
+    tried = dict.fromkeys((*lines, *HOLDS, *HALF_A_SAMPLE_LATE))
     variants = []
-    for behind, held in dict.fromkeys(tried):
+    for behind, held in tried:
         late = Surroundings(Size(behind * logs[0].h), held=held)
         variants.append([replace(late.of_one_instant(log), held=held) for log in logs])
-    found = sliding_likelihoods(variants, motor=False, rotary=rotary)
+    found = sliding_likelihoods(variants, rotary=rotary)
     if found is None:
         return None
-    likely = dict(zip(dict.fromkeys(tried), found.tolist(), strict=True))
+    likely = dict(zip(tried, found.tolist(), strict=True))
     best = max(HOLDS, key=lambda one: likely[one])
     surely = 0.5 * BEYOND_CHANCE**2  # nats
-    line = max(likely[one] for one in tried[:2])
+    line = max(likely[one] for one in lines)
     half = max(likely[one] for one in HALF_A_SAMPLE_LATE)
     if likely[best] - line <= surely or half - likely[best] > surely:
         return None

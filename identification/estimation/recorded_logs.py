@@ -270,6 +270,12 @@ def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:
     return "command" if logged and explains_force(logs) else "force"
 
 
+def acts_directly(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> bool:
+    """Whether the force acts on the body without an actuator between: a motor's, or a measured one
+    that drives its runs."""
+    return rig.kind == "motor" or chosen_drive(logs, rig, drive) == "force"
+
+
 def commanded(logs: Sequence[Log]) -> bool:
     """Whether every log has a command that is not constant."""
     return all("u" in log and np.ptp(log["u"]) > 0 for log in logs)

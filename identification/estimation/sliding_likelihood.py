@@ -37,29 +37,25 @@ class _Fitted:
     slowest: float
 
 
-def sliding_likelihoods(
-    variants: Sequence[Sequence[Log]], *, motor: bool, rotary: bool
-) -> Array | None:
+def sliding_likelihoods(variants: Sequence[Sequence[Log]], *, rotary: bool) -> Array | None:
     """Logarithm of the likelihood [nats] of every variant (v,), over the same samples; None where
-    one of them shows no inertia, or too little slides.
-
-    motor: whether the force is a motor's, which is held; of others each log says so. Source: as of
-    the module.
+    one of them shows no inertia, or too little slides. Each log says whether its measured force is
+    held. Source: as of the module.
     """
-    fits = [one for logs in variants if (one := _fitted(logs, motor, rotary)) is not None]
+    fits = [one for logs in variants if (one := _fitted(logs, rotary)) is not None]
     if len(fits) < len(variants):
         return None
     slowest = max(one.slowest for one in fits)
     return np.array([latent_forces(one.plant, one.logs, slowest).log_likelihood for one in fits])
 
 
-def _fitted(logs: Sequence[Log], motor: bool, rotary: bool) -> _Fitted | None:
+def _fitted(logs: Sequence[Log], rotary: bool) -> _Fitted | None:
     """What the equation of motion says of logs; None where it shows no inertia."""
     try:
-        moved = [motion_log(log, held=motor, by_command=False) for log in logs]
+        moved = [motion_log(log, held=False, by_command=False) for log in logs]
     except UserError:
         return None
-    found = lagged_rows(moved, NO_LAG, True, motor or logs[0].held)
+    found = lagged_rows(moved, NO_LAG, True, logs[0].held)
     if found is None or inertia_has_no_part(moved):
         return None
     theta = found.left(found.every, WITH_PLACE[rotary])[1][:, 0]

@@ -19,7 +19,7 @@ from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
 from identification.estimation.held_force import whole_samples_late
-from identification.estimation.recorded_logs import chosen_drive
+from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
@@ -77,7 +77,7 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     Gautier, Khalil, CDC 1988; deviations, Tukey (1958).
     """
     orders: tuple[Order, ...] = ()
-    if rig.kind == "motor" or chosen_drive(logs, rig, None) == "force":
+    if acts_directly(logs, rig):
         orders = turn_orders(logs, rig)
     gives = rig.force_per_command if rig.kind == "motor" else None
     known = Surroundings(orders=orders, gives=gives)
@@ -97,8 +97,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     except UserError:
         return NO_SURROUNDINGS
     # Between an actuator's command and the torque that it makes, gravity is an effect as any other.
-    direct = held or chosen_drive(logs, rig, None) == "force"
-    turns = direct and max(float(np.ptp(log["y"])) for log in logs) > TURNS
+    turns = acts_directly(logs, rig) and max(float(np.ptp(log["y"])) for log in logs) > TURNS
     turns = turns and rig.motion == "rotary"
     looked = _looked_far(moved, turns, held, known)
     if looked is None:

@@ -58,7 +58,7 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
         return None
     every = signals_at(choice.end, equation)
     way = upward(choice.end, equation, every)[keep]
-    motor = _by_motor(choice.end.logs)
+    motor = all(one.by_motor for one in choice.end.logs)
     if equation == BREAKAWAY:  # force and command at breakaway are what is judged
         every = {k: v for k, v in every.items() if k not in ("F", "u", "v", "reversal")}
     if equation == MECHANICAL:
@@ -99,11 +99,6 @@ def upward(stage: EffectRows, equation: str, signals: Mapping[str, Array]) -> Bo
 def _mean(r: Array) -> float:
     """Mean, 0 of nothing."""
     return float(np.mean(r)) if len(r) else 0.0
-
-
-def _by_motor(logs: Sequence[MotionLog]) -> bool:
-    """Whether a motor drives the body, whose force is its command held."""
-    return all(one.held and "u" in one.log for one in logs)
 
 
 def _with_command(names: tuple[str, ...], motor: bool) -> tuple[str, ...]:
@@ -178,7 +173,8 @@ def in_run(
     if not told:
         return Dependence((), 0.0)
     named = tuple(dict.fromkeys(name for one in told for name in one.depends_on))
-    return replace(told[0], depends_on=_with_command(named, _by_motor(logs)))
+    motor = all(one.by_motor for one in logs)
+    return replace(told[0], depends_on=_with_command(named, motor))
 
 
 def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:

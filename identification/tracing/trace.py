@@ -14,7 +14,7 @@ from identification.effects._library import Library
 from identification.errors import NotIdentifiable
 from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
-from identification.estimation.recorded_logs import chosen_drive
+from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.run_or_equation import STEPS_WHY
 from identification.estimation.structure_fit import FittedStructure
@@ -103,8 +103,7 @@ def trace(
     if beside.sampled:  # a measured current, which no period holds
         told = replace(told, command_period=0.0)
     elastic = told.verdict == "unknown" and not told.effects and not halt.reached()
-    direct = rig.kind == "motor" or chosen_drive(train, rig, None) == "force"
-    if not (elastic and direct):
+    if not (elastic and acts_directly(train, rig)):
         return told
     resonance = two_masses(train, rig)
     if resonance is None:

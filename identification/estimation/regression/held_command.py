@@ -112,9 +112,8 @@ def between_samples(log: Log, share: float, held: bool) -> Log:
     for key in keys:
         x = np.asarray(log[key], dtype=np.float64)
         of_place = np.zeros(len(x))
-        if (
-            log.of_place is not None
-        ):  # in the unit of a motor's command, which is its force over k_a
+        if log.of_place is not None:
+            # In the unit of a motor's command, which is its force over k_a.
             of_place = log.of_place * float(x @ x) / max(float(x @ log["F"]), 1e-300)
         commanded = np.pad(x - of_place, (1, 2), "edge")
         means[key] = np.convolve(commanded, kernel, "valid") + of_place

@@ -14,12 +14,13 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.structure_fit import FittedStructure, band
-from identification.tracing import held_out
+from identification.tracing import held_out, judgement
+from identification.tracing.free_run.backward_elimination import only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.model_errors import OnTest
 from identification.tracing.predictive_check import Worse
 from identification.tracing.regression.stepwise import choose
-from identification.tracing.result import MissingForce, Residual, Trace
+from identification.tracing.result import Change, MissingForce, Residual, Trace
 from identification.tracing.trace import trace
 from identification.tracing.verdict import parameters_before
 from tests.identification.motor_logs import NINE, made, plant, seen
@@ -198,3 +199,16 @@ def test_no_effect_of_an_actuator_is_proved_by_the_force_that_a_body_lacks(
     sliding = Residual("mechanical", n, n, n, n, n, {})
     found = held._force_left(MissingForce(latent(2.0, 0.1), latent(0.02, 0.001), sliding))
     assert (found is None) == measured
+
+
+@pytest.mark.parametrize(("lacks_force", "verdict"), [(False, "drift"), (True, "unknown")])
+def test_other_levels_are_no_drift_where_a_force_of_account_is_missing(
+    lacks_force: bool, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind an elastic shaft any level follows better than another."""
+    held = judged()
+    none = replace(held, model=held.plain.model, choice=only(held.choice, ()), seen=held.logs)
+    vars(none).update(lacks_force=lacks_force, lacking=True)
+    level = Change("F_cp", "N", 15.0, 16.0, 0.1)
+    monkeypatch.setattr(judgement, "levels_refitted", lambda *_: ((level,), "how"))
+    assert judgement.judgement(none).verdict == verdict

@@ -215,10 +215,8 @@ def test_a_slower_test_log_is_no_drift_of_the_mass() -> None:
     assert found.verdict == "none", found.drift
 
 
-@pytest.mark.slow
-def test_an_effect_of_slow_motion_that_the_test_log_alone_has_is_no_drift() -> None:
-    """Friction that falls from 15 to 10 N over 30 mm/s: quick training strokes do not show it, and
-    the trace ended with "nothing is missing", or with friction that had "changed"."""
+def quick_and_slow() -> tuple[Log, Log]:
+    """Quick strokes and slow ones of a body whose friction falls from 15 to 10 N over 30 mm/s."""
     stribeck = {"stribeck": {"F_s": 5.0, "v_s": 0.03}}
     even = Karnopp(2.5, 10.0, 10.0, 120.0, 120.0, 1e-3, -1e-3, 15.0, -15.0)
     t = H * np.arange(15_000, dtype=np.float64)
@@ -227,11 +225,28 @@ def test_an_effect_of_slow_motion_that_the_test_log_alone_has_is_no_drift() -> N
         driven(seed, size * swelling * np.sin(2 * np.pi * f * t), even, stribeck)
         for seed, size, f in ((61, 0.3, 0.9), (62, 0.04, 0.12))
     )
-    found = traced(quick, slow)
+    return quick, slow
+
+
+@pytest.mark.slow
+def test_an_effect_of_slow_motion_that_the_test_log_alone_has_is_no_drift() -> None:
+    """Quick training strokes do not show it, and the trace ended with "nothing is missing", or with
+    friction that had "changed"."""
+    found = traced(*quick_and_slow())
     (one,) = found.effects
     assert one.effect.key == "stribeck" and not found.drift
     assert one.params["F_s"].value == pytest.approx(5.0, rel=0.02)
     assert any("first half" in remark for remark in found.remarks)
+
+
+@pytest.mark.slow
+def test_what_the_test_log_alone_lacks_is_looked_for_there() -> None:
+    """Of an effect that is in no library: what is left of the training log depends on nothing."""
+    quick, slow = quick_and_slow()
+    constant = {"constant_force": built_in()["constant_force"]}
+    found = traced(quick, slow, library=constant)
+    assert found.verdict == "unknown" and not found.effects
+    assert "v" in found.unknown.depends_on
 
 
 def driven(seed: int, u: Array, plain: Karnopp, effects: Mapping[str, Mapping[str, float]]) -> Log:
