@@ -28,9 +28,10 @@ from pathlib import Path
 
 from benchmarks.init_cases import Case, make_case
 from benchmarks.init_judge import wrong_lines
+from design.first_card.proposal import Proposal
 from identification.errors import UserError
 from workbench.logs.sources import DATA_VARIABLE
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.init_cases import Case
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.log import Log
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_log
-from workbench.steps.first_card.proposal import Proposal
 from workbench.steps.first_card.written import written
 
 SLOPE = 5e-3  # of one, that half the slope may be off

@@ -29,10 +29,11 @@ import numpy as np
 from benchmarks.init_cases import Case
 from benchmarks.init_judge import wrong_lines
 from benchmarks.init_table_words import KINDS, LANGUAGES, Kind
+from design.first_card.answers import THE_OTHER, BadAnswer, with_rig
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import UserError
-from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed, with_signal
 
 UNIT: Mapping[str, float] = {
     "rad": 1.0, "deg": np.pi / 180, "m": 1.0, "mm": 1e-3, "rad/s": 1.0, "deg/s": np.pi / 180,

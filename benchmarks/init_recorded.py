@@ -18,10 +18,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from design.first_card.answers import THE_OTHER, BadAnswer, with_rig
+from design.first_card.proposal import Proposal
 from identification.errors import UserError
 from workbench.logs.sources import DATA_VARIABLE
-from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed, with_signal
 from workbench.steps.first_card.written import checked_proposal
 
 Signal = tuple[str | int, str]  # column, and unit ("": in no log)

@@ -1,1 +1,2 @@
-"""Which column of a log is which signal: by what its header means, and by what the columns do."""
+"""Which column of a log is which signal, and in which unit: by what its header means, and by
+what the columns do."""

@@ -19,6 +19,10 @@ _ADDRESS = re.compile(r"(?<!\w)0x[0-9a-f]+", re.I)
 _GREEK = str.maketrans({"θ": "theta", "φ": "phi", "ω": "omega", "τ": "tau", "α": "alpha",
                         "β": "beta", "ψ": "psi"})  # fmt: skip
 SAYS_WHAT_IT_IS = 3.0  # weight of a word that does
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
+_WORDS_OF_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "xincrement",
+                     "interval", "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
+_TWO_OF_PERIODS = {("delta", "x"), ("delta", "t"), ("sample", "time"), ("sampling", "time")}
 
 
 @dataclass(frozen=True)
@@ -88,3 +92,9 @@ def words_of(name: str) -> list[str]:
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
         small = small.replace(umlaut, two)
     return [one for one in re.split(r"[\W_]+", small) if one]
+
+
+def says_period(name: str) -> bool:
+    """Whether a name is one of the time from row to row."""
+    words = words_of(name)
+    return bool(_WORDS_OF_PERIODS & set(words)) or tuple(words[:2]) in _TWO_OF_PERIODS

@@ -9,7 +9,8 @@ import pytest
 from benchmarks.init_cases import Case, make_case
 from benchmarks.init_judge import wrong_lines
 from benchmarks.init_words import WORDS
-from workbench.steps.first_card.proposal import Proposal, proposed
+from design.first_card.proposal import Proposal
+from workbench.steps.first_card.proposal import proposed
 
 FORCE = 10  # a seed whose file is of a force-driven machine and has t, r, y, F and u
 

@@ -13,7 +13,7 @@ from workbench.screen import JSON, is_given
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
-    from workbench.steps.first_card.proposal import Proposal
+    from design.first_card.proposal import Proposal
 
 CARD = "card.toml"
 
@@ -96,7 +96,7 @@ def _asked(of: "Proposal") -> "Proposal":
 
 def _asked_signal(of: "Proposal", name: str) -> "Proposal":
     """The proposal after a question on one of its signals, asked until the answer can be one."""
-    from workbench.steps.first_card.answers import with_signal
+    from workbench.steps.first_card.proposal import with_signal
 
     one = of.signal(name)
     assert one is not None
@@ -107,7 +107,7 @@ def _asked_signal(of: "Proposal", name: str) -> "Proposal":
 
 def _asked_rig(of: "Proposal", key: str) -> "Proposal":
     """The proposal after a question on a value of its rig, asked until the answer can be one."""
-    from workbench.steps.first_card.answers import with_rig
+    from design.first_card.answers import with_rig
 
     guess = next(one for one in of.rig if one.key == key)
     value = "nothing" if guess.value is None else guess.value
@@ -118,7 +118,7 @@ def _asked_rig(of: "Proposal", key: str) -> "Proposal":
 
 def _answered(said: str, changed: "Callable[[str], Proposal]") -> "Proposal":
     """The proposal changed by the first answer that can be one."""
-    from workbench.steps.first_card.answers import BadAnswer
+    from design.first_card.answers import BadAnswer
 
     while True:
         try:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from design.machine.nearest import nearest
+from identification.columns.header import NUMBER
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.channels import optional
-from workbench.logs.layout import NUMBER, Layout, find_layout
+from workbench.logs.layout import Layout, find_layout
 from workbench.logs.table import RawColumn, Table, refuse_long
 
 _BOOK_BYTES = 100_000_000

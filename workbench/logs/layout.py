@@ -9,12 +9,10 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.columns.header import words_of
+from identification.columns.header import NUMBER, says_period, words_of
 from identification.thresholds import HALF
 from workbench.cards.written_units import written_unit
 from workbench.logs.times import is_time
-
-NUMBER = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 
 _IN_A_ROW = 3  # lines of data that show where it begins
 _DATA_SHARE = 0.5  # of a line's fields above which numbers and times make it a line of data
@@ -24,9 +22,6 @@ _TYPE_OR_UNIT = re.compile(
     r"(?:L?REAL|FLOAT|DOUBLE|U?[SDL]?INT|BOOL|BIT|BYTE|D?WORD|TIME)(?:8|16|32|64)?|"
     r"double|float|int(?:8|16|32|64)?"
 )
-_WORDS_OF_PERIODS = {"ts", "dt", "timestep", "period", "tsample", "increment", "xincrement",
-                     "interval", "takt", "taktzeit", "abtastzeit", "zykluszeit"}  # fmt: skip
-_TWO_OF_PERIODS = {("delta", "x"), ("delta", "t"), ("sample", "time"), ("sampling", "time")}
 _RATES = {"rate", "samplerate", "abtastrate", "fs"}
 _DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
 _COMMENT = re.compile(r"\s*(?:%+|//|!|;)\s*")  # of programs whose comments begin otherwise
@@ -130,12 +125,6 @@ def _keyed_units(line: Sequence[str]) -> tuple[str, ...]:
     own = tuple(map(_bare, line[1:]))
     known = all(written_unit(one) for one in own if one) and any(own)
     return ("", *own) if known and "unit" in line[0].casefold() else ()
-
-
-def says_period(name: str) -> bool:
-    """Whether a name is one of the time from row to row."""
-    words = words_of(name)
-    return bool(_WORDS_OF_PERIODS & set(words)) or tuple(words[:2]) in _TWO_OF_PERIODS
 
 
 def period_above(lines: Sequence[Sequence[str]]) -> tuple[str, float, str] | None:

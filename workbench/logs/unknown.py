@@ -1,11 +1,10 @@
-"""A log that no card describes yet: its layout found by looking, its columns as numbers, those of
-several clocks brought to one of these."""
+"""A log that no card describes yet: its layout found by looking, its columns as numbers."""
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -14,77 +13,18 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.columns.column import RawColumn
+from identification.columns.log_columns import UnknownLog
+from identification.columns.several_clocks import on_clock_of_most
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import read_header
 from workbench.files import refuse_larger
+from workbench.logs.notation import NOTATION
 from workbench.logs.packed import TEXT_BYTES, text_bytes
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, checked_format, read_table
 from workbench.logs.times import numbers_in, seconds
-
-FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
-LEAST_COMMON = 0.5  # of the clock's span, that another one shares
-
-
-def on_clock_of_most(columns: Sequence[RawColumn], clocks: Mapping[str, int]) -> list[RawColumn]:
-    """The columns on the clock of one group: that of most columns, of equal ones the slowest.
-
-    clocks: the column of a group's clock, where that is known; else one that rises, of the same
-    name in each. Columns of one group are passed on as they are; those of a group without a clock,
-    or whose clock has no time in common, are unusable.
-    """
-    groups = list(dict.fromkeys(one.group for one in columns))
-    times = {name: one for name in groups if (one := _clock(name, columns, clocks)) is not None}
-    if len(groups) < 2 or not times:
-        return list(columns)
-    period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
-    quick = [name for name in times if period[name] <= FAR_SLOWER * min(period.values())]
-    many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
-    base = times[max(quick, key=lambda name: (many[name], period[name]))]
-    known = np.isfinite(base.values)
-    moved = [_moved(one, times.get(one.group), base) for one in columns]
-    return [replace(one, values=one.values[known]) if len(one.values) == len(known) else one
-            for one in moved]  # fmt: skip
-
-
-def _clock(group: str, columns: Sequence[RawColumn], clocks: Mapping[str, int]) -> RawColumn | None:
-    """The clock of a group; None where no column of it rises."""
-    if group in clocks:
-        return next((one for one in columns if one.number == clocks[group]), None)
-    own = [one for one in columns if one.group == group and not one.unusable]
-    own = [one for one in own if len(one.values) >= SHORTEST_LOG and _rises(one.values)]
-    return max(own, key=lambda one: read_header(one.header).means.get("time", 0.0), default=None)
-
-
-def _rises(x: Array) -> bool:
-    known = x[np.isfinite(x)]
-    return len(known) >= SHORTEST_LOG and bool(np.all(np.diff(known) > 0.0))
-
-
-def _moved(one: RawColumn, own: RawColumn | None, base: RawColumn) -> RawColumn:
-    """A column at the times of the base clock, NaN where it has none."""
-    if own is None:
-        return replace(one, unusable=one.unusable or "has no clock")
-    if own is base or one.unusable or np.array_equal(own.values, base.values, equal_nan=True):
-        return one
-    if len(one.values) != len(own.values):
-        return replace(one, unusable="has not the length of its clock")
-    known = np.isfinite(own.values) & np.isfinite(one.values)
-    if np.count_nonzero(known) < SHORTEST_LOG:
-        return replace(one, unusable="has hardly a number beside its clock")
-    t, x = own.values[known], one.values[known]
-    to = base.values
-    values = np.interp(to, t, x, left=np.nan, right=np.nan)
-    values[~np.isfinite(to)] = np.nan
-    if np.mean(np.isfinite(values)) < LEAST_COMMON:
-        why = f"its clock {own.header!r} has hardly a time in common with {base.header!r}"
-        return replace(one, values=values, unusable=why)
-    if one is own:
-        return replace(one, values=values, unusable=f"the clock of {one.group!r}")
-    return replace(one, values=values)
-
 
 ONE_ROW = 1  # by which vectors of one log may differ in length
 _OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
@@ -97,17 +37,6 @@ _FRAMES = re.compile(  # as candump prints them, with and without -L
 _ONLY_DATES = "dates, not numbers"
 _ENCODINGS = ("utf-8", "gb18030", "cp932", "cp1252", "latin-1")
 _FIRST_LINES, _FEWEST_SPOKEN = 40, 2  # of a text, in which so many Chinese headers are known
-
-
-@dataclass(frozen=True, eq=False)
-class UnknownLog:
-    """The columns of a file, how it is read, single values beside them, and what else it holds."""
-
-    path: Path
-    spec: FileSpec
-    columns: tuple[RawColumn, ...]
-    scalars: tuple[RawColumn, ...]
-    notes: tuple[str, ...] = ()
 
 
 def read_unknown(path: Path) -> UnknownLog:
@@ -153,7 +82,7 @@ def read_unknown(path: Path) -> UnknownLog:
         found.append(one)
         if np.count_nonzero(known := np.isfinite(values)) == 1:  # a period, in the first row alone
             scalars.append(replace(found.pop(), header=table.names[number], values=values[known]))
-    found = on_clock_of_most(found, table.clocks)
+    found = on_clock_of_most(found, table.clocks, NOTATION)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)
     if longest < SHORTEST_LOG:
         many = f"{longest} rows of numbers" if longest else "no column of numbers"
@@ -162,7 +91,8 @@ def read_unknown(path: Path) -> UnknownLog:
     shortest = min((len(one.values) for one in same), default=0)
     same = [replace(one, values=one.values[:shortest]) for one in same]
     notes = tuple(one for one in (said, *table.remarks) if one)
-    return UnknownLog(path, spec, tuple(same), tuple(scalars), notes)
+    layout = spec.model_dump(exclude_defaults=True)
+    return UnknownLog(str(path), layout, tuple(same), tuple(scalars), notes)
 
 
 def _plain_names(table: Table, form: Format) -> tuple[str, ...]:

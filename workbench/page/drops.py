@@ -27,7 +27,7 @@ from workbench.page.work import shown_tasks
 from workbench.registry.tables import UploadRow
 
 if TYPE_CHECKING:
-    from workbench.steps.first_card.proposal import Proposal
+    from design.first_card.proposal import Proposal
 
 
 FORM_FILE = "form.json"
@@ -174,9 +174,8 @@ def form_of(of: "Proposal", file: str) -> CardForm:
     why |= {f"column_{one.name}": (one.sure, one.why) for one in of.signals}
     columns = [(json.dumps(one.raw.key), one.raw.header or one.shown) for one in of.columns]
     unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
-    layout = of.spec.model_dump(exclude_defaults=True)
     remarks = [*of.hardly, *of.remarks, *unused]
-    return CardForm(_fields(of), columns, why, remarks, layout, _others(of))
+    return CardForm(_fields(of), columns, why, remarks, dict(of.layout), _others(of))
 
 
 def _field(key: str) -> str:
@@ -200,7 +199,8 @@ def _fields(of: "Proposal") -> dict[str, str]:
 
 def _others(of: "Proposal") -> dict[str, tuple[str, Mapping[str, str]]]:
     """By the field of each guess that has another, this in words, and the fields that change."""
-    from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
+    from design.first_card.answers import THE_OTHER, BadAnswer, with_rig
+    from workbench.steps.first_card.proposal import with_signal
 
     before, out = _fields(of), dict[str, tuple[str, Mapping[str, str]]]()
     guesses: list[tuple[str, str, Callable[[Proposal, str, str], Proposal], str]]

@@ -19,12 +19,12 @@ from identification.errors import UserError
 from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
+    from design.first_card.proposal import Proposal
     from design.machine.design import Design
     from design.machine.model import Identifiable
     from identification.arrays import Array
-    from workbench.logs.unknown import UnknownLog
+    from identification.columns.log_columns import UnknownLog
     from workbench.report.chart import Colour, LineStyle
-    from workbench.steps.first_card.proposal import Proposal
 
 MOST_COLUMNS = 12  # that the first picture shows
 FIRST_POINTS = 8000  # of each column's line, every peak kept

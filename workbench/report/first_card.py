@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from design.first_card.proposal import Proposal, SignalGuess
+from design.first_card.rig_guess import RigGuess
 from workbench.output import next_step
 from workbench.screen import Row, Screen, listed, screen, tabled
-from workbench.steps.first_card.proposal import Proposal, SignalGuess
-from workbench.steps.first_card.rig_guess import RigGuess
 
 MOST_LEFT_OUT = 5  # columns that one screen names
 
@@ -20,7 +20,7 @@ def proposal_view(of: Proposal, card: Path) -> Screen:
     left_out = (f"left out: {shown} ({why})" for shown, why in of.unused.items())
     return screen(
         f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}.",
-        next_step(f"workbench doctor {of.path} --card {card}"),
+        next_step(f"workbench doctor {of.log} --card {card}"),
         *([refused] if of.refused else []),
         listed(f"hardly identifiable: {line}" for line in of.hardly),
         tabled(("", "column or value", "unit", "", "why"), rows, right=()),

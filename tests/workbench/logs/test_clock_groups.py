@@ -8,6 +8,7 @@ import pytest
 from identification.arrays import Array
 from workbench.cards.card import load_card
 from workbench.logs.clocks import clock_groups
+from workbench.logs.notation import NOTATION
 from workbench.logs.runs import read_log
 from workbench.logs.table import Table
 from workbench.logs.unknown import read_unknown
@@ -78,13 +79,13 @@ def test_pairs_are_read_on_one_clock(tmp_path: Path) -> None:
 
 def test_clocks_without_a_time_in_common_are_said_to_be(tmp_path: Path) -> None:
     from identification.columns.column import RawColumn
-    from workbench.logs.unknown import on_clock_of_most
+    from identification.columns.several_clocks import on_clock_of_most
 
     columns = [
         RawColumn(0, "a/t", "t", "", T, group="a"), RawColumn(1, "a/y", "y", "", Y, group="a"),
         RawColumn(2, "a/v", "v", "", F, group="a"), RawColumn(4, "b/F", "F", "", F, group="b"),
         RawColumn(3, "b/t", "t", "", T + 900.0, group="b"),
     ]  # fmt: skip
-    found = {one.key: one.unusable for one in on_clock_of_most(columns, {})}
+    found = {one.key: one.unusable for one in on_clock_of_most(columns, {}, NOTATION)}
     assert "hardly a time in common" in found["b/F"]
     assert found["a/y"] == ""

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.columns.log_columns import columns_of
 from tests.workbench.log_files import card, signals, write_csv
+from workbench.logs.notation import NOTATION
 from workbench.logs.runs import read_runs
 from workbench.logs.unknown import read_unknown
-from workbench.steps.first_card.columns import columns_of
 
 
 def with_line(folder: Path, line: str) -> Path:
@@ -28,7 +29,7 @@ def test_a_message_of_the_logger_is_left_out(tmp_path: Path, line: str) -> None:
     (run,) = found.runs
     np.testing.assert_array_equal(run["y"], signals()["y"])
     assert any("left out" in one for one in found.remarks)
-    log = columns_of(read_unknown(path))
+    log = columns_of(read_unknown(path), NOTATION)
     assert len(log.clock.values) == 400
     assert any("left out" in one for one in (*log.log.notes, *found.remarks))
 
@@ -52,7 +53,7 @@ def test_a_clock_that_was_set_gives_two_runs(tmp_path: Path, leap: float, said: 
     found = read_runs(path, card(tmp_path))
     assert [len(run) for run in found.runs] == [400, 400]
     assert any(said in one for one in found.remarks), found.remarks
-    log = columns_of(read_unknown(path))
+    log = columns_of(read_unknown(path), NOTATION)
     assert len(log.clock.values) == 400
     assert any("the clock" in one for one in log.log.notes)
 

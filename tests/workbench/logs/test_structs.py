@@ -22,7 +22,7 @@ def columns(path: Path, content: object) -> dict[str, float]:
     """The columns of a JSON file as `init` finds them, by the value in row 10."""
     path.write_text(json.dumps(content), "utf-8")
     found = read_unknown(path)
-    table = read_table(path, found.spec)
+    table = read_table(path, FileSpec.model_validate(found.layout))
     assert {one.key for one in found.columns} <= set(table.names)
     return {str(one.key): one.values[10] for one in found.columns if not one.unusable}
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 Cells = Sequence[float] | Sequence[str] | Array

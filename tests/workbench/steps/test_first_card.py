@@ -9,14 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from design.first_card.answers import BadAnswer, with_rig
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import BadLog
 from tests.bad_inputs.shop import CARDS
 from tests.identification.motor_logs import made
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_log
-from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed, with_signal
 from workbench.steps.first_card.written import refusal, written
 from workbench.steps.simulate import record
 

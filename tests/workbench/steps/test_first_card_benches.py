@@ -11,12 +11,13 @@ from scipy.io import savemat
 
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import BadLog
 from workbench.cards.card import load_card
 from workbench.cards.headers import read_header
 from workbench.logs.runs import read_runs
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 from workbench.steps.first_card.written import written
 
 H, ROWS = 4e-3, 2500
@@ -45,9 +46,9 @@ def card_of(path: Path, content: str = "") -> Proposal:
 
 def is_read(found: Proposal, truth: Mapping[str, Array]) -> bool:
     """Whether the card is read, and gives these signals up to an offset."""
-    card = found.path.with_suffix(".toml")
+    card = Path(found.log).with_suffix(".toml")
     card.write_text(written(found), "utf-8")
-    run = read_runs(found.path, load_card(card)).runs[0]
+    run = read_runs(Path(found.log), load_card(card)).runs[0]
     return len(run) == pytest.approx(ROWS, abs=30) and all(
         np.corrcoef(run[name], x[: len(run)])[0, 1] > 0.98
         and np.std(run[name]) == pytest.approx(np.std(x), rel=0.05)

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.first_card.proposal import Proposal
+from design.first_card.remarks import no_body
 from identification.columns.column import read_register
+from identification.columns.log_columns import columns_of
 from identification.errors import BadLog
+from workbench.logs.notation import NOTATION
 from workbench.logs.unknown import read_unknown
-from workbench.steps.first_card.columns import columns_of
-from workbench.steps.first_card.proposal import Proposal, proposed
-from workbench.steps.first_card.remarks import no_body
+from workbench.steps.first_card.proposal import proposed
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
 H, HOLD, LATE = 0.005, 4, 20  # s a row; rows for which a value is held; rows of a speed's mean
@@ -175,5 +177,5 @@ def test_a_command_without_its_sign_is_named(tmp_path: Path, signed: bool) -> No
     said = "'MotorPWM' is never negative, though 'Encoder' goes both ways"
     found = propose(tmp_path, "time_ms,MotorPWM,Encoder", 100.0 * np.arange(len(u)), u, y)
     assert any(said in remark for remark in found.remarks) is not signed
-    told = no_body(columns_of(read_unknown(tmp_path / "run.csv")))
+    told = no_body(columns_of(read_unknown(tmp_path / "run.csv"), NOTATION))
     assert (said in str(told)) is not signed

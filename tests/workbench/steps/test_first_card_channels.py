@@ -7,9 +7,10 @@ import pytest
 
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS as TABLES
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import BadLog
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 from workbench.steps.first_card.written import checked_proposal
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from tests.identification.uneven_rows import servo_log
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 
 H, ROWS = 5e-3, 1600
 

@@ -10,13 +10,14 @@ from scipy.io import savemat
 from benchmarks.init_people import KINDS, make_file
 from benchmarks.init_real_tables import fewest_wrong, machine
 from benchmarks.init_table_words import KINDS as TABLES
+from design.first_card.answers import BadAnswer, with_rig
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
 from identification.errors import BadLog
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
 from workbench.page.drops import OTHER_FIELD, form_of, stored_form
-from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed, with_signal
 from workbench.steps.first_card.written import checked_proposal, written
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)

@@ -10,13 +10,15 @@ import pytest
 
 from benchmarks.init_real_tables import fewest_wrong, machine, make_table
 from benchmarks.init_table_words import KINDS
+from design.first_card.answers import BadAnswer, with_rig
+from design.first_card.proposal import Proposal
 from identification.arrays import Array
+from identification.columns.log_columns import columns_of
 from identification.errors import BadLog
 from workbench.cards.card import load_card
+from workbench.logs.notation import NOTATION
 from workbench.logs.unknown import read_unknown
-from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.columns import columns_of
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed, with_signal
 from workbench.steps.first_card.written import written
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
@@ -252,7 +254,7 @@ def test_a_position_that_only_rises_is_no_clock(tmp_path: Path) -> None:
     y = np.cumsum(1e-3 * (2.0 + np.sin(3.0 * T)))
     np.savetxt(tmp_path / "run.csv", np.column_stack([T, y, np.cos(3.0 * T)]), delimiter=",",
                header="t,position,current", comments="")  # fmt: skip
-    found = columns_of(read_unknown(tmp_path / "run.csv"))
+    found = columns_of(read_unknown(tmp_path / "run.csv"), NOTATION)
     assert [one.raw.header for one in found.signals] == ["position", "current"]
 
 

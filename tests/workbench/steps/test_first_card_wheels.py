@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from design.first_card.proposal import Proposal
 from identification.errors import BadLog
-from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.proposal import proposed
 
 Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
 H = 0.005

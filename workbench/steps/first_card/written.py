@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.first_card.proposal import Proposal, SignalGuess
 from design.identified.hardly_identifiable import hardly_identifiable
 from identification.errors import UserError
 from identification.signals.renewal import HELD_FOR, RENEWED_AT
 from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
-from workbench.steps.first_card.proposal import Proposal, SignalGuess
 
 LEGEND = (
     '"sure" and "guess" say how well a line follows from the log; check each guess before you use',
@@ -23,7 +23,7 @@ LEGEND = (
 def written(of: Proposal, *, asked: bool = False) -> str:
     """The card's text; asked: somebody has confirmed it on a terminal."""
     by = ", confirmed on a terminal" if asked else ""
-    head = (f"Written by workbench init from {of.path.name}{by}.", *LEGEND)
+    head = (f"Written by workbench init from {Path(of.log).name}{by}.", *LEGEND)
     tables: dict[str, Sequence[Line]] = {
         "card": [Line("name", of.name)],
         "rig": [
@@ -36,9 +36,8 @@ def written(of: Proposal, *, asked: bool = False) -> str:
         ],
         "signals": [_signal_line(one) for one in of.signals],
     }
-    layout = of.spec.model_dump(exclude_defaults=True)
-    if layout:
-        tables["file"] = [Line(key, value) for key, value in layout.items()]
+    if of.layout:
+        tables["file"] = [Line(key, value) for key, value in of.layout.items()]
     left_out = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
     return card_text(head, tables, [*of.hardly, *of.remarks, *left_out, *_extra(of)])
 
@@ -86,12 +85,12 @@ def checked_proposal(of: Proposal) -> Proposal:
     """The proposal with what doctor will say of it first: `refused`, and `hardly` identifiable."""
     try:
         card = card_from(tomllib.loads(written(of)), CARD_NAME)
-        found = read_runs(of.path, card)
-        rig = card.rig(of.path.name)
+        found = read_runs(Path(of.log), card)
+        rig = card.rig(Path(of.log).name)
         lines = hardly_identifiable(found.runs, rig)
     except UserError as error:
         return replace(of, refused=str(error))
-    before = f"{of.path.name}: "
+    before = f"{Path(of.log).name}: "
     renewed = [
         one.removeprefix(before) for one in found.remarks if RENEWED_AT in one or HELD_FOR in one
     ]

@@ -6,13 +6,15 @@ from dataclasses import replace
 from identification.arrays import Array
 from identification.columns.comparable import SAME_MOTION
 from identification.columns.header import Header, WrittenUnit, is_position, words_of
-from workbench.cards.headers import meaning, says_purpose
+from identification.columns.notation import Notation
 
 OF_TURNS = {"rpm": "turn"}  # what a speed sums up to whose unit does not say it
 WORDS_OF_A_NAME = 3  # of an axis's name
 
 
-def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, str]:
+def axes_of(
+    columns: Sequence[tuple[Header, int]], alike: Array, notation: Notation
+) -> dict[int, str]:
     """The axis of each column by its number, "" of what belongs to all; empty for one axis.
 
     Headers that differ in a word or a few beside each other make a family: of positions that do
@@ -30,7 +32,7 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
         for k, own in enumerate(words):
             for place in range(len(own) - count + 1):
                 name = own[place : place + count]
-                if all(map(_may_be_a_name, name)):
+                if all(_may_be_a_name(word, notation) for word in name):
                     key = (*own[:place], "*", *own[place + count :])
                     families.setdefault(key, {})[" ".join(name)] = k
     every = [one for one in families.values() if len(one) > 1]
@@ -54,10 +56,10 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
     return out
 
 
-def _may_be_a_name(word: str) -> bool:
+def _may_be_a_name(word: str, notation: Notation) -> bool:
     """Whether a word may name an axis: it says nothing else, or is itself a position's name."""
-    means = meaning(word)
-    return not says_purpose(word) and (not means or "position" in means or len(word) == 1)
+    means = notation.meaning(word)
+    return not notation.says_purpose(word) and (not means or "position" in means or len(word) == 1)
 
 
 def _positions(

@@ -2,17 +2,17 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from design.first_card.proposal import Proposal, SignalGuess
+from design.first_card.rig_guess import DRIVEN_THROUGH
 from design.machine.nearest import nearest
 from identification.columns.column import COLUMN, Column
+from identification.columns.header import WrittenUnit
+from identification.columns.motion_guess import parts_of, written_gain
 from identification.errors import BadCard, UserError
-from workbench.cards.card import NEEDED_SIGNALS
-from workbench.cards.units import column_scale, over_time
-from workbench.cards.written_units import written_unit
-from workbench.steps.first_card.motion_guess import parts_of, written_gain
-from workbench.steps.first_card.proposal import Proposal, SignalGuess
+from identification.log import Motion
 
 LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
@@ -22,28 +22,38 @@ NEXT_UNIT = {"m": "mm", "mm": "m", "rad": "deg", "deg": "rad", "N m": "mN m", "N
 OTHER_GAIN = {"mm": "turn", "turn": "mm"}
 WRITTEN_GAIN = re.compile(r"[\d.]+ [^/\d][^/]*/[^/]+")
 
+UnitOf = Callable[[str], WrittenUnit | None]
+
 
 class BadAnswer(UserError):
     """An answer that is no column, unit or number."""
 
 
-def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
+def with_signal(
+    of: Proposal,
+    name: str,
+    answer: str,
+    written_unit: UnitOf,
+    scaled: Callable[[SignalGuess, Motion], object],
+) -> Proposal:
     """The proposal after an answer on one of its signals.
 
     answer: empty (the guess is right), "-" (no such signal), "+" (what it would be otherwise), or a
-    column and its unit, or either alone. Raises BadAnswer, one line, where it is none of these.
+    column and its unit, or either alone; written_unit: the unit of a spelling, None where it is
+    none; scaled: raises BadCard where unit and gain do not make the signal. Raises BadAnswer, one
+    line, where the answer is none of these.
     """
     one = of.signal(name)
     assert one is not None
     text = _other(answer.strip(), one.rival)
     if text == LEAVE_OUT:
-        if name in NEEDED_SIGNALS[of.kind]:
+        if name in ("t", "y", *DRIVEN_THROUGH[of.kind]):
             raise BadAnswer(f'a rig of kind "{of.kind}" needs {name}; name its column')
         return replace(of, signals=tuple(other for other in of.signals if other is not one))
-    found = replace(one, sure=True, why=CONFIRMED) if not text else _answered(of, one, text)
+    found = replace(one, sure=True, why=CONFIRMED)
+    found = _answered(of, one, text, written_unit) if text else found
     try:
-        unit = over_time(found.unit, name) if found.summed else found.unit
-        column_scale(unit, found.gain, name, of.motion)
+        scaled(found, of.motion)
     except BadCard as error:
         raise BadAnswer(str(error)) from None
     return replace(of, signals=tuple(found if other is one else other for other in of.signals))
@@ -113,24 +123,26 @@ def _other(text: str, rival: str) -> str:
     return rival if text == THE_OTHER else text
 
 
-def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
+def _answered(of: Proposal, one: SignalGuess, text: str, written_unit: UnitOf) -> SignalGuess:
     """The signal from a column, a unit, or both."""
     names = _names(of)
     text = text if text in names else text.removeprefix(f"{COLUMN} ")
     given = replace(one, sure=True, why="given on the terminal")
     before, _, last = text.rpartition(" ")
     if column := names.get(text) or names.get(before.strip()):
-        unit = one.unit if text in names else _unit(last)
+        unit = one.unit if text in names else _unit(last, written_unit)
         return replace(given, column=column.raw.key, shown=column.shown, unit=unit, gain=None,
                        bits=None, summed=False)  # fmt: skip
     if WRITTEN_GAIN.fullmatch(text):
         return replace(given, gain=text)
     if written_unit(text) is None:
         raise BadAnswer(f"{text!r} is neither a column nor a unit{nearest(text, names)}")
-    return replace(given, unit=_unit(text), gain=None if isinstance(one.gain, str) else one.gain)
+    return replace(
+        given, unit=_unit(text, written_unit), gain=None if isinstance(one.gain, str) else one.gain
+    )
 
 
-def _unit(text: str) -> str:
+def _unit(text: str, written_unit: UnitOf) -> str:
     found = written_unit(text)
     return found.card if found else text
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.columns.axes import axes_of
 from identification.columns.clock import clock_of, gone_back, is_second
-from identification.columns.column import MOST_ROWS_READ, Column, read_register
+from identification.columns.column import MOST_ROWS_READ, Column, RawColumn, read_register
 from identification.columns.comparable import (
     at_sound_rows,
     longest_piece,
@@ -18,16 +19,12 @@ from identification.columns.comparable import (
     why_unusable,
     without_doubles,
 )
-from identification.columns.header import Header, Quantity, words_of
+from identification.columns.header import Header, Quantity, says_period, words_of
+from identification.columns.names import read_together
+from identification.columns.notation import Notation
 from identification.columns.pairs import correlation
 from identification.signals.stamps import even_stamps
 from identification.thresholds import HALF
-from workbench.cards.headers import read_header
-from workbench.cards.units import conversion
-from workbench.logs.layout import says_period
-from workbench.logs.unknown import UnknownLog
-from workbench.steps.first_card.axes import axes_of
-from workbench.steps.first_card.names import read_together
 
 _INPUT = re.compile(r"input\W*\d+", re.I)
 VOLTS = ("V", "mV")
@@ -37,12 +34,29 @@ FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 
 
 @dataclass(frozen=True, eq=False)
+class UnknownLog:
+    """The columns of a file that no card describes, single values beside them, and what else it
+    holds.
+
+    where: what the file is called by; layout: how it is read, as a card's [file] says it.
+    """
+
+    where: str
+    layout: Mapping[str, object]
+    columns: tuple[RawColumn, ...]
+    scalars: tuple[RawColumn, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Columns:
     """A log's clock, the columns that may be signals, and why each of the others is not.
 
-    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`.
+    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`;
+    notation: by which headers and units were read.
     """
 
+    notation: Notation
     log: UnknownLog
     clock: Column
     step: float
@@ -57,19 +71,19 @@ class Columns:
         return tuple(sorted({one.axis for one in self.signals if one.axis}))
 
 
-def columns_of(log: UnknownLog) -> Columns:
+def columns_of(log: UnknownLog, notation: Notation) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    heads = read_together([(one.header, one.unit_below) for one in log.columns])
+    heads = read_together([(one.header, one.unit_below) for one in log.columns], notation)
     read = list[Column]()
     for raw, header in zip(log.columns, heads, strict=True):
         register = read_register(raw.values)
         values = raw.values if register is None else register.values
-        one = Column(raw, header, values, values, register, pascals=_pascals(header))
+        one = Column(raw, header, values, values, register, pascals=_pascals(header, notation))
         read.append(_with_sign(one))
     left_out = {one.raw.number: why for one in read if (why := why_unusable(one))}
     usable, said = at_sound_rows([one for one in read if one.raw.number not in left_out])
     others = [one for one in read if one.raw.number in left_out]
-    clock = clock_of(str(log.path), usable, others, _periods(log, usable))
+    clock = clock_of(log.where, usable, others, _periods(log, usable, notation))
     even, late = even_stamps(clock.values)
     clock, notes = replace(clock, values=even, x=even), [*log.notes, *said, late]
     left_out.pop(clock.raw.number, None)
@@ -95,26 +109,25 @@ def columns_of(log: UnknownLog) -> Columns:
     phases = motor_phases(signals)
     left_out |= {one.raw.number: PHASE_CURRENT for one in phases}
     distinct, twice = without_doubles([one for one in signals if one not in phases])
-    own = tuple(_with_axes(_of_a_scope(distinct)))
-    return Columns(log, clock, step, grid, own, left_out | twice, tuple(read))
+    own = tuple(_with_axes(_of_a_scope(distinct), notation))
+    return Columns(notation, log, clock, step, grid, own, left_out | twice, tuple(read))
 
 
-def _periods(log: UnknownLog, usable: Sequence[Column]) -> list[Column]:
+def _periods(log: UnknownLog, usable: Sequence[Column], notation: Notation) -> list[Column]:
     """The log's single values that are called a period, as columns of as many rows."""
     rows, out = len(usable[0].values) if usable else 0, []
     for one in log.scalars:
         if says_period(one.header):
             values = np.full(rows, one.values[0])
-            out.append(Column(one, read_header(one.header, one.unit_below), values, values))
+            out.append(Column(one, notation.header(one.header, one.unit_below), values, values))
     return out
 
 
-def _pascals(head: Header) -> float | None:
+def _pascals(head: Header, notation: Notation) -> float | None:
     """What one of the header's unit is in Pa; None where that is no pressure's."""
     if head.unit is None or head.unit.quantity != "pressure":
         return None
-    found = conversion(head.unit.card, "Pa")
-    return None if found is None else found.factor
+    return notation.factor(head.unit.card)
 
 
 def _with_sign(one: Column) -> Column:
@@ -140,10 +153,10 @@ def _of_a_scope(columns: Sequence[Column]) -> Sequence[Column]:
     return [replace(one, header=head) for one, head in zip(columns, heads, strict=True)]
 
 
-def _with_axes(columns: Sequence[Column]) -> list[Column]:
+def _with_axes(columns: Sequence[Column], notation: Notation) -> list[Column]:
     """The columns, each with the axis that its header names where there are several."""
     if len(columns) < FEWEST_OF_AXES:
         return list(columns)
     alike = correlation(np.column_stack([one.x for one in columns]))
-    named = axes_of([(one.header, one.raw.number) for one in columns], alike)
+    named = axes_of([(one.header, one.raw.number) for one in columns], alike, notation)
     return [replace(one, axis=named.get(one.raw.number, "")) for one in columns]

@@ -13,16 +13,12 @@ from itertools import product
 import numpy as np
 
 from identification.columns.column import Column
-from identification.columns.roles import Roles
-from workbench.cards.headers import read_header
-from workbench.cards.units import force_unit
-from workbench.logs.layout import NUMBER, says_period
-from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.motion_guess import (
+from identification.columns.header import NUMBER, says_period
+from identification.columns.log_columns import Columns
+from identification.columns.motion_guess import (
     USUAL,
     MotionGuess,
     UnitGuess,
-    factor,
     is_count,
     likeliest,
     metre,
@@ -30,7 +26,9 @@ from workbench.steps.first_card.motion_guess import (
     unit_by_turn,
     written_gain,
 )
-from workbench.steps.first_card.scale_guess import (
+from identification.columns.notation import Factor
+from identification.columns.roles import Roles
+from identification.columns.scale_guess import (
     DATA_SHEET,
     SENSOR_OUTPUTS,
     by_reference,
@@ -88,15 +86,16 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     out |= _jointly(columns, roles, motion, out)
     if no_clock:
         out["t"] = replace(out["t"], why=f"by its size: {no_clock}")
+    factor = columns.notation.factor
     if "r" not in out:
-        out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
+        out["r"] = _of_reference(roles, out["y"], factor) if "r" in found else out["y"]
     for name, column in found.items():
         nameless = name == "u" and not column.header.means and column.bits is None
         nameless = nameless and not _stops_at_all(column)
         if name not in out and nameless and is_count(roles.columns["y"]):
             out[name] = _command("A", "beside counts of an encoder mostly a current")
         elif name not in out:
-            out[name] = _alone(name, column, motion)
+            out[name] = _alone(name, column, motion, factor)
     if chambers := {"p_p", "p_n"} & found.keys() - given.keys():  # of one supply: in one unit
         whole = {"p_p", "p_n"} & given.keys() or chambers
         larger = max(whole, key=lambda name: float(np.max(np.abs(found[name].x))))
@@ -118,7 +117,7 @@ def _of_a_sensor(
         return guess
     if own.rotary == (motion.motion == "rotary"):
         return guess
-    per, size = force_unit(motion.motion), 1.0
+    per, size = motion.force_unit, 1.0
     why = "before a gear or screw: its ratio or lead is in no log"
     if name == "r":
         per, why = units["y"].unit, "by its size beside the position, behind a gear or screw"
@@ -139,7 +138,7 @@ def _unreadable(columns: Columns, given: Units) -> str:
     if "t" not in given:
         return ""
     unit = given["t"].unit
-    h = columns.step * factor(unit)
+    h = columns.step * columns.notation.factor(unit)
     return f"the header's {unit} makes rows {h:.3g} s apart" if h < FASTEST_LOGGER else ""
 
 
@@ -156,7 +155,7 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         names = dict(zip(open_of, (unit for unit, _ in units), strict=True))
         likely = sum(weight for _, weight in units)
         likely += _plausible(columns, roles, motion.machine, names, given)
-        off = _off(names, given, slope)
+        off = _off(names, given, slope, columns.notation.factor)
         likely -= 0.0 if off is None else min(0.5 * (off / AGREES) ** 2, MOST_LOST)
         scored.append((likely, names))
     scored.sort(key=lambda one: -one[0])
@@ -166,7 +165,7 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         if name in given or unit == "":
             continue
         others = [(score, other[name]) for score, other in scored if other[name] != unit]
-        related = _by_relation(name, names, given, slope)
+        related = _by_relation(name, names, given, slope, columns.notation.factor)
         why = "by the velocity and the position" if related else "by its size, the header says none"
         out[name] = UnitGuess(unit, None, related, why, others[0][1] if others else "")
     return out
@@ -193,9 +192,9 @@ def _increment(columns: Columns) -> UnitGuess | None:
     for one in (*columns.log.scalars, *(one.raw for one in columns.read)) if counts else ():
         if not says_period(one.header):
             continue
-        unit = read_header(one.header, one.unit_below).unit
+        unit = columns.notation.header(one.header, one.unit_below).unit
         step = float(one.unit_below) if NUMBER.fullmatch(one.unit_below) else float(one.values[0])
-        step *= factor(unit.card) if unit and unit.quantity == "time" else 1.0
+        step *= columns.notation.factor(unit.card) if unit and unit.quantity == "time" else 1.0
         return UnitGuess("1", f"{1.0 / step:.9g} 1/s", True, f"by {one.header!r}")
     return None
 
@@ -204,8 +203,8 @@ def _plausible(
     columns: Columns, roles: Roles, machine: str, units: Mapping[str, str], given: Units
 ) -> float:
     """Log-probability of the sizes that these units make."""
-    second, length = _second(units, given), metre(units["y"], given.get("y"))
-    y = roles.columns["y"]
+    factor, y = columns.notation.factor, roles.columns["y"]
+    second, length = _second(units, given, factor), metre(units["y"], given.get("y"), factor)
     assert y.motion is not None
     h = max(columns.step * second, SHORTEST_PERIOD)
     per_sample = length / (h * columns.grid)
@@ -222,24 +221,28 @@ def _plausible(
     return total
 
 
-def _second(units: Mapping[str, str], given: Units) -> float:
+def _second(units: Mapping[str, str], given: Units, factor: Factor) -> float:
     """What one of the clock's unit is in s."""
     clock = given.get("t")
-    return metre(units["t"], clock) if clock and clock.gain else factor(units["t"])
+    return metre(units["t"], clock, factor) if clock and clock.gain else factor(units["t"])
 
 
-def _off(units: Mapping[str, str], given: Units, slope: float | None) -> float | None:
+def _off(
+    units: Mapping[str, str], given: Units, slope: float | None, factor: Factor
+) -> float | None:
     """Logarithm of the velocity over the position's derivative, both in SI."""
     if slope is None or not units["v"]:
         return None
-    length = metre(units["y"], given.get("y"))
-    ratio = slope * factor(units["v"]) * _second(units, given) / length
+    length = metre(units["y"], given.get("y"), factor)
+    ratio = slope * factor(units["v"]) * _second(units, given, factor) / length
     return float(np.log(max(ratio, 1e-300)))
 
 
-def _by_relation(name: str, units: Mapping[str, str], given: Units, slope: float | None) -> bool:
+def _by_relation(
+    name: str, units: Mapping[str, str], given: Units, slope: float | None, factor: Factor
+) -> bool:
     """Whether the other two of clock, position and velocity are given, and make sure of this."""
-    off = _off(units, given, slope)
+    off = _off(units, given, slope, factor)
     others = {"t", "y", "v"} - {name}
     known = name in ("t", "y") and all(one in given and given[one].sure for one in others)
     return known and off is not None and abs(off) < SAME_RATE
@@ -255,27 +258,27 @@ def contradicted_clock(columns: Columns, roles: Roles, units: Units) -> float | 
     if slope is None or not (units["y"].sure and units["v"].sure):
         return None
     names = {name: units[name].unit for name in ("t", "y", "v")}
-    off = _off(names, units, slope)
+    off = _off(names, units, slope, columns.notation.factor)
     return None if off is None or abs(off) < OFF_RATE else float(np.exp(off))
 
 
-def _of_reference(roles: Roles, y: UnitGuess) -> UnitGuess:
+def _of_reference(roles: Roles, y: UnitGuess, factor: Factor) -> UnitGuess:
     """The reference's unit from the position's, by their ratio."""
     if in_one_unit(roles.columns["y"], roles.columns["r"]):
         return replace(y, why="that of the position, which follows it")
     ratio = float(np.std(roles.columns["y"].x) / np.std(roles.columns["r"].x))
     per = y.gain.partition("/")[2] if y.gain else y.unit
     of_length = USUAL["y"] if per in USUAL["y"] else USUAL["y rotary"]
-    wanted = metre(y.unit, y) * ratio
+    wanted = metre(y.unit, y, factor) * ratio
     ranked = sorted(of_length, key=lambda one: abs(np.log(factor(one) / wanted)))
     return UnitGuess(ranked[0], None, False, "by its size beside the position", ranked[1])
 
 
-def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
+def _alone(name: str, column: Column, motion: MotionGuess, factor: Factor) -> UnitGuess:
     """The unit of a signal by its own size."""
     means = column.header.means
     if name == "u" and means.get("force", -1.0) >= means.get("command", 0.0) and not column.current:
-        unit, why = force_unit(motion.motion), "the header speaks of a force that is asked for"
+        unit, why = motion.force_unit, "the header speaks of a force that is asked for"
         return UnitGuess(unit, None, False, why, "V")
     if name == "u":
         return _of_command(column)
@@ -284,7 +287,7 @@ def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
         turns = " rotary" if name == "F" and motion.motion == "rotary" else ""
         usual = USUAL[f"F{turns}" if name == "F" else "p"]
         quantity = "force" if name == "F" else "pressure"
-        unit, rival = likeliest(quantity, peak, usual, motion.machine)
+        unit, rival = likeliest(quantity, peak, usual, motion.machine, factor)
         return UnitGuess(unit, None, False, "by its size, the header says none", rival)
     unit = max(USUAL.get(name, {"1": 0.0}).items(), key=lambda one: one[1])[0]
     return UnitGuess(unit, None, False, "the usual one, the header says none")

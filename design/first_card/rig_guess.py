@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.columns.column import Column
+from identification.columns.log_columns import Columns
+from identification.columns.motion_guess import UnitGuess
+from identification.columns.notation import Factor
 from identification.columns.roles import Roles
 from identification.columns.weights import SURE
 from identification.log import Motion
-from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.motion_guess import UnitGuess, factor
 
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
@@ -20,7 +21,12 @@ AMBIENT = 1e5  # Pa
 MOST_OF_AIR = 1.5e6  # Pa, of compressed air; above, pressures are those of oil
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
-DRIVEN_THROUGH = {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",), "motor": ("u",)}
+DRIVEN_THROUGH = {
+    "electro-pneumatic": ("p_p", "p_n"),
+    "force": ("F",),
+    "motor": ("u",),
+    "velocity": ("u",),
+}
 DRIVEN_BY = {
     "electro-pneumatic": "F_e from two pressures",
     "force": "F_e is logged",
@@ -41,7 +47,7 @@ class RigGuess:
     rival: str = ""
 
 
-def area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
+def area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess], factor: Factor) -> RigGuess:
     """The area on which a pressure beside the force acts: it makes friction alike both ways."""
     mean = float(np.mean(roles.columns[name].x)) * factor(units[name].unit)
     area = abs(roles.law.balance) * factor(units["F"].unit) / mean
@@ -77,7 +83,7 @@ def rig_of(
         out.append(RigGuess("area_p_m2", 1e-3, "m^2", False, why))
         out.append(RigGuess("area_n_m2", float(f"{1e-3 * roles.area_ratio:.3g}"), "m^2", False,
                             "as area_p_m2: measure bore and rod"))  # fmt: skip
-        out.append(_around_the_rod(roles, units))
+        out.append(_around_the_rod(roles, units, columns.notation.factor))
     if roles.kind == "motor":
         force = "N m" if motion == "rotary" else "N"
         out.append(_motor_constant(columns, force, asked=units["u"].unit == force))
@@ -87,7 +93,7 @@ def rig_of(
     return out
 
 
-def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
+def _around_the_rod(roles: Roles, units: Mapping[str, UnitGuess], factor: Factor) -> RigGuess:
     """The pressure on the rod's area: the ambient one of absolute pressures of air, else none."""
     chambers = [roles.columns[name].values * factor(units[name].unit) for name in ("p_p", "p_n")]
     low, high = min(map(np.nanmin, chambers)), max(map(np.nanmax, chambers))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import takewhile
 
 from identification.columns.header import Header, words_of
-from workbench.cards.headers import meaning, read_header
+from identification.columns.notation import Notation
 
 RIGHT = re.compile(r"(?<![^\W_])r(?![^\W_])", re.I)  # a letter that no reference has beside an l
 SAYS_PRESENT = {"current", "input"}  # words of what is measured, where it is set beside a set point
@@ -21,7 +21,7 @@ _LETTER = re.compile(r"[^\W\d]")
 _WHOLE_WORDS = re.compile(r".*[_\s.-]")
 
 
-def read_together(named: Sequence[tuple[str, str]]) -> list[Header]:
+def read_together(named: Sequence[tuple[str, str]], notation: Notation) -> list[Header]:
     """The headers of a log, each a text with the unit below it."""
     texts = [one for one, _ in named]
     names = [_PER.sub("_", _ARGUMENT.sub("()", one)) for one in _without_blocks(texts)]
@@ -31,28 +31,29 @@ def read_together(named: Sequence[tuple[str, str]]) -> list[Header]:
         for x in names
     ]
     heads = [
-        _of_one_drive(read_header(one, own)) for one, (_, own) in zip(names, named, strict=True)
+        _of_one_drive(notation.header(one, own), notation)
+        for one, (_, own) in zip(names, named, strict=True)
     ]
-    whole = map(read_header, texts)  # what all share tells of the machine
+    whole = (notation.header(one, "") for one in texts)  # what all share tells of the machine
     heads = [
         replace(own, turning=max(own.turning, one.turning), angle=own.angle or one.angle)
         for own, one in zip(heads, whole, strict=True)
     ]
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
-    return _with_present(_without_letters(_without_machine(heads)))
+    return _with_present(_without_letters(_without_machine(heads, notation)))
 
 
-def _of_one_drive(head: Header) -> Header:
+def _of_one_drive(head: Header, notation: Notation) -> Header:
     """The header, "torque_current" meaning the current, "tau_motor" the motor's torque, "command"
     beside a torque what "cmd" does, and a torque in nm no nanometres."""
     if head.unit is not None and head.unit.card == "nm":
-        torque = replace(read_header(_NM.sub("Nm", head.text)), text=head.text)
-        return _of_one_drive(torque) if "force" in torque.means else head
+        torque = replace(notation.header(_NM.sub("Nm", head.text), ""), text=head.text)
+        return _of_one_drive(torque, notation) if "force" in torque.means else head
     words = words_of(head.name)
     if not {"force", "command"} <= set(head.means) or head.purpose in ("reference", "demand"):
         return head
-    commands = {one for one in words if "command" in meaning(one)}
+    commands = {one for one in words if "command" in notation.meaning(one)}
     asked = all(one.startswith("command") for one in commands)
     if words[-1] not in _CURRENTS and not asked and commands != {"motor"}:
         return head
@@ -71,7 +72,7 @@ def _without_blocks(headers: Sequence[str]) -> list[str]:
     return ["/".join(one.split("/")[common:]) if "/" in one else one for one in headers]
 
 
-def _without_machine(heads: Sequence[Header]) -> list[Header]:
+def _without_machine(heads: Sequence[Header], notation: Notation) -> list[Header]:
     """The headers, each meaning what its words behind the name of the machine do, with which all
     begin but those of times and counts: the R of "R_elbow_load" asks for nothing."""
     others = [one.text for one in heads if one.text and not {"time", "count"} & set(one.means)]
@@ -80,7 +81,7 @@ def _without_machine(heads: Sequence[Header]) -> list[Header]:
     rest = [one.text.removeprefix(begin[0]) for one in heads] if begin else []
     if len(others) < FEWEST_ALIKE or not all(map(_LETTER.match, filter(None, rest))) or not rest:
         return list(heads)
-    own = map(read_header, rest)
+    own = (notation.header(one, "") for one in rest)
     return [
         replace(one, means=part.means, purpose=part.purpose)
         for one, part in zip(heads, own, strict=True)

@@ -3,7 +3,6 @@ and sizes that servo machines usually have, as log-probabilities."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +10,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.columns.column import Column, halved_counts
 from identification.columns.header import words_of
+from identification.columns.notation import Factor
 from identification.columns.roles import Roles
-from identification.errors import BadCard
 from identification.log import Motion
 from identification.signals.relations import of_a_weight
-from workbench.cards.units import conversion
 
 USUAL: Mapping[str, Mapping[str, float]] = {  # signal: unit and how usual it is
     "t": {"s": 0.0, "ms": 0.0, "us": -0.7, "ns": -1.5},
@@ -59,16 +57,7 @@ class UnitGuess:
     rival: str = ""
 
 
-@cache
-def factor(unit: str) -> float:
-    """What one of the unit is in SI; raises BadCard where it is unknown."""
-    found = conversion(unit, None)
-    if found is None:
-        raise BadCard(f"unit {unit!r} has no SI base")
-    return found.factor
-
-
-def metre(unit: str, guess: UnitGuess | None) -> float:
+def metre(unit: str, guess: UnitGuess | None, factor: Factor) -> float:
     """What one of the position's unit is in SI, its gain reckoned with."""
     if guess is None or guess.gain is None:
         return factor(unit)
@@ -103,7 +92,7 @@ def near(quantity: str, value: float, machine: str) -> float:
 
 
 def likeliest(
-    quantity: str, value: float, usual: Mapping[str, float], machine: str
+    quantity: str, value: float, usual: Mapping[str, float], machine: str, factor: Factor
 ) -> tuple[str, str]:
     """The likeliest unit of a value, and the next one."""
     ranked = sorted(
@@ -137,6 +126,11 @@ class MotionGuess(NamedTuple):
     def machine(self) -> str:
         """As sizes of machines are looked up: linear, rotary or rotor."""
         return "rotor" if self.rotor and self.motion == "rotary" else self.motion
+
+    @property
+    def force_unit(self) -> str:
+        """N, or N m of a machine that turns."""
+        return "N m" if self.motion == "rotary" else "N"
 
 
 def known_motion(roles: Roles, beside: Sequence[Column] = ()) -> MotionGuess:

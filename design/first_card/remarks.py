@@ -10,17 +10,17 @@ import numpy as np
 from identification.columns.column import Column
 from identification.columns.comparable import NEARLY_ALIKE
 from identification.columns.header import is_position, words_of
+from identification.columns.log_columns import PHASE_CURRENT, Columns
+from identification.columns.motion_guess import UnitGuess
 from identification.columns.pairs import follows
 from identification.columns.roles import MOSTLY_ITS_LAW, Roles, are_constant
+from identification.columns.unit_guess import contradicted_clock
 from identification.columns.weights import SURE, said, together
 from identification.errors import BadLog
 from identification.signals.delays import are_exchanged
 from identification.signals.even_clock import rows_lost
 from identification.signals.relations import FEWEST_MOVING, force_law, lead, moving
 from identification.thresholds import OF_ACCOUNT, TWICE
-from workbench.steps.first_card.columns import PHASE_CURRENT, Columns
-from workbench.steps.first_card.motion_guess import UnitGuess, factor
-from workbench.steps.first_card.unit_guess import contradicted_clock
 
 CONTROLLERS = {"controller", "pid", "pi", "pd", "regler", "regulator"}  # in a header
 DRIVING = ("F", "u", "p_p", "p_n")
@@ -31,7 +31,8 @@ BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a
 def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> Iterator[str]:
     """The remarks of a card, each a line."""
     clock = units["t"]
-    second = factor(clock.unit) if clock.gain is None else 1.0 / float(clock.gain.split()[0])
+    gain = clock.gain
+    second = columns.notation.factor(clock.unit) if gain is None else 1.0 / float(gain.split()[0])
     h = columns.step * second
     yield from _of_clock(columns, second, h)
     yield from _of_names(columns, roles)
@@ -142,19 +143,19 @@ def no_body(columns: Columns) -> BadLog:
     phases = [o.shown for o in columns.read if columns.left_out.get(o.raw.number) == PHASE_CURRENT]
     if phases:
         return BadLog(
-            f"{columns.log.path}: columns {', '.join(phases)} are the three phase currents of a"
+            f"{columns.log.where}: columns {', '.join(phases)} are the three phase currents of a"
             " motor (their sum is 0), of which none is its force, and no other drive is logged; log"
             " the current that makes the torque too (the drive's q current), or add a column of it"
             " by Park's transform with the electrical angle"
         )
     pair = _followed(columns.signals)
     if pair is not None and (told := _hardly_moves(pair, columns.signals)):
-        return BadLog(f"{columns.log.path}: {told}")
+        return BadLog(f"{columns.log.where}: {told}")
     if pair is not None:
         return BadLog(
-            f"{columns.log.path}: column {pair[0].shown} follows its reference {pair[1].shown}, and"
-            " no force and no command of the motor is logged; log its current, torque or force too:"
-            " reference and position alone identify no friction"
+            f"{columns.log.where}: column {pair[0].shown} follows its reference {pair[1].shown},"
+            " and no force and no command of the motor is logged; log its current, torque or force"
+            " too: reference and position alone identify no friction"
         )
     unsigned = f"; {told}" if (told := without_sign(columns.signals)) else ""
     there = ", ".join(one.shown for one in columns.signals) or "none"
@@ -163,7 +164,7 @@ def no_body(columns: Columns) -> BadLog:
         for one in columns.read if (why := columns.left_out.get(one.raw.number))
     )  # fmt: skip
     return BadLog(
-        f"{columns.log.path}: no column moves as a body that another one drives (tried: {there}"
+        f"{columns.log.where}: no column moves as a body that another one drives (tried: {there}"
         f"{'; ' if left_out else ''}{left_out}){unsigned}; a position is"
         " needed that goes both ways, and"
         " beside it a force, two pressures or a motor's command; or write the card by hand"
@@ -225,7 +226,7 @@ def of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Colum
         return columns.signals, named[0]
     there = ", ".join(columns.axes) or "its headers name one alone"
     raise BadLog(
-        f"{columns.log.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
+        f"{columns.log.where}: no axis {axis!r} (axes: {there}); give one of them, or the header of"
         " a position"
     )
 
@@ -238,7 +239,7 @@ def refuse_undriven(columns: Columns, roles: Roles, share: float) -> None:
     for one in columns.read:
         if columns.left_out.get(one.raw.number) == "is always 0" and said(one, "u") >= SAID_SO:
             raise BadLog(
-                f"{columns.log.path}: nothing drives: the command {one.shown} is always 0, and"
+                f"{columns.log.where}: nothing drives: the command {one.shown} is always 0, and"
                 f" {roles.columns['u'].shown} is the velocity alone ({share:.0%}), against it, as"
                 " of a motor that the body turns, whose braking is no friction; log a run with a"
                 " command"
@@ -256,7 +257,7 @@ def refuse_unsigned(columns: Columns, roles: Roles) -> None:
         law = force_law(motion, roles.columns["y"].x, signed)
         if law is not None and law.share > max(MOSTLY_ITS_LAW, TWICE * roles.law.share):
             raise BadLog(
-                f"{columns.log.path}: column {u.shown} has no sign, {flag.shown} gives its"
+                f"{columns.log.where}: column {u.shown} has no sign, {flag.shown} gives its"
                 " direction; add a column of the one with the sign of the other, and give that log"
             )
 
@@ -269,9 +270,9 @@ def refuse_sign_bits(columns: Columns, roles: Roles) -> None:
             continue
         top = 2**found.sign_bit
         raise BadLog(
-            f"{columns.log.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
-            f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
-            f" write x where x < {top}, else {top} - x, and give that log"
+            f"{columns.log.where}: column {one.shown} jumps by {top} (data row {found.row}) where"
+            f" it passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means"
+            f" -n); write x where x < {top}, else {top} - x, and give that log"
         )
 
 
@@ -283,7 +284,7 @@ def refuse_error(columns: Columns, roles: Roles) -> None:
         e, x = one.values, y.values
         if {one.header.purpose, y.header.purpose} == {"error", "reference"}:
             raise BadLog(
-                f"{columns.log.path}: no position but its reference {y.shown} and the error"
+                f"{columns.log.where}: no position but its reference {y.shown} and the error"
                 f" {one.shown}; add a column of the one less the other (the position), and give it"
             )
         if one.header.purpose != "error" or len(e) != len(x) or not np.all(np.isfinite(e * x)):
@@ -293,7 +294,7 @@ def refuse_error(columns: Columns, roles: Roles) -> None:
         reached = abs(float(np.corrcoef(e, x)[0, 1])) > NEARLY_ALIKE  # of a reference at rest
         if np.var(left) < OF_ACCOUNT**2 * np.var(x) and not reached:
             raise BadLog(
-                f"{columns.log.path}: no position: {y.shown} is made of the error {one.shown}, as"
+                f"{columns.log.where}: no position: {y.shown} is made of the error {one.shown}, as"
                 " the terms of a controller are, and error and output alone identify no friction;"
                 " log the position too"
             )
@@ -306,6 +307,6 @@ def refuse_resting(columns: Columns, roles: Roles) -> None:
         why = columns.left_out.get(one.raw.number, "")
         if why.startswith("is always") and said(one, "y") >= max(SURE, said(y, "y") + 1.0):
             raise BadLog(
-                f"{columns.log.path}: column {one.shown}, the position by its header, {why}; motion"
-                " needed: check the sensor, or leave the column out"
+                f"{columns.log.where}: column {one.shown}, the position by its header, {why};"
+                " motion needed: check the sensor, or leave the column out"
             )

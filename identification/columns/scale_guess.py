@@ -7,21 +7,20 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.columns.column import BITS, Column
-from identification.columns.roles import Roles
-from identification.log import Motion
-from identification.signals.relations import derivative, lead
-from identification.thresholds import TWICE
-from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.motion_guess import (
+from identification.columns.log_columns import Columns
+from identification.columns.motion_guess import (
     USUAL,
     UnitGuess,
     counts_per_turn,
-    factor,
     is_count,
     likeliest,
     metre,
     written_gain,
 )
+from identification.columns.roles import Roles
+from identification.log import Motion
+from identification.signals.relations import derivative, lead
+from identification.thresholds import TWICE
 
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
@@ -57,7 +56,8 @@ def by_reference(
     known = given.get("r")
     if r is not None and not is_output(r) and (known or not in_one_unit(y, r)):
         usual = USUAL["y" if motion == "linear" else "y rotary"]
-        per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)[0]
+        likely, _ = likeliest("travel", np.ptp(r.x), usual, motion, columns.notation.factor)
+        per = known.unit if known else likely
         if abs(lead(r.x, y.x).likeness) > WELL_KNOWN:
             number = sensible(slow_ratio(y.x, r.x), per == "turn")
             return guess(number, f"by its size beside the reference {r.shown}")
@@ -77,7 +77,7 @@ def _by_velocity(
     slope = slope_of(columns, roles)
     if not slope or not {"t", "v"} <= given.keys():
         return None
-    size = 2.0 * np.pi if motion == "rotary" else 1e-3
+    size, factor = 2.0 * np.pi if motion == "rotary" else 1e-3, columns.notation.factor
     return size / (slope * factor(given["v"].unit) * factor(given["t"].unit))
 
 
@@ -126,9 +126,10 @@ def counts_samples(clock: Column) -> bool:
 def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:
     """The rate of a log that counts its samples: by a velocity of known unit, else a usual one."""
     rate, why = 1000.0, "a usual one: nothing in the log gives the time of a sample"
-    slope = slope_of(columns, roles)
+    slope, factor = slope_of(columns, roles), columns.notation.factor
     if slope is not None and {"y", "v"} <= given.keys():
-        rate = sensible(slope * factor(given["v"].unit) / metre(given["y"].unit, given["y"]))
+        length = metre(given["y"].unit, given["y"], factor)
+        rate = sensible(slope * factor(given["v"].unit) / length)
         why = "by the velocity and the position"
     elif slope is not None and not {"y", "v"} & given.keys():
         rate, why = sensible(slope), "by the velocity, if it is the position's unit a second"

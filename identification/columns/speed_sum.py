@@ -5,7 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.columns.axes import as_position
 from identification.columns.column import Column
+from identification.columns.log_columns import Columns
+from identification.columns.motion_guess import USUAL, likeliest
 from identification.columns.pairs import follows
 from identification.columns.roles import WORK_GIVES_SIGN, Roles, known_roles
 from identification.columns.ways import HEADER_SAYS
@@ -13,9 +16,6 @@ from identification.columns.weights import EXPLAINED, NO_FRICTION, said
 from identification.signals.relations import lead
 from identification.signals.summed import summed
 from identification.thresholds import HALF
-from workbench.steps.first_card.axes import as_position
-from workbench.steps.first_card.columns import Columns
-from workbench.steps.first_card.motion_guess import USUAL, factor, likeliest
 
 BY_THE_MINUTE = {"rpm": 60.0, "m/min": 60.0, "mm/min": 60.0}  # s, of units of speeds
 
@@ -65,7 +65,8 @@ def _summed(columns: Columns, signals: Sequence[Column], own: Column) -> tuple[C
     asks = [x for x in asked if "force" not in x.header.means and follows(lead(x.x, own.x))]
     kept = [one for one in signals if one is not own and one not in asks and not one.header.speed]
     unit, clock = own.header.unit, columns.clock.header.unit
-    usual, _ = likeliest("period", columns.step, USUAL["t"], "linear")
+    factor = columns.notation.factor
+    usual, _ = likeliest("period", columns.step, USUAL["t"], "linear", factor)
     second = factor(clock.card if clock and clock.quantity == "time" else usual)
     h = columns.step * columns.grid * second / BY_THE_MINUTE.get(unit.plain if unit else "", 1.0)
     x = summed(own.x, np.full(len(own.x), h))
