@@ -8,10 +8,8 @@ import pytest
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
-from identification.columns.names import read_together
 from identification.errors import BadLog
 from tests.workbench.steps.first_card_columns import T, propose, roles
-from workbench.logs.notation import NOTATION
 
 
 @pytest.fixture(scope="module")
@@ -34,30 +32,6 @@ def test_what_all_headers_begin_with_is_the_machines_name(
     found = propose(tmp_path, headers, T, joint["y"], joint["F"], 30.0 + 0.1 * np.sin(T))
     assert roles(found) == {"t": "t", "y": "R_wrist_pos", "F": "R_wrist_load",
                             "temperature": "R_wrist_temp"}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("header", "means", "purpose"),
-    [("torque_current", "command", ""), ("tau_motor", "force", ""),
-     ("command_torque", "force", "reference")],
-)  # fmt: skip
-def test_of_torque_and_current_one_is_meant(header: str, means: str, purpose: str) -> None:
-    (head,) = read_together([(header, "")], NOTATION)
-    assert (set(head.means), head.purpose) == ({means}, purpose)
-
-
-def test_a_torque_in_small_letters_is_in_no_nanometres() -> None:
-    torque, slide, speed = read_together(
-        [("torque_nm", ""), ("position_nm", ""), ("speed_rad_per_s", "")], NOTATION
-    )
-    assert torque.unit is not None and torque.unit.card == "N m"
-    assert slide.unit is not None and slide.unit.card == "nm"
-    assert speed.unit is not None and speed.unit.card == "rad/s"
-
-
-def test_a_function_of_time_is_no_time(joint: dict[str, Array], tmp_path: Path) -> None:
-    heads = read_together([("setpoint(t)", ""), ("input_u(t)", ""), ("output_y(t)", "")], NOTATION)
-    assert all(one.unit is None and "time" not in one.means for one in heads)
 
 
 def test_axes_have_names_of_several_words(
