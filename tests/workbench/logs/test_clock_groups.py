@@ -17,7 +17,7 @@ Y: Array = 0.1 * np.sin(6.0 * T)
 F: Array = np.cos(6.0 * T)
 
 
-def told(names: list[str], *columns: Array) -> Table | None:
+def table_of(names: list[str], *columns: Array) -> Table | None:
     table = Table(tuple(names), lambda k: columns[k])
     return clock_groups(table, [one[:40] for one in columns])
 
@@ -32,14 +32,14 @@ def write(path: Path, names: str, *columns: Array, shorter: int = 0) -> Path:
 
 
 def test_each_column_may_have_its_clock() -> None:
-    found = told(["a", "pos", "b", "cur"], T, Y, T + 4e-4, F)
+    found = table_of(["a", "pos", "b", "cur"], T, Y, T + 4e-4, F)
     assert found is not None
     assert found.groups == ("pos", "pos", "cur", "cur")
     assert dict(found.clocks) == {"pos": 0, "cur": 2}
 
 
 def test_two_instruments_each_have_a_clock() -> None:
-    found = told(["time_a", "pos", "vel", "time_b", "load"], T, Y, F, T + 4e-4, F)
+    found = table_of(["time_a", "pos", "vel", "time_b", "load"], T, Y, F, T + 4e-4, F)
     assert found is not None
     assert found.groups == ("time_a", "time_a", "time_a", "load", "load")
 
@@ -55,7 +55,7 @@ def test_two_instruments_each_have_a_clock() -> None:
     ],
 )
 def test_what_is_no_clock_of_its_own(names: list[str], columns: tuple[Array, ...]) -> None:
-    assert told(names, *columns) is None
+    assert table_of(names, *columns) is None
 
 
 def test_pairs_are_read_on_one_clock(tmp_path: Path) -> None:
