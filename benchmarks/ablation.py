@@ -157,7 +157,7 @@ def halved(rules: Sequence[str], run: Run, tell: Tell) -> list[str]:
     return halved(rules[:middle], run, tell) + halved(rules[middle:], run, tell)
 
 
-def told(
+def table_line(
     rules: Sequence[str], cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]
 ) -> str:
     """A line of the table."""
@@ -195,14 +195,14 @@ def main() -> None:
     if asked.together:
 
         def tell(rules: Sequence[str], found: list[Said]) -> bool:
-            print(told(rules, cases, usual, found), flush=True)
+            print(table_line(rules, cases, usual, found), flush=True)
             return not all(a.same(b) for a, b in zip(usual, found, strict=True))
 
         print("decide:", " ".join(halved(asked.rules, run, tell)))
         return
     with ProcessPoolExecutor(asked.jobs) as pool:
         for rules, found in pool.map(run, [(rule,) for rule in asked.rules]):
-            print(told(rules, cases, usual, found), flush=True)
+            print(table_line(rules, cases, usual, found), flush=True)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,10 @@
 
     python benchmarks/bad_samples.py [--first 100] [--seeds 2] [--machine motor] [--kind jump]
 
-Three machines in closed loop (a rotary motor, an electro-pneumatic one by force and command, a
-stage by its measured force), each logged once without a fault and then with one of each kind, on
+Three machines in closed loop (a rotary motor, an electro-pneumatic one driven by force and command,
+a stage by its measured force), each logged once without a fault and then with one of each kind, on
 each signal, at a random time: in motion, at rest, in a reversal. `moved` is the largest difference
-of a told parameter from the sound log's value, over the half-width of the sound log's interval;
+of a reported parameter from the sound log's value, over the half-width of the sound log's interval;
 `own` over that of the spoilt log's. The method was chosen on seeds below 100; those from 100 on
 judge it. How often something is found in sound logs: `sound_logs.py`.
 """
@@ -189,7 +189,7 @@ def fitted(log: Log, rig: Rig) -> tuple[KarnoppFit, str]:
 
 def moved(clean: KarnoppFit, spoilt: KarnoppFit) -> tuple[float, float, str, int]:
     """Largest difference over the sound log's half-width, over the own, of which, and how many
-    that the sound log tells are not told any more."""
+    that the sound log identifies are not reported any more."""
     worst, own, name, lost = 0.0, 0.0, "-", 0
     for key, one in clean.estimates.items():
         other = spoilt.estimates.get(key)
@@ -233,7 +233,7 @@ def judged(machine: Machine, clean: KarnoppFit, fault: tuple[str, str, Change], 
 
 def spoilt(asked: argparse.Namespace) -> int:
     """The table of spoilt logs; how many moved a parameter."""
-    held = total = 0
+    passed = total = 0
     for name in [asked.machine] if asked.machine else SOUND_MACHINES:
         for seed in range(asked.first, asked.first + asked.seeds):
             machine = SOUND_MACHINES[name](seed)
@@ -241,10 +241,10 @@ def spoilt(asked: argparse.Namespace) -> int:
             print(f"{name} {seed}: chi-square {clean.chi_square:.3g} {said}", flush=True)
             for fault in faults(machine):
                 if asked.kind in f"{fault[1]} {fault[0]}":
-                    held += judged(machine, clean, fault, seed)
+                    passed += judged(machine, clean, fault, seed)
                     total += 1
-    print(f"{held} of {total} spoilt logs move no parameter beyond its interval")
-    return total - held
+    print(f"{passed} of {total} spoilt logs move no parameter beyond its interval")
+    return total - passed
 
 
 def main() -> int:

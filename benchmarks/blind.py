@@ -150,8 +150,8 @@ def run(
     fit_truth: bool = False, seconds: float = SECONDS,
 ) -> None:  # fmt: skip
     """Makes every case that the file does not hold yet, and appends a line for each."""
-    held = done(file)
-    left = [case for case in todo if case.name not in held]
+    answered = done(file)
+    left = [case for case in todo if case.name not in answered]
     with tempfile.TemporaryDirectory() as work, tempfile.TemporaryDirectory() as sealed:
         tracers: queue.SimpleQueue[Tracer] = queue.SimpleQueue()
         every = [Tracer(Path(sealed)) for _ in range(jobs)]

@@ -143,7 +143,7 @@ def clean(lines: Sequence[Line]) -> None:
 
 
 def removed(lines: Sequence[Line]) -> None:
-    """Runs whose effect the library lacked: told as unknown, and by the right signal.
+    """Runs whose effect the library lacked: reported as unknown, and by the right signal.
 
     nothing named: unknown, and no effect named beside it; mimicked: what was named instead brings
     the held-out force error down to the noise.
@@ -169,7 +169,7 @@ def mimicked(line: Line) -> bool:
 
 
 def right_signal(line: Line) -> bool:
-    """Whether the first signals told are among those that the hidden effect depends on."""
+    """Whether the first signals named are among those that the hidden effect depends on."""
     depends = tuple(x for xs in line["truth"]["depends_on"].values() for x in xs)
     return bool(right_signals(depends) & set(line["trace"]["unknown"]["depends_on"]))
 

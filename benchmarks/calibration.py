@@ -87,11 +87,11 @@ def drawn(key: str, seed: int, seconds: float, with_posterior: bool) -> Draw:
     }
     if not with_posterior:
         return Draw({}, normal)
-    walked = sample_posterior(fit, [log], rng, rig=Rig("force"))
-    if not walked.converged:
-        return Draw({}, normal, walked.verdict)
-    below = np.mean(walked.samples < [truth.get(name, np.nan) for name in walked.names], axis=0)
-    ranks = dict(zip(walked.names, below.tolist(), strict=True))
+    sampled = sample_posterior(fit, [log], rng, rig=Rig("force"))
+    if not sampled.converged:
+        return Draw({}, normal, sampled.verdict)
+    below = np.mean(sampled.samples < [truth.get(name, np.nan) for name in sampled.names], axis=0)
+    ranks = dict(zip(sampled.names, below.tolist(), strict=True))
     return Draw({name: ranks[name] for name in ranks if name in truth}, normal)
 
 
@@ -168,10 +168,10 @@ def main() -> None:
                 ("posterior", [one.posterior for one in made]),
                 ("Gauss-Newton", [one.gauss_newton for one in made]),
             ):
-                told = {n: np.array([r[n] for r in given if n in r]) for n in names}
-                told = {n: x for n, x in told.items() if len(x)}
-                kinds[kind].update(told)
-                table(f"{key}, {kind}", told)
+                ranks_of = {n: np.array([r[n] for r in given if n in r]) for n in names}
+                ranks_of = {n: x for n, x in ranks_of.items() if len(x)}
+                kinds[kind].update(ranks_of)
+                table(f"{key}, {kind}", ranks_of)
             reasons = [one.reason for one in made if one.reason]
             print(f"  without a posterior {len(reasons)}", *dict.fromkeys(
                 reason[:90] for reason in reasons[:3]), sep="\n    ", flush=True)  # fmt: skip

@@ -159,14 +159,14 @@ def verdict(found: Trace) -> str:
 
 def effect(found: FoundEffect, rig: Rig) -> str:
     """An effect with its parameters and their 95 % half-widths."""
-    told = []
+    parts = []
     for name, one in effect_estimates(found, rig).items():
         if one.value == 0 and not one.sd:
             continue  # held at nothing
         value = "?" if one.value is None else f"{one.value:.4g}"
         width = f" ± {1.96 * one.sd:.2g}" if one.sd else ""
-        told.append(f"{name} {value}{width} {one.unit}".removesuffix(" 1"))
-    return f"{found.effect.key} ({', '.join(told)}; {100 * found.explained:.3g} %)"
+        parts.append(f"{name} {value}{width} {one.unit}".removesuffix(" 1"))
+    return f"{found.effect.key} ({', '.join(parts)}; {100 * found.explained:.3g} %)"
 
 
 def force(found: Trace, where: str) -> str:
@@ -188,11 +188,11 @@ def _number(of: Errors, name: str, factor: float) -> str:
 
 def drift(found: Trace) -> str:
     """What differs between training and held-out logs."""
-    told = (
+    parts = (
         f"{c.name} {c.before:.4g} -> {c.after:.4g} ± {1.96 * c.sd:.2g} {c.unit}"
         for c in found.drift
     )
-    return "; ".join(told) or "-"
+    return "; ".join(parts) or "-"
 
 
 def main(wanted: Sequence[str]) -> int:

@@ -5,7 +5,7 @@
 
 Machines and loops are those of the blind benchmark (benchmarks/blind_machines.py): the paper's
 three tables, a motor, a machine that logs no command, and random ones. Every stream identifies a
-model from one log of 40 s, puts it in force, and tests further logs of 10, 20 and 40 s at 500 Hz
+model from one log of 40 s, makes it active, and tests further logs of 10, 20 and 40 s at 500 Hz
 with other references. In every second stream each friction parameter varies from log to log by a
 standard deviation of 1 % by itself, which is no drift. Seeds below 9000 served to choose.
 
@@ -81,7 +81,7 @@ class Outcome:
     seen: float = np.inf  # smallest change of both Coulomb levels that could have been seen
 
 
-def put_in_force(one: Machine, seed: int) -> ReferenceModel:
+def activated(one: Machine, seed: int) -> ReferenceModel:
     """The model of one log of the machine as it is."""
     log = simulated(one, (), seed, "model", MODEL).log
     fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
@@ -128,7 +128,7 @@ def tested(
 def stable(name: str, seed: int, logs: int) -> list[Outcome]:
     """A stream of logs without drift; after an alarm the chart begins anew."""
     one = machine(name, seed)
-    model = put_in_force(one, seed)
+    model = activated(one, seed)
     share = VARIATION * (seed % 2)
     rng = stream(seed, name, "stable")
     out: list[Outcome] = []
@@ -146,7 +146,7 @@ def stable(name: str, seed: int, logs: int) -> list[Outcome]:
 def jump(name: str, seed: int) -> list[Outcome]:
     """One log of 40 s after the machine has become that of another table, or has changed a lot."""
     one = machine(name, seed)
-    model = put_in_force(one, seed)
+    model = activated(one, seed)
     rng = stream(seed, name, "jump")
     after = {f"{name} -> {o}": machine(o, seed).friction for o in TABLES if o != name}
     if name not in TABLES:
@@ -161,7 +161,7 @@ def jump(name: str, seed: int) -> list[Outcome]:
 def slow(name: str, seed: int) -> list[Outcome]:
     """Logs of 20 s while a parameter grows by 2 % of its first value a log, up to the alarm."""
     one = machine(name, seed)
-    model = put_in_force(one, seed)
+    model = activated(one, seed)
     share = VARIATION * (seed % 2)
     out = []
     for what, names in SLOW.items():
@@ -180,7 +180,7 @@ def slow(name: str, seed: int) -> list[Outcome]:
 def structure(name: str, seed: int) -> list[Outcome]:
     """One log of 40 s with each effect of 20 % of the Coulomb level."""
     one = machine(name, seed)
-    model = put_in_force(one, seed)
+    model = activated(one, seed)
     place = place_of(one, simulated(one, (), seed, "place", MODEL))
     library = built_in()
     out = []
@@ -198,7 +198,7 @@ def structure(name: str, seed: int) -> list[Outcome]:
 def length(name: str, seed: int) -> list[Outcome]:
     """The same change of both Coulomb forces in logs of 20, 60 and 200 s."""
     one = machine(name, seed)
-    model = put_in_force(one, seed)
+    model = activated(one, seed)
     out = []
     for share in (0.0, 0.01, 0.05, 0.1):
         changed = scaled(one.friction, ("F_cp", "F_cn"), 1.0 + share)
@@ -215,8 +215,8 @@ def lacking(seed: int) -> list[Outcome]:
     fit = fit_plant(logs, np.random.default_rng(seed), rig=STAGE_RIG)
     model = active(fit, STAGE_RIG, key=f"stage{seed}", fastest=speed_of(logs))
     model = with_own_logs(model, logs, np.random.default_rng(seed))
-    told = sum(one.value is not None for one in fit.estimates.values())
-    print(f"  stage {seed}: {told} of 9 identified, chi-square {fit.chi_square:.3g}")
+    tested_share = sum(one.value is not None for one in fit.estimates.values())
+    print(f"  stage {seed}: {tested_share} of 9 identified, chi-square {fit.chi_square:.3g}")
     out = []
     for what, factor, first in (("as it was", 1.0, 3), ("worn", WORN, 30)):
         last: DriftTest | None = None
@@ -294,9 +294,9 @@ def report_stable(found: Sequence[Outcome]) -> None:
         high = 2 * len(judged) / chi2.isf(0.975, 2 * alarms) if alarms else np.inf
         mean = len(judged) / alarms if alarms else np.inf
         kinds = ", ".join(f"{n} {v}" for v, n in Counter(o.verdict for o in rows).items())
-        told = np.mean([o.judged for o in judged])
+        tested_share = np.mean([o.judged for o in judged])
         print(f"  {name:16s} {kinds}; run length {mean:.0f} logs ({low:.0f} to {high:.0f});"
-              f" {told:.1f} parameters judged")  # fmt: skip
+              f" {tested_share:.1f} parameters judged")  # fmt: skip
 
 
 def run(job: tuple[str, str, int, int]) -> list[Outcome]:

@@ -69,7 +69,9 @@ def active(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> Re
     plant = Plant(fit.friction, fit.actuator, fit.effects)
     return ReferenceModel(
         plant, fit.free, values_of(plant, fit.free), fit.covariance, rig, fit.drive,
-        chi_square=fit.chi_square, imposed=fit.imposed,
-        untold={name: one.reason or "" for name, one in fit.estimates.items() if not one.known},
+        chi_square=fit.chi_square, prescribed=fit.prescribed,
+        not_identifiable={
+            name: one.reason or "" for name, one in fit.estimates.items() if not one.known
+        },
         key=key, fastest=fastest,
     )  # fmt: skip

@@ -82,13 +82,13 @@ def cases(given: argparse.Namespace) -> Iterator[Case]:
         "strange": [(one,) for one in STRANGE],
         "lacking": [(one,) for one in given.effects or LACKING],
     }
-    held = {name_of(one) for one in read(given.out)} if given.out else set()
+    written = {name_of(one) for one in read(given.out)} if given.out else set()
     for part in given.part:
         for seed in range(given.first, given.first + given.machines):
             for effects in options[part]:
                 for family in given.families:
                     case = Case(part, family, effects, seed)
-                    if all(shown(one, family) for one in effects) and case.name not in held:
+                    if all(shown(one, family) for one in effects) and case.name not in written:
                         yield case
 
 

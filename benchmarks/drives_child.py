@@ -36,7 +36,7 @@ def fitted(made: Made) -> dict[str, Any]:
     return {
         "nine": {key: asdict(fit.estimates[key]) for key in NAMES},
         "drive": fit.drive, "chi_square": fit.chi_square, "adequate": fit.adequate,
-        "imposed": fit.imposed, "remarks": list(fit.remarks),
+        "prescribed": fit.prescribed, "remarks": list(fit.remarks),
     }  # fmt: skip
 
 

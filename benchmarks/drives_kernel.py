@@ -29,7 +29,7 @@ SIZES = (
 ) = range(25)  # fmt: skip
 State = tuple[float, float, float, float, float, float, float, float]
 # y, v, F; bristle z; Bouc-Wen force; second mass's place and speed; slowed speed.
-Y, V, FORCE, BRISTLES, HELD, PLACE, SPEED, SLOWED = range(8)
+Y, V, FORCE, BRISTLES, HYSTERETIC, PLACE, SPEED, SLOWED = range(8)
 
 
 @compiled_inline
@@ -47,7 +47,7 @@ def driving(x: State, u: float, t: float, act: Array, e: Array) -> float:
         force += e[COG] * np.sin(2.0 * np.pi * y / e[COG_PERIOD])
     if e[SHAKE] != 0.0:
         force += e[SHAKE] * np.sin(2.0 * np.pi * e[SHAKE_RATE] * t)
-    force -= e[K] * y + e[CABLE] * y * y + x[HELD]
+    force -= e[K] * y + e[CABLE] * y * y + x[HYSTERETIC]
     if e[SECOND_MASS] > 0.0:
         force += e[SECOND_K] * (x[PLACE] - y) + e[SECOND_C] * (x[SPEED] - x[V])
     return float(force)
@@ -99,12 +99,23 @@ def slopes(x: State, u: float, t: float, turned: float, mode: int, act: Array, p
         force = act[1] * u - act[2] * moving - e[LEAK] * x[FORCE]
     elif act[0] == LAGGING:
         force = (act[1] * u - x[FORCE]) / act[3]
-    held = (e[BOUC] * moving - abs(moving) * x[HELD]) / e[BOUC_LENGTH] if e[BOUC] > 0.0 else 0.0
+    hysteretic_rate = (
+        (e[BOUC] * moving - abs(moving) * x[HYSTERETIC]) / e[BOUC_LENGTH] if e[BOUC] > 0.0 else 0.0
+    )
     swing = 0.0
     if e[SECOND_MASS] > 0.0:
         pull = e[SECOND_K] * (x[PLACE] - x[Y]) + e[SECOND_C] * (x[SPEED] - moving)
         swing = -pull / e[SECOND_MASS]
-    return (moving, dv, force, dz, held, x[SPEED], swing, (moving - x[SLOWED]) / ACCELERATION_LAG)
+    return (
+        moving,
+        dv,
+        force,
+        dz,
+        hysteretic_rate,
+        x[SPEED],
+        swing,
+        (moving - x[SLOWED]) / ACCELERATION_LAG,
+    )
 
 
 @compiled_inline
@@ -209,8 +220,8 @@ def through(x: State, u: float, t: float, turned: float, mode: int, act: Array, 
             x = with_speed(x, p[6])
         beyond = excess(x, u, t, turned, act, p, e)
         if mode == STUCK:
-            nudge = driving(after, u, t + left, act, e)
-            mode = BAND_P if nudge > 0.0 else BAND_N
+            surplus = driving(after, u, t + left, act, e)
+            mode = BAND_P if surplus > 0.0 else BAND_N
             x = stepped(x, u, t, turned, mode, act, p, e, left)
             return x, mode
         if mode in (BAND_P, BAND_N) and x[V] == p[5]:
@@ -233,7 +244,7 @@ def run(p: Array, act: Array, e: Array, loop: Array, r: Array, dr: Array, noise:
     loop: gain of position and speed, their integrals, speed filter's share, limit, force loop's
     bandwidth, encoder's count, largest force. r, dr, noise (2, ticks): reference, its rate and the
     controller's own sensors, every `tick` steps. at, share: step and part of it at which y and F
-    are read; every: steps between samples, whose commands are those in force.
+    are read; every: steps between samples, whose commands are the active ones.
     """
     n = len(at)
     out = np.zeros((4, n))

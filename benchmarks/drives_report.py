@@ -23,7 +23,7 @@ def wilson(hits: int, count: int) -> str:
 
 
 def errors(found: Found) -> dict[str, float]:
-    """Error over half the interval, by parameter, where both are told and the truth exists."""
+    """Error over half the interval, by parameter, where both are reported and the truth exists."""
     out = {}
     for key, one in found.get("fit", {}).get("nine", {}).items():
         true = found["truth"][key]
@@ -75,8 +75,10 @@ def line(found: Found) -> str:
     if "nine" in found.get("fit", {}):
         z = errors(found)
         fit = found["fit"]
-        told = " ".join(f"{key}:{z[key]:+.2f}" if key in z else f"{key}:-" for key in NAMES)
-        out.append(f"{told} chi2 {fit['chi_square']:.3g} {fit['drive']} {fit['seconds']:.0f} s")
+        of_effect = " ".join(f"{key}:{z[key]:+.2f}" if key in z else f"{key}:-" for key in NAMES)
+        out.append(
+            f"{of_effect} chi2 {fit['chi_square']:.3g} {fit['drive']} {fit['seconds']:.0f} s"
+        )
     if "verdict" in found.get("trace", {}):
         said = found["trace"]
         keys = ", ".join([*said["effects"], *(f"[{one}]" for one in said["depends_on"])]) or "-"
@@ -105,12 +107,12 @@ def coverage(founds: Sequence[Found], title: str) -> None:
     for key in NAMES:
         z = NORMAL * np.array([one[key] for one in every if key in one])
         if not len(z):
-            print(f"{key:6}{'told by no log':>26}")
+            print(f"{key:6}{'of_effect by no log':>26}")
             continue
         pooled.extend(z)
-        told = [one for one, e in zip(founds, every, strict=True) if key in e]
-        sizes = [abs(one["truth"][key]) for one in told]
-        ours = [one["fit"]["nine"][key] for one in told]
+        of_effect = [one for one, e in zip(founds, every, strict=True) if key in e]
+        sizes = [abs(one["truth"][key]) for one in of_effect]
+        ours = [one["fit"]["nine"][key] for one in of_effect]
         half = [0.5 * (x["high"] - x["low"]) / s for x, s in zip(ours, sizes, strict=True)]
         off = [abs(abs(x["value"]) - s) / s for x, s in zip(ours, sizes, strict=True)]
         inside = int(np.sum(np.abs(z) <= NORMAL))
@@ -136,12 +138,12 @@ def verdicts(founds: Sequence[Found], title: str) -> None:
         named = [[*one.get("effects", [])] for one in said]
         keys = [one["keys"] for one in some]
         first = sum(bool(n) and n[0] in k for n, k in zip(named, keys, strict=True))
-        held = sum(bool(k) and set(k) <= set(n) for n, k in zip(named, keys, strict=True))
+        contained = sum(bool(k) and set(k) <= set(n) for n, k in zip(named, keys, strict=True))
         off, over = [ratio(one) for one in some], [of_truth(one) for one in some]
         took = [one["seconds"] for one in said if "seconds" in one]
         counts = ", ".join(f"{len(v)} {k}" for k, v in words.items())
         print(f"{name:22}{wilson(sum(map(right, some)), len(some)):>24}"
-              f"{wilson(first, len(some)):>24}{wilson(held, len(some)):>24}"
+              f"{wilson(first, len(some)):>24}{wilson(contained, len(some)):>24}"
               f"{median(off):9.2f}{median(over):8.2f}{median(took):5.0f}  {counts}")  # fmt: skip
 
 

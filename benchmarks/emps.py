@@ -40,7 +40,7 @@ def main() -> int:
     ways = {
         f"{cutoff:g} Hz, as published": Smoothing(cutoff=cutoff),
         "cut-off from the log": Smoothing(),
-        f"{cutoff:g} Hz, held command": Smoothing(cutoff=cutoff, held=True),
+        f"{cutoff:g} Hz, held command": Smoothing(cutoff=cutoff, zoh=True),
     }
     print(f"{'':34}{'m':>9}{'F_v+':>9}{'F_v-':>9}{'F_c':>8}{'offset':>8}  training  PULSES    ms")
     for viscous in ("symmetric", "directional"):

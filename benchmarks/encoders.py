@@ -6,7 +6,7 @@
 A body with Coulomb, viscous and breakaway friction under a PID loop of 1 kHz, by trapezoidal steps
 of 2 us written apart from the kernels of the fit; its sensors have no noise but the encoder's
 counts (500 to 65536 a turn), and 0.01 N m of a measured torque. Logged are the command of a motor
-("motor"), or the torque, as it acts from its row on ("held") or did until then ("late"), which is
+("motor"), or the torque, as it acts from its row on ("zoh") or did until then ("late"), which is
 half a period to either side of where a line through its samples has it. Seeds 1 to 6 served to
 choose the constants of `identification.estimation.settling`; those from 11 on judge.
 """
@@ -29,7 +29,7 @@ LOOP, STEPS, SECONDS = 1e-3, 500, 30.0  # s, steps in a period, s
 TORQUE_NOISE, LIMIT, BANDWIDTH = 0.01, 5.0, 2.0 * np.pi * 6.0
 WAVES = ((1.0, 0.23), (0.5, 0.71), (0.2, 1.7), (0.05, 4.1))  # rad, Hz
 COUNTS, RATES = (500, 2000, 8000, 65536), (200.0, 1000.0)  # a turn, Hz
-KINDS = ("motor", "held", "late")
+KINDS = ("motor", "zoh", "late")
 SLIDING, STICK = ("m", "F_cp", "F_cn", "F_vp", "F_vn"), ("F_sp", "F_sn")
 
 
@@ -67,10 +67,10 @@ def logged(kind: str, counts: int, rate: float, seed: int) -> tuple[Log, Rig, di
     f_c, f_v = 0.4 * np.exp(rng.uniform(-0.4, 0.4, 2)), 0.03 * np.exp(rng.uniform(-0.4, 0.4, 2))
     stick, phases = rng.uniform(1.1, 1.5), rng.uniform(0.0, 2.0 * np.pi, len(WAVES))
     t = LOOP * np.arange(round(SECONDS / LOOP))
-    held = np.where(t % 10.0 > 7.0, 10.0 * (t // 10.0) + 7.0, t)  # a rest of 3 s in 10
+    zoh = np.where(t % 10.0 > 7.0, 10.0 * (t // 10.0) + 7.0, t)  # a rest of 3 s in 10
     r = np.zeros(len(t))
     for (size, rate_of), phase in zip(WAVES, phases, strict=True):
-        r += size * np.sin(2.0 * np.pi * rate_of * held + phase)
+        r += size * np.sin(2.0 * np.pi * rate_of * zoh + phase)
     y, u, before = run(np.array([m, *f_c, *f_v, stick]), r, 2.0 * np.pi / counts)
     every = round(1.0 / rate / LOOP)
     signals = {"t": t[::every], "y": y[::every]}
@@ -103,7 +103,7 @@ def main() -> int:
     parser.add_argument("--rates", nargs="+", type=float, default=list(RATES), help="Hz")
     asked = parser.parse_args()
     seeds = range(asked.first, asked.first + asked.seeds)
-    print("log                  told  F_c, F_v off by [%]  sliding in 95 %  stick in 95 %  refused")
+    print("log              reported  F_c, F_v off by [%]  sliding in 95 %  stick in 95 %  refused")
     for kind in asked.kinds:
         for counts in COUNTS:
             for rate in asked.rates:
@@ -127,11 +127,11 @@ def row(name: str, found: list[tuple[str, float, bool]], refused: int, seeds: in
     """A line of the table."""
     slides = [one for one in found if one[0] in SLIDING]
     off = [100.0 * abs(error) for key, error, _ in slides if key != "m"]
-    sticks = [held for key, _, held in found if key in STICK]
+    sticks = [zoh for key, _, zoh in found if key in STICK]
     return (
         f"{name:20s} {len(slides):2d}/{5 * seeds}  "
         f"{np.median(off) if off else np.nan:8.3f}             "
-        f"{sum(held for *_, held in slides):3d}/{len(slides):<3d}          "
+        f"{sum(zoh for *_, zoh in slides):3d}/{len(slides):<3d}          "
         f"{sum(sticks):3d}/{len(sticks):<3d}        {refused}"
     )
 

@@ -9,7 +9,7 @@ with noise, and `fit_plant` identifies the log from nothing; so it does with two
 length within the same limits, each as large as they allow: multisine (0.1 to 3 Hz), and the paper's
 steps.
 
-- kept: share of the told parameters whose interval is within a factor of 1.5 of the promise.
+- kept: share of the reported parameters whose interval is within a factor of 1.5 of the promise.
 - covered: share of the true values within the intervals.
 - ratio: relative half interval of the least certain parameter, over that of the rivals (which count
   as 1 where they do not tell it).
@@ -172,7 +172,7 @@ def fitted(one: Machine, r: Array | None, seed: int) -> tuple[KarnoppFit | None,
 
 
 def least_certain(fit: KarnoppFit | None) -> float:
-    """Relative half interval of the least certain parameter, 1 where one is not told."""
+    """Relative half interval of the least certain parameter, 1 where one is not reported."""
     if fit is None or not fit.adequate:
         return 1.0
     out = 0.0
@@ -185,7 +185,7 @@ def least_certain(fit: KarnoppFit | None) -> float:
 
 def kept_of(plan: Experiment, fit: KarnoppFit | None, truth: Plant) -> tuple[float, float]:
     """Shares of the promised parameters whose interval is as wide as promised within KEPT, and of
-    the told ones whose interval holds the truth."""
+    the reported ones whose interval holds the truth."""
     kept, inside, promised = 0, [], [one for one in plan.promise if one.after is not None]
     for one in promised:
         found = None if fit is None else fit.estimates.get(one.name)

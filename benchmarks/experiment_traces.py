@@ -1,11 +1,11 @@
-"""A trace that could not tell which effect a machine has: does the run to make next settle it?
+"""A trace that could not tell which effect a machine has: does the run to make next decide it?
 
     python benchmarks/experiment_traces.py [--first 700] [--cases 50] [--seconds 30] [--budget 30]
 
 Every seed draws a machine and an effect of the library (of `blind_effects`, at 20 %), and logs a
 few moves of 5 s, under five times the usual noise. Where `trace` of that log ends "inseparable" or
 "unknown", the search makes a run of at most 30 s that tells its rivals apart, within limits of the
-machine's own; the true machine runs it, and both logs are traced together. Settled: the verdict is
+machine's own; the true machine runs it, and both logs are traced together. Decided: the verdict is
 "effect", and the effect is the right one, alone or with others. Seeds below 700 served to choose.
 """
 
@@ -69,7 +69,7 @@ def open_question(found: Trace) -> dict[str, object]:
 
 
 def judged(seed: int, seconds: float, budget: float) -> bool | None:
-    """Whether one case is settled; None where its trace left nothing open."""
+    """Whether one case is decided; None where its trace left nothing open."""
     case = case_of(seed)
     key, effects = case.effect.key, (case.effect,)
     before = poor_log(case.machine, seed, effects, seconds=POOR, worse=WORSE)
@@ -89,14 +89,14 @@ def judged(seed: int, seconds: float, budget: float) -> bool | None:
     run, used = logged(case.machine, plan.r, rng, effects=effects)
     after = traced(case, [before, run])
     found = [one.effect.key for one in after.effects]
-    settled = after.verdict == "effect" and key in found
+    decided = after.verdict == "effect" and key in found
     print(
-        f"{said} -> {after.verdict:11s} {' '.join(found):30s} {'settled' if settled else 'OPEN'}"
+        f"{said} -> {after.verdict:11s} {' '.join(found):30s} {'decided' if decided else 'OPEN'}"
         f"  {spent:5.1f} s of a processor, {len(rivals)} rivals"
         f" {' '.join(used.exceeded(plan.limits))}",
         flush=True,
     )
-    return settled
+    return decided
 
 
 def main() -> None:
@@ -106,17 +106,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--budget", type=float, default=30.0)
     asked = parser.parse_args()
-    settled: list[bool] = []
+    decided: list[bool] = []
     seed = asked.first
-    while len(settled) < asked.cases:
+    while len(decided) < asked.cases:
         try:
             found = judged(seed, asked.seconds, asked.budget)
         except UserError as error:
             print(f"{seed:5d} {type(error).__name__}: {error}"[:150], flush=True)
             found = None
-        settled += [] if found is None else [found]
+        decided += [] if found is None else [found]
         seed += 1
-    print(f"{sum(settled)} of {len(settled)} settled by one run (seeds to {seed - 1})")
+    print(f"{sum(decided)} of {len(decided)} decided by one run (seeds to {seed - 1})")
 
 
 if __name__ == "__main__":

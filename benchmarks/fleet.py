@@ -121,19 +121,19 @@ def scaling(folder: Path, work: Path, card: Card) -> None:
 
 
 def errors(out: Path, truths: dict[str, Karnopp]) -> None:
-    """Print the errors of the told parameters of all machines against the truths."""
+    """Print the errors of the reported parameters of all machines against the truths."""
     rows = pq.read_table(out / "results").to_pylist()
     off: list[float] = []
-    told = 0
+    reported = 0
     for row in rows:
         truth = truths[row["machine"]]
         for name in NAMES:
             if row["verdict"] == "identified" and row[name] is not None:
-                told += 1
+                reported += 1
                 off.append(abs(row[name] / getattr(truth, name) - 1.0))
     high, worst = np.quantile(off, 0.99), max(off)
     print(
-        f"errors of {told} told parameters of {len(rows)} machines: median"
+        f"errors of {reported} reported parameters of {len(rows)} machines: median"
         f" {100 * statistics.median(off):.4f} %, 99 % within {100 * high:.3f} %, worst"
         f" {100 * worst:.2f} %"
     )

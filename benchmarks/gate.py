@@ -1,12 +1,13 @@
-"""The gate before a fit: what is said to be told, and what the fit then gives.
+"""The gate before a fit: what is said to be identifiable, and what the fit then gives.
 
     python benchmarks/gate.py [--first 1500] [--machines 500]
 
 Every seed draws a machine (of `blind_machines`) and two logs of it: 6 s of a few moves under ten
 times the usual noise, and 15 s of moves and multisines. `doctor`'s rules say of each parameter
 whether the log can tell it, and within what; `fit_plant` then identifies the log. Wrong is a
-parameter that is said to be told and is null, or has an interval more than twice as wide as
-promised. Missed: one that is said not to be told, and is. Seeds below 1500 served to choose.
+parameter that is said to be identifiable and is null, or has an interval more than twice as wide as
+promised. Missed: one that is said not to be identifiable, and is. Seeds below 1500 served to
+choose.
 """
 
 import argparse
@@ -35,13 +36,13 @@ def judged(log: Log, rig: Rig, seed: int, count: Counter[str]) -> str:
         found = fit.estimates.get(one.name)
         if one.name not in NAMES or found is None:
             continue
-        told = found.value is not None and found.low is not None and found.high is not None
+        reported = found.value is not None and found.low is not None and found.high is not None
         if not one.can:
-            count["missed"] += told
+            count["missed"] += reported
             count["not said"] += 1
             continue
         count["said"] += 1
-        if not told:
+        if not reported:
             wrong.append(f"{one.name} null")
         elif one.within is not None:
             half = 0.5 * ((found.high or 0.0) - (found.low or 0.0)) / abs(found.value or 1.0)
@@ -73,7 +74,7 @@ def main() -> None:
                 wrong = f"{type(error).__name__}: {error}"[:100]
             print(f"{seed:5d} {one.kind:17s} {kind} {wrong or 'kept'}", flush=True)
     said = max(count["said"], 1)
-    print(f"{dict(count)}: wrong {count['wrong'] / said:.1%} of what is said to be told")
+    print(f"{dict(count)}: wrong {count['wrong'] / said:.1%} of what is said to be identifiable")
 
 
 if __name__ == "__main__":

@@ -81,7 +81,7 @@ def make_case(seed: int, words: str, folder: Path) -> Case:
     flips = _flips(signals, rng)
     columns = {name: flips.get(name, 1.0) * x for name, x in signals.items()}
     columns |= _extras(columns, machine, rng)
-    loose: set[str] = set()
+    uncertain: set[str] = set()
     headers, units, values = list[str](), list[str](), list[Array]()
     order = rng.permutation(list(columns))
     for name in order:
@@ -90,11 +90,11 @@ def make_case(seed: int, words: str, folder: Path) -> Case:
         units.append(unit)
         values.append(x)
         if name == "u" and not style.shows_units:
-            loose.add("u")
+            uncertain.add("u")
     path = folder / f"case_{seed}.csv"
     style.write(path, headers, units, np.column_stack(values), rng)
     said = f"{machine.said} ({', '.join(map(str, order))}; {style.said})"
-    return Case(path, said, truth, machine.kinds, machine.rotary, frozenset(loose))
+    return Case(path, said, truth, machine.kinds, machine.rotary, frozenset(uncertain))
 
 
 def _machine(seed: int, rng: np.random.Generator) -> _Machine:

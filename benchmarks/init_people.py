@@ -34,7 +34,7 @@ from identification.errors import UserError
 from workbench.steps.first_card.proposal import proposed
 
 AREA_P, AREA_N = 12.6e-4, 9.4e-4
-LOOSE = 0.995  # correlation from which a signal brought to another clock is the true one
+CORRELATED = 0.995  # correlation from which a signal brought to another clock is the true one
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ KINDS: tuple[Layout, ...] = (
     Layout("clutter", layouts.plain, ("y", "F", "v", "pred", "e", "temperature", "supply", "mode",
                                       "state", "constant", "i2t")),
     Layout("two pressures", layouts.plain, ("y", "p_p", "p_n", "r", "temperature")),
-    Layout("a clock for each signal", layouts.clock_pairs, ("y", "F", "r"), alike=LOOSE),
-    Layout("two instruments", layouts.two_clocks, ("y", "v", "F", "temperature"), alike=LOOSE),
+    Layout("a clock for each signal", layouts.clock_pairs, ("y", "F", "r"), alike=CORRELATED),
+    Layout("two instruments", layouts.two_clocks, ("y", "v", "F", "temperature"), alike=CORRELATED),
     Layout("stamps", layouts.stamps),
     Layout("ticks", layouts.ticks),
     Layout("ugly headers", layouts.ugly),
@@ -68,7 +68,7 @@ KINDS: tuple[Layout, ...] = (
     Layout("struct of a trace", layouts.struct, ("y", "F", "r")),
     Layout("rollout", layouts.rollouts, ("y", "v", "F", "r")),
     Layout("bag", layouts.bag, ("y", "F", "v"), named=False),
-    Layout("blocks", layouts.blocks, ("y", "F", "r", "mode"), alike=LOOSE),
+    Layout("blocks", layouts.blocks, ("y", "F", "r", "mode"), alike=CORRELATED),
     Layout("current", layouts.plain, ("y", "current", "v", "supply", "i2t")),
 )  # fmt: skip
 UNITS: Mapping[str, tuple[str, ...]] = {"y": ("mm", "m"), "v": ("mm/s", "m/s"), "F": ("N",),
@@ -110,8 +110,8 @@ def make_file(seed: int, part: str, folder: Path) -> Table:
     said = f"{kind.said}, {language}, {'units' if shown else 'no units'}, " + (
         "turns" if rotary else "slides"
     )
-    told = kind.named and not (kind.write is layouts.rollouts and part == "judge")
-    shown, known = shown and told, known and told
+    labelled = kind.named and not (kind.write is layouts.rollouts and part == "judge")
+    shown, known = shown and labelled, known and labelled
     return Table(path, said, _cases(path, said, kind, signals, rotary, shown, known))
 
 
@@ -128,10 +128,10 @@ def _cases(
     drive = next(key for key in ("F", "u", "current") if key in kind.holds)
     own = "F" if drive == "F" else "u"
     names = (own,) if known or shown else ("F", "u")
-    loose = frozenset(() if shown else ("F", "u"))
+    uncertain = frozenset(() if shown else ("F", "u"))
     return tuple(
         Case(path, said, truth | {name: signals[drive]},
-             ("force",) if name == "F" else ("motor",), rotary, loose, kind.alike)
+             ("force",) if name == "F" else ("motor",), rotary, uncertain, kind.alike)
         for name in names
     )  # fmt: skip
 

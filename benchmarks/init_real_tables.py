@@ -148,8 +148,8 @@ def make_table(seed: int, part: str, folder: Path) -> Table:
         if kind.counts:
             signals = _counted(signals, kind.counts)
         columns += [_named(words, name, axis, signals, units, style, kind) for name in names]
-        loose = frozenset(() if style and not kind.counts else ("u",))
-        cases.append(Case(path, kind.said, truth, kind.kinds, kind.rotary, loose))
+        uncertain = frozenset(() if style and not kind.counts else ("u",))
+        cases.append(Case(path, kind.said, truth, kind.kinds, kind.rotary, uncertain))
     extra = shared(rng, t)
     for name in rng.permutation(list(extra))[: int(rng.integers(1, 5))]:
         columns.append((str(rng.choice(words[str(name)])), extra[str(name)]))

@@ -59,8 +59,8 @@ def judged(name: str, seed: int) -> Judged:
         squares = _least_squares(folder, machine)
     named = _named(model)
     right = found["verdict"] in machine.right and set(named) == set(machine.names)
-    told = _intervals(model)
-    known = {key: one for key, one in told.items() if key in machine.numbers}
+    bands = _intervals(model)
+    known = {key: one for key, one in bands.items() if key in machine.numbers}
     inside = sum(low <= machine.numbers[key] <= high for key, (low, high) in known.items())
     left = found["after"]["test"]["force_relative"]
     return Judged(

@@ -103,18 +103,18 @@ def report(name: str, trials: list[Trial], with_command: bool) -> None:
         f"\n{name}: {len(trials)} seeds, fit {np.median([t.seconds for t in trials]):.2f} s median"
     )
     print(f"{'':6s}{'median %':>10s}{'worst %':>10s}{'rms %':>10s}{'bound %':>10s}", end="")
-    print(f"{'rms/bound':>11s}{'in 95 %':>9s}{'told':>6s}")
+    print(f"{'rms/bound':>11s}{'in 95 %':>9s}{'reported':>6s}")
     for i, key in enumerate(NAMES):
         column = np.abs(errors[:, i])
-        told = int(np.count_nonzero(np.isfinite(column)))
-        if not told:
+        reported = int(np.count_nonzero(np.isfinite(column)))
+        if not reported:
             print(f"{key:6s}{'not identified in any log':>40s}")
             continue
         share = f"{rms[i] / least[i]:.2f}" if with_command else "-"
         print(
             f"{key:6s}{100 * np.nanmedian(column):10.4f}{100 * np.nanmax(column):10.4f}"
             f"{100 * rms[i]:10.4f}{100 * least[i]:10.4f}{share:>11s}"
-            f"{np.nanmean(inside[:, i]):9.2f}{told:6d}"
+            f"{np.nanmean(inside[:, i]):9.2f}{reported:6d}"
         )
 
 

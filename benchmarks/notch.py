@@ -12,7 +12,7 @@ Without a filter the best is taken of: the P-PI cascade, RST and PID whose poles
 body, and the RST whose poles are placed on both masses; all of them with their margins on the two
 masses, as `design` has them. With: the P-PI cascade with the notch or low-pass that `design`
 proposes. Bandwidth: up to which |S_yp| is below -3 dB on the true machine. A loop whose modulus
-margin on the truth misses what was asked by more than 2 % is told. Seeds below 100 served to
+margin on the truth misses what was asked by more than 2 % is reported. Seeds below 100 served to
 choose.
 """
 
@@ -81,7 +81,7 @@ def machine(seed: int) -> Machine:
     )  # fmt: skip
 
 
-def told(one: Machine, seed: int) -> Machine:
+def as_identified(one: Machine, seed: int) -> Machine:
     """The machine as an identification tells it."""
     rng = np.random.default_rng([seed, 42])
     swing = one.swing.times(1.0 + RESONANCE_OFF * rng.standard_normal())
@@ -136,7 +136,7 @@ def _frequencies(one: Machine) -> tuple[float, float]:
 def judged(seed: int, modulus: float) -> float:
     """Bandwidth with a filter over the best without, on the true machine."""
     truth = machine(seed)
-    known = told(truth, seed)
+    known = as_identified(truth, seed)
     begun = time.process_time()
     plants, goals = plants_of(known), goals_of(known, modulus)
     A, B = truth.plant()

@@ -95,7 +95,7 @@ def run(
     out = np.zeros((3, len(r)))
     sent = np.zeros(64)
     y, v, force, shown, rested = r[0], 0.0, 0.0, r[0], 0.0
-    speed, before, total, held = 0.0, r[0], 0.0, 0.0
+    speed, before, total, hysteretic = 0.0, r[0], 0.0, 0.0
     sub = round(h / EULER)
     dt = h / sub
     smoothed = 1.0 - 0.7 ** (h / 2e-3)  # the loop's low-pass of the speed, of one bandwidth
@@ -123,7 +123,7 @@ def run(
             drive = (
                 force
                 + outer
-                - held
+                - hysteretic
                 - (e[26] if y > 0.0 else 0.0)
                 - e[4] * y
                 - e[5] * y**3
@@ -153,7 +153,7 @@ def run(
             after = v + dt * (drive - friction) / m
             v = 0.0 if after * v < 0.0 else after
             y += dt * v
-            held += dt * (e[23] * v - abs(v) * held) / e[24]
+            hysteretic += dt * (e[23] * v - abs(v) * hysteretic) / e[24]
     return out
 
 

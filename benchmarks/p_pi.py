@@ -89,9 +89,9 @@ def judged(family: str, seed: int, folder: Path | None) -> bool:
         except (NotIdentifiable, BadSpecification) as error:
             print(f"{family} {seed}: leave it ({str(error)[:150]})", flush=True)
             return True
-    told = made.recommendation
-    assert told is not None and made.p_pi is not None
-    leave = made.recommended == "none" or told.keep_present
+    advised = made.recommendation
+    assert advised is not None and made.p_pi is not None
+    leave = made.recommended == "none" or advised.keep_present
     loop = driven_loop(model, made, made.p_pi)
     r, noise = reference_of(one, seed, "test", one.paths[1])
     before = by_present(one, r, noise)
@@ -110,7 +110,7 @@ def judged(family: str, seed: int, folder: Path | None) -> bool:
         f" {after.peak:.0f} N; {time.process_time() - begun:.0f} s",
         flush=True,
     )
-    print("    " + "; ".join([*cascade_lines(made), told.why[:300]]), flush=True)
+    print("    " + "; ".join([*cascade_lines(made), advised.why[:300]]), flush=True)
     return right
 
 

@@ -1,4 +1,4 @@
-"""A registry with many machines, written in bulk: a version in force and a few results each."""
+"""A registry with many machines, written in bulk: an active version and a few results each."""
 
 import math
 from datetime import UTC, datetime, timedelta
@@ -48,9 +48,12 @@ def _block(session: Session, numbers: range, rng: np.random.Generator, now: date
     for k in numbers:
         name, state = f"axis-{k:05d}", STATES[int(rng.integers(len(STATES)))]
         heard = now - timedelta(hours=float(rng.exponential(60.0)))
-        walk = 10.0 * np.exp(0.01 * np.cumsum(rng.standard_normal((len(NAMES_SHOWN), TREND)), 1))
+        random_walk = 10.0 * np.exp(
+            0.01 * np.cumsum(rng.standard_normal((len(NAMES_SHOWN), TREND)), 1)
+        )
         trend = {
-            one: [float(f"{v:.6g}") for v in x] for one, x in zip(NAMES_SHOWN, walk, strict=True)
+            one: [float(f"{v:.6g}") for v in x]
+            for one, x in zip(NAMES_SHOWN, random_walk, strict=True)
         }
         moved = max(trend, key=lambda one: abs(math.log(trend[one][-1] / 10.0)))
         at = {"machine": name, "made_at": now}

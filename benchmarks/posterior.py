@@ -24,14 +24,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=3)
     asked = parser.parse_args()
     rig, rng = Rig("force"), np.random.default_rng
-    for seconds, told in ((3.0, False), (asked.seconds, True)):  # the first fills the cache
+    for seconds, timed in ((3.0, False), (asked.seconds, True)):  # the first fills the cache
         log = made_log(table(1), seed=asked.seed, seconds=seconds)
         for drive in asked.drive:
             fit = fit_plant([log], rng(1), rig=rig, drive=drive)
             begun, spent = time.perf_counter(), time.process_time()
             found = sample_posterior(fit, [log], rng(2), rig=rig)
             took, spent = time.perf_counter() - begun, time.process_time() - spent
-            if told:
+            if timed:
                 rate = found.evaluations / spent
                 print(f"by {drive}: {took:.1f} s, {spent:.1f} s, {rate:.0f} likelihoods/s")
                 print(f"  {found.verdict}")

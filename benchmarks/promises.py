@@ -1,4 +1,5 @@
-"""What doctor says is told, and what identify tells: on every rig and case of the real logs.
+"""What doctor says is identifiable, and what identify reports: on every rig and case of the real
+logs.
 
     python benchmarks/promises.py --out promises.jsonl [--only NAME ...] [--limit 300] [--held-out]
     python benchmarks/promises.py --again promises.jsonl [--held-out]
@@ -35,21 +36,21 @@ WIDTH = 100  # of a reason
 
 @dataclass(frozen=True)
 class Promise:
-    """A parameter of a log, or of the logs of a case: said to be told ("yes", "no", or "if" some
-    condition holds), and told."""
+    """A parameter of a log, or of the logs of a case: said to be identifiable ("yes", "no", or "if"
+    some condition holds), and reported."""
 
     case: str
     logs: str
     name: str
     said: str
-    told: bool
+    identifiable: bool
     why: str
     because: str
 
     @property
     def kept(self) -> bool:
         """Whether the two are the same."""
-        return self.said == ("yes" if self.told else "no")
+        return self.said == ("yes" if self.identifiable else "no")
 
 
 def promises(found: Answers) -> Iterator[Promise]:
@@ -60,10 +61,10 @@ def promises(found: Answers) -> Iterator[Promise]:
         fit, before = found[logs], found.get(f"said_{logs}", {"fault": ""})
         if any(word in one for one in (fit, before) for word in ("over", "fault")):
             continue
-        told, kept = before.get("told", {}), fit.get("kept", {})
+        identifiable, kept = before.get("identifiable", {}), fit.get("kept", {})
         refused = before.get("refused", "")
         for name in NAMES:
-            one, got = told.get(name, {}), kept.get(name, {})
+            one, got = identifiable.get(name, {}), kept.get(name, {})
             said = "yes" if one.get("can") else "if" if one.get("only_if") else "no"
             said = "no" if refused else said
             yield Promise(
@@ -75,19 +76,22 @@ def promises(found: Answers) -> Iterator[Promise]:
 def print_table(found: Sequence[Answers]) -> None:
     """What differs, a line each, and the counts by parameter."""
     every = [one for case in found for one in promises(case)]
-    print("| case | logs | | said | told | doctor's reason | identify's reason |")
+    print("| case | logs | | said | reported | doctor's reason | identify's reason |")
     print("|---|---|---|---|---|---|---|")
     for one in every:
         if not one.kept:
-            told = "yes" if one.told else "no"
+            identifiable = "yes" if one.identifiable else "no"
             why, because = (" ".join(text.split())[:WIDTH] for text in (one.why, one.because))
-            print(f"| {one.case} | {one.logs} | {one.name} | {one.said} | {told} | {why} |"
+            print(f"| {one.case} | {one.logs} | {one.name} | {one.said} | {identifiable} | {why} |"
                   f" {because} |")  # fmt: skip
     print()
-    print('| | said and told | said, not told | not said, told | neither | "only if": told | not |')
+    print(
+        "| | said and reported | said, not reported | not said, reported | neither"
+        ' | "only if": reported | not |'
+    )
     print("|---|---|---|---|---|---|---|")
     for name in (*NAMES, "all"):
-        count = Counter((one.said, one.told) for one in every if name in (one.name, "all"))
+        count = Counter((one.said, one.identifiable) for one in every if name in (one.name, "all"))
         cells = [count[key] for key in (("yes", True), ("yes", False), ("no", True), ("no", False),
                                       ("if", True), ("if", False))]  # fmt: skip
         print(f"| {name} | " + " | ".join(map(str, cells)) + " |")

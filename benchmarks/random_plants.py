@@ -75,10 +75,10 @@ def drawn_reference(
     f = float(np.clip(fastest / (2 * np.pi * amplitude), 0.1, 3.0))
     levels = rng.uniform(-1, 1, 200)
     begins = np.cumsum(rng.uniform(0.3, 1.5, 200))
-    held = levels[np.searchsorted(begins, t)]
+    contained = levels[np.searchsorted(begins, t)]
     phase = rng.uniform(0, 2 * np.pi, 4)
     if kind == "steps":
-        r = held
+        r = contained
     elif kind == "sine":
         r = np.sin(2 * np.pi * f * t)
     elif kind == "multisine":
@@ -88,7 +88,7 @@ def drawn_reference(
         knots = np.concatenate([[0.0], begins])
         r = np.interp(t, knots, np.repeat(levels, 2)[: len(knots)])
     else:
-        r = np.sin(2 * np.pi * f * t) + 0.4 * held
+        r = np.sin(2 * np.pi * f * t) + 0.4 * contained
     return amplitude * r
 
 
@@ -199,7 +199,7 @@ class Outcome:
     @property
     def worst(self) -> str:
         if not self.errors:
-            return "nothing told"
+            return "nothing identifiable"
         key = max(self.errors, key=lambda name: self.errors[name])
         return f"{100 * self.errors[key]:8.3f} % {key:5s}"
 
@@ -259,11 +259,11 @@ def main() -> None:
     print(f"{sum(one.found for one in every)} of {len(every)} found")
     for key in NAMES:
         errors = [100.0 * one.errors[key] for one in every if key in one.errors]
-        held = sum(one.holds.get(key, False) for one in every)
+        contained = sum(one.holds.get(key, False) for one in every)
         if errors:
             print(
                 f"{key:5s} off by {np.median(errors):.4f} % (median), {max(errors):.3g} % at most;"
-                f" {held} of {len(errors)} in 95 %"
+                f" {contained} of {len(errors)} in 95 %"
             )
 
 

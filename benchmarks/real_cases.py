@@ -40,7 +40,7 @@ class Part:
 @dataclass(frozen=True)
 class Truth:
     """A parameter that is known: the range that is right, the value where there is one, and whether
-    "not told" is right too."""
+    "not identifiable" is right too."""
 
     name: str
     low: float
@@ -85,7 +85,7 @@ class Case:
     test: tuple[Part, ...]
     terms: Terms
     array: bool
-    imposed: bool
+    prescribed: bool
     right: Right = field(repr=False)
 
     @property
@@ -113,8 +113,8 @@ def every_case() -> tuple[Case, ...]:
     cases = tomllib.loads(TABLE.read_text("utf-8"))["case"]
     named = {one["name"]: one for one in cases}
     splits = tomllib.loads(SPLITS.read_text("utf-8"))["split"]
-    looked = {"init": None, "doctor": None}  # at the rig's own
-    others = [{**named[one["of"]], **looked, **one, "group": "split"} for one in splits]
+    own_cards = {"init": None, "doctor": None}  # at the rig's own
+    others = [{**named[one["of"]], **own_cards, **one, "group": "split"} for one in splits]
     found = tuple(_case(entry) for entry in (*cases, *others))
     return (*found, *_halves(found))
 
@@ -154,7 +154,7 @@ def _case(entry: Mapping[str, Any]) -> Case:
         test=tuple(Part.of(one) for one in entry.get("test", ())),
         terms=Terms(**terms),
         array=entry.get("array", False),
-        imposed=entry.get("imposed", False),
+        prescribed=entry.get("prescribed", False),
         right=Right(
             entry.get("init"), entry.get("doctor"), truths, verdicts, must, must_not
         ),

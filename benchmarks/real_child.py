@@ -3,9 +3,9 @@
     python -m benchmarks.real_child NAME LIMIT look|identify|trace|both|said|promise
 
 look: init, doctor and yardstick; identify: these and the fit; trace: the yardstick and the trace.
-said: what is told of the first log before a fit, alone, and of all logs; promise: this and what
+said: what is reported of the first log before a fit, alone, and of all logs; promise: this and what
 `identify` then tells (see `promises`); with `_of_test` behind it, of the held-out logs.
-LIMIT: processor time [s], after which the system ends the process; a trace is told to end a little
+LIMIT: processor time [s], after which the system ends the process; a trace is asked to end a little
 before, as by `--budget`. Everything is asked through the functions behind the commands.
 """
 
@@ -42,7 +42,7 @@ SEED = 0
 SHORT, LONG = 0.2, 2.0  # s, windows of the free run
 OF_TEST = "_of_test"
 PROMISES = ("said", "promise", f"said{OF_TEST}", f"promise{OF_TEST}")
-ROOM = 20.0  # s before the limit at which a trace is told to end
+ROOM = 20.0  # s before the limit at which a trace is asked to end
 
 
 def record_of(path: Path, card: Card) -> Record:
@@ -66,7 +66,7 @@ def by_yardstick(
         "width": fit.width, "lag": fit.lag, "h": train[0].h,
         "measured": measured,
     }  # fmt: skip
-    if not case.imposed:
+    if not case.prescribed:
         out |= {f"run_{s:g}": run_errors(test, fit, window_of(test[0], s)) for s in (SHORT, LONG)}
     return out | {"fit": fit}
 
@@ -88,10 +88,10 @@ def judged_model(
     }
     try:
         out["share"] = model_share(model, test, fit, read) if fit else None
-        if not case.imposed:
+        if not case.prescribed:
             out |= {f"run_{s:g}": model_run(model, test, s) for s in (SHORT, LONG)}
     except UserError as error:
-        out["not_judged"] = str(error)
+        out["inconclusive"] = str(error)
     return out
 
 
@@ -105,20 +105,22 @@ def named_in(found: Trace) -> list[str]:
 
 def doctor_answer(found: Examined) -> dict[str, Any]:
     """What the doctor says, as far as it is judged."""
-    told = [f"{one.name}: {one.why} {one.add}" for one in found.identifiability]
+    identifiable = [f"{one.name}: {one.why} {one.add}" for one in found.identifiability]
     bad = [json.dumps(one.as_json(), default=str) for one in found.bad]
     return {
         "delays": {one.of: one.seconds for one in found.delays},
         "rested": None if found.ways is None else found.ways.rested,
         "duration": found.clock.duration,
-        "text": "\n".join([found.refused, *found.remarks, *told, *bad]),
+        "text": "\n".join([found.refused, *found.remarks, *identifiable, *bad]),
     }
 
 
-def said_answer(told: Sequence[Identifiable], refused: str) -> dict[str, Any]:
+def said_answer(identifiable: Sequence[Identifiable], refused: str) -> dict[str, Any]:
     """What is said of each parameter before a fit."""
-    said = {one.name: {"can": one.can, "why": one.why, "only_if": one.only_if} for one in told}
-    return {"refused": refused, "told": said}
+    said = {
+        one.name: {"can": one.can, "why": one.why, "only_if": one.only_if} for one in identifiable
+    }
+    return {"refused": refused, "identifiable": said}
 
 
 def kept_answer(found: Identified) -> dict[str, Any]:

@@ -44,8 +44,8 @@ def _question(about: str, wrong: str) -> Question:
 def final_model(found: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The last answer with parameters; an answer without any where none has; None: not asked."""
     asked = [found[key] for key in ("trace", "identify") if key in found]
-    told = [one for one in asked if "parameters" in one]
-    best: list[Mapping[str, Any]] = told or asked
+    with_parameters = [one for one in asked if "parameters" in one]
+    best: list[Mapping[str, Any]] = with_parameters or asked
     return best[0] if best else None
 
 
@@ -104,7 +104,7 @@ def _parameter(truth: Truth, answer: Mapping[str, Any]) -> str:
         return failed
     value = answer.get("parameters", {}).get(truth.name, {}).get("value")
     if value is None:
-        return "" if truth.or_none else "not told"
+        return "" if truth.or_none else "not identifiable"
     if truth.low <= value <= truth.high:
         return ""
     return f"{value:.4g}, not {truth.low:.4g} to {truth.high:.4g}"
@@ -129,7 +129,7 @@ def _verdict(case: Case, answer: Mapping[str, Any]) -> str:
 
 
 def intervals(case: Case, found: Mapping[str, Any]) -> list[bool]:
-    """Whether each told interval of a parameter with a known value holds it."""
+    """Whether each reported interval of a parameter with a known value holds it."""
     out = []
     parameters = (final_model(found) or {}).get("parameters", {})
     for truth in case.right.truth:

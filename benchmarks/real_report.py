@@ -47,7 +47,7 @@ def row(case: Case, found: Answers) -> list[str]:
     models = [found.get(key, {}) for key in ("yardstick", "identify", "trace")]
     shares = [_cell(one, "share", 100.0) for one in models]
     runs = [
-        "imposed" if case.imposed else " / ".join(_cell(one, key) for one in models)
+        "prescribed" if case.prescribed else " / ".join(_cell(one, key) for one in models)
         for key in ("run_0.2", "run_2")
     ]
     own = [q for q in asked if q.about not in ("init", "doctor", "verdict")]
@@ -126,8 +126,8 @@ def summary(found: Sequence[tuple[Case, Answers]]) -> list[str]:
     headlined = sum(one.get("trace", {}).get("verdict") == "effect" for _, one in found)
     out.append(f"false proofs: {len(proofs)} of {headlined} headlined"
                f" ({', '.join(proofs) or 'none'})")  # fmt: skip
-    held = [hold for case, one in found for hold in intervals(case, one)]
-    out.append(f"intervals that hold: {sum(held)} of {len(held)}")
+    contained = [hold for case, one in found for hold in intervals(case, one)]
+    out.append(f"intervals that hold: {sum(contained)} of {len(contained)}")
     times = [seconds(one) for _, one in found]
     if times:
         out.append(f"median processor seconds: {float(np.median(times)):.0f}")

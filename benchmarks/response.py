@@ -8,8 +8,8 @@ of its own), and 60 s at 2 kHz of moves, in two of three with a small multisine 
 noise on position and force, an encoder on some. `response` is asked for the plant, as its command
 does it; friction: by a model identified from the first 10 s of the log, by the true
 parameters each off by 3 % (one sigma, viscous friction 10 %), or left in.
-Told are: of the points whose coherence is above 0.8, how many lie within 1 dB and 5 degrees of the
-truth (with friction left in too), and how many within the 95 % bands; resonances and
+Reported are: of the points whose coherence is above 0.8, how many lie within 1 dB and 5 degrees of
+the truth (with friction left in too), and how many within the 95 % bands; resonances and
 anti-resonances that the points reach, how many are found within 2 %, and within their 95 %
 interval; those that are invented; processor seconds. --models: where the identified models are kept
 from run to run. Seeds below 100 served to choose, and 100 to 106 for the least that a swinging load
@@ -53,7 +53,7 @@ class Judged:
     inside: int
     reached: int
     found: int
-    told: int
+    summed_up: int
     invented: int
     seconds: float
     identified: float
@@ -100,11 +100,11 @@ def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path 
     points, near, inside = of_points(found.found.position, one)
     by_position = -1.0 / (2.0 * np.pi * found.found.f) ** 2
     points_left, near_left, _ = of_points(found.found.with_friction.times(by_position), one)
-    reached, hit, told_right, invented = of_peaks(found, one)
+    reached, hit, reported_right, invented = of_peaks(found, one)
     sure = found.found.body.sure
     top = float(np.max(found.found.f[sure], initial=0.0))
     return Judged(
-        points, near, inside, reached, hit, told_right, invented,
+        points, near, inside, reached, hit, reported_right, invented,
         ended - middle, middle - begun, top, points_left, near_left,
     )  # fmt: skip
 
@@ -168,14 +168,14 @@ def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int, int]:
 
 
 def _near_one(peak: Peak, one: Machine) -> bool:
-    """Whether a peak is one of the machine's, if badly told (10 %)."""
+    """Whether a peak is one of the machine's, if reported badly (10 %)."""
     true = {"resonance": one.resonance, "anti-resonance": one.anti_resonance}[peak.kind]
     return true is not None and abs(peak.frequency.value / true - 1.0) < 0.1
 
 
-def told(name: str, every: Sequence[Judged]) -> str:
+def summed_up(name: str, every: Sequence[Judged]) -> str:
     """What all machines add up to, in a line."""
-    keys = ("points", "near", "inside", "reached", "found", "told", "invented", "points_left",
+    keys = ("points", "near", "inside", "reached", "found", "reported", "invented", "points_left",
             "near_left")  # fmt: skip
     total = {key: sum(getattr(one, key) for one in every) for key in keys}
     shares = [one.near / one.points for one in every if one.points]
@@ -188,7 +188,7 @@ def told(name: str, every: Sequence[Judged]) -> str:
         f" {total['near_left'] / max(total['points_left'], 1):.1%} of {total['points_left']}),"
         f" {total['inside'] / points:.1%} within the band; peaks in reach"
         f" {total['reached']}, found within 2 % {total['found']}, within their interval"
-        f" {total['told']}, invented {total['invented']}; {np.median(seconds):.2f} s"
+        f" {total['summed_up']}, invented {total['invented']}; {np.median(seconds):.2f} s"
         f" each (at most {max(seconds):.2f})"
     )
 
@@ -216,7 +216,7 @@ def main() -> None:
                 flush=True,
             )
         if every:
-            print(told("two masses" if compliant else "one mass", every), flush=True)
+            print(summed_up("two masses" if compliant else "one mass", every), flush=True)
 
 
 if __name__ == "__main__":

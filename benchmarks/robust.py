@@ -164,11 +164,11 @@ def summary(done: list[Judged], refused: int) -> None:
     for words, chosen in (("all", done), ("passed", [one for one in done if one.passed])):
         print(f"{words}: limit, promised, kept by robust / nominal / PID alone / present")
         for name in limits:
-            told = [one for one in chosen if name in one.promised]
-            if not told:
+            promising = [one for one in chosen if name in one.promised]
+            if not promising:
                 continue
-            promised = np.mean([one.promised[name] for one in told])
-            kept = [share(told, loop, name) for loop in (ROBUST, NOMINAL, PID, PRESENT)]
+            promised = np.mean([one.promised[name] for one in promising])
+            kept = [share(promising, loop, name) for loop in (ROBUST, NOMINAL, PID, PRESENT)]
             print(f"  {name:12} {100 * promised:6.1f} %  " + " / ".join(kept))
     for kind in sorted({one.kind for one in done}):
         own = [one for one in done if one.kind == kind and PID in one.true]
@@ -184,12 +184,12 @@ def summary(done: list[Judged], refused: int) -> None:
     print(f"processor: median {np.median([one.processor for one in done]):.0f} s")
 
 
-def share(told: list[Judged], loop: str, name: str) -> str:
+def share(promising: list[Judged], loop: str, name: str) -> str:
     """Share of the true machines on which the loop keeps the limit, in words."""
     limits = limits_by_name(RobustAsked().limits)
     kept = [
         bool(one.true[loop].within({name: limits[name]})[name][0])
-        for one in told
+        for one in promising
         if loop in one.true and name in one.true[loop].values
     ]
     return f"{100 * np.mean(kept):.0f} %" if kept else "-"

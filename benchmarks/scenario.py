@@ -73,8 +73,8 @@ class Day:
 
 
 @dataclass(frozen=True)
-class Told:
-    """A day's log, what became of it, and the model's F_cp [N] in force after it."""
+class DayResult:
+    """A day's log, what became of it, and the model's active F_cp [N] after it."""
 
     day: Day
     outcome: LogOutcome
@@ -98,13 +98,13 @@ def between(old: Karnopp, new: Karnopp, wear: float) -> Karnopp:
 
 def story(
     root: Path, seed: int, numbers: Iterable[int] = range(24),
-    on_day: Callable[["Told"], None] = lambda _told: None,
-) -> list[Told]:  # fmt: skip
+    on_day: Callable[["DayResult"], None] = lambda _result: None,
+) -> list[DayResult]:  # fmt: skip
     """The logs of these numbers, one after the other, each judged by a pass of its own."""
     machine = root / "machines" / "rig"
     (machine / "logs").mkdir(parents=True)
     (machine / "card.toml").write_text(CARD, encoding="utf-8")
-    told = []
+    results = []
     with Registry(str(root / "registry.db")) as registry:
         every = list(days())
         options = JobOptions(root / "machines", settle=0.0, first=True)
@@ -117,9 +117,9 @@ def story(
             value = None
             if version is not None:
                 value = registry.document(version, "model")["friction"]["F_cp"]["value"]
-            told.append(Told(day, outcome, truth(day).F_cp, value))
-            on_day(told[-1])
-    return told
+            results.append(DayResult(day, outcome, truth(day).F_cp, value))
+            on_day(results[-1])
+    return results
 
 
 def at(now: datetime) -> datetime:
@@ -178,7 +178,7 @@ def silent(_event: str, **_more: object) -> None:
     """A pass's report that goes nowhere."""
 
 
-def line(one: Told) -> str:
+def line(one: DayResult) -> str:
     """One log's line of the timeline."""
     day, known = one.day, "-" if one.in_force is None else f"{one.in_force:.2f}"
     about = ", ".join(
@@ -186,40 +186,40 @@ def line(one: Told) -> str:
         if part
     )  # fmt: skip
     return (
-        f"week {day.week:4.1f}  {about:34s} F_cp {one.true:5.2f} true, {known:>5s} in force  "
+        f"week {day.week:4.1f}  {about:34s} F_cp {one.true:5.2f} true, {known:>5s} active    "
         f"{one.outcome.verdict:10s} {one.outcome.reason}"
     )
 
 
-def picture(told: list[Told], path: Path) -> None:
-    """The timeline as a PNG: F_cp true and in force, and what was made of each log."""
+def picture(results: list[DayResult], path: Path) -> None:
+    """The timeline as a PNG: F_cp true and active, and what was made of each log."""
     from workbench.report.chart_figure import MODEL, OTHER, REFERENCE, figure, label, style
 
-    looks = {
+    marks = {
         "none": ("o", OTHER, "nothing has changed"),
-        "promoted": ("^", MODEL, "new model put in force"),
+        "promoted": ("^", MODEL, "new model active"),
         "effect": ("*", "#cc79a7", "missing effect named and added"),
         "refused": ("v", "#56b4e9", "challenger refused"),
         "structure": ("s", "#e69f00", "structure changed: no model follows"),
         "set_aside": ("x", "#000000", "log excluded"),
         "not_judged": ("d", "#999999", "inconclusive"),
     }
-    week = [one.day.week for one in told]
+    week = [one.day.week for one in results]
     with style():
         drawn = figure(9.0, 3.6)
         axes = drawn.subplots(1, 1)
-        axes.plot(week, [one.true for one in told], color=REFERENCE, label="F_cp, true")
-        known = [np.nan if one.in_force is None else one.in_force for one in told]
-        axes.step(week, known, where="post", color=MODEL, ls="--", label="F_cp in force")
-        for verdict, (marker, colour, words) in looks.items():
-            at = [one for one in told if look_of(one) == verdict]
+        axes.plot(week, [one.true for one in results], color=REFERENCE, label="F_cp, true")
+        known = [np.nan if one.in_force is None else one.in_force for one in results]
+        axes.step(week, known, where="post", color=MODEL, ls="--", label="F_cp, active")
+        for verdict, (marker, colour, words) in marks.items():
+            at = [one for one in results if mark_of(one) == verdict]
             if at:
                 axes.plot(
                     [one.day.week for one in at], [one.true for one in at], marker,
                     color=colour, label=words, ms=11 if marker == "*" else 7,
                 )  # fmt: skip
         low, high = axes.get_ylim()
-        for row, (first, last, words) in enumerate(spans(told)):
+        for row, (first, last, words) in enumerate(spans(results)):
             axes.axvspan(first - 0.2, last + 0.2, color="#eeeeee", zorder=0)
             height = low + (0.03 + 0.07 * (row % 2)) * (high - low)
             axes.text(first - 0.15, height, words, fontsize=8)
@@ -228,16 +228,16 @@ def picture(told: list[Told], path: Path) -> None:
         drawn.savefig(path, dpi=130)
 
 
-def look_of(one: Told) -> str:
+def mark_of(one: DayResult) -> str:
     """What the picture shows of a log: its verdict, "effect" where the trace named one."""
     named = one.outcome.verdict == "promoted" and "Missing: " in one.outcome.reason
     return "effect" if named else one.outcome.verdict
 
 
-def spans(told: list[Told]) -> list[tuple[float, float, str]]:
+def spans(results: list[DayResult]) -> list[tuple[float, float, str]]:
     """Weeks in which something is wrong with the logs, or undeclared is in the machine."""
     found: dict[str, list[float]] = {}
-    for one in told:
+    for one in results:
         words = one.day.fault or ("spring" if one.day.spring else "")
         if words:
             found.setdefault(words, []).append(one.day.week)
@@ -252,11 +252,11 @@ def main() -> None:
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        told = story(
+        results = story(
             Path(name), given.seed, range(given.count), lambda one: print(line(one), flush=True)
         )
     if given.picture:
-        picture(told, given.picture)
+        picture(results, given.picture)
 
 
 if __name__ == "__main__":

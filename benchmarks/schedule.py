@@ -89,14 +89,14 @@ def _model(
 ) -> Model:
     """What an identification would tell of it."""
 
-    def told(value: float, unit: str, error: float) -> Estimate:
+    def estimate(value: float, unit: str, error: float) -> Estimate:
         found = value * float(1.0 + error * rng.standard_normal())
         sd = abs(value) * error
         return Estimate(found, unit, sd, found - 2.0 * sd, found + 2.0 * sd)
 
     (effect,) = truth.effects
     values = {
-        p.name: told(v, p.unit, EFFECT_ERROR if p.linear else 0.0)
+        p.name: estimate(v, p.unit, EFFECT_ERROR if p.linear else 0.0)
         for p, v in zip(effect.effect.params, effect.p, strict=True) if v or not p.optional
     }  # fmt: skip
     h = float(rng.choice([2.5e-4, 5e-4, 1e-3]))
@@ -118,7 +118,7 @@ def _model(
     assert isinstance(truth.actuator, Motor)
     k_a, noise = truth.actuator.k_a, float(np.exp(rng.uniform(np.log(1e-7), np.log(3e-6))))
     rig = Rig("motor", force_per_command=k_a, control_limit=LIMIT)
-    nine = {n: told(getattr(truth.friction, n), UNITS[n], PARAMETER_ERROR) for n in NAMES}
+    nine = {n: estimate(getattr(truth.friction, n), UNITS[n], PARAMETER_ERROR) for n in NAMES}
     return Model(
         card="axis", rig=rig, friction=nine, actuator={"k_a": Estimate(k_a, "N/V")}, plant=None,
         plant_reason="none was fitted", log=(entry,), versions={}, effects={effect.key: values},

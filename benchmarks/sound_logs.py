@@ -9,7 +9,7 @@ of `random_plants`. The thresholds of `identification.signals.jumps` were chosen
 such machines (seeds 1 to 6), the measured sets and the shipped recipes; seeds from 7 on judge them.
 
 The logs of `drives`, whose clocks jitter, go through all that a log goes through before a fit:
-nothing of them may be set aside or refused. Seeds 100 to 111 of them served to choose, those from
+nothing of them may be excluded or refused. Seeds 100 to 111 of them served to choose, those from
 500 on judge; the command at its limit is no finding.
 """
 

@@ -4,7 +4,7 @@
         [--families motor pneumatic force]
 
 What is far from 1 lies in how logs are recorded (rates, clocks, noise), not in any fit. One line a
-machine: the share of the command's step that was told and the true one, the clock's jitter, and
+machine: the share of the command's step that was reported and the true one, the clock's jitter, and
 the misfit of the run in windows. Exit status 0 in any case.
 """
 

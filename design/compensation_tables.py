@@ -14,7 +14,7 @@ from identification.model.plant import Plant
 from identification.simulation.effect_along_motion import contribution
 
 TABLE_ERROR = 2e-3  # largest relative error between the points of a table with room for them
-CURVE_POINTS = 1500  # in which a curve is held against the straight lines of a table
+CURVE_POINTS = 1500  # in which a curve is compared with the straight lines of a table
 TURN_POINTS = 720  # of one turn
 LOWEST_OF_TABLE = 1e-3  # lowest speed of a table, of its highest, where no stick band is identified
 NO_SLOPE = 1e-12  # of the largest, below which an amplitude is none
@@ -53,7 +53,7 @@ class SlidingFriction:
 
     @cached_property
     def speeds(self) -> Array:
-        """Speeds at which tables are held against it, close together where they are low."""
+        """Speeds at which tables are compared with it, close together where they are low."""
         share = np.linspace(0.0, 1.0, CURVE_POINTS)
         low = np.geomspace(self.low, self.high, CURVE_POINTS)
         return np.unique(np.concatenate([low, self.low + share * (self.high - self.low)]))

@@ -72,7 +72,7 @@ STATE_ARRAYS: Mapping[str, tuple[str, str]] = {
     "z_v": ("z_v", "state of filter A and the slope (5)"),
     "z_e": ("z_e", "state of filter B"),
     "z_c": ("z_c", "state of filter C"),
-    "now": ("now", "row of the schedule in force"),
+    "now": ("now", "active row of the schedule"),
 }
 STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "pid": (
@@ -97,7 +97,7 @@ STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("F_ff", "force of the feed-forward"),
         ("v_ref", "velocity of the reference"),
     ),
-    "held": (
+    "past": (
         ("r_moved", "reference, moved at its limited speed"),
         ("integral", "sum of the force loop's error"),
         ("u_before", "command of the sample before, of which the motor's force is known"),

@@ -116,7 +116,7 @@ def sampled(one: Filter, slope: Filter | None = None) -> Sampled:
     return Sampled(np.pad(b, (0, size - b.size)), np.pad(a, (0, size - a.size)))
 
 
-def settled(one: Sampled, x: float) -> Array:
+def steady_state(one: Sampled, x: float) -> Array:
     """The state of the filter, of the length of b, last entry 0, that a past of `x` leaves."""
     b, a = one.b, np.pad(one.a, (0, one.b.size - one.a.size))
     left = b - a * float(b.sum() / a.sum())

@@ -31,7 +31,8 @@ def linear_plant(
     force: ForcePI | None = None,
     ratio: int = 1,
 ) -> tuple[Array, Array]:
-    """(A, B) in z^-1 from the force reference [N] to the position [m] of a sliding body, held.
+    """(A, B) in z^-1 from the force reference [N] to the position [m] of a sliding body, zero-order
+    hold.
 
     m [kg], f [N s/m], h [s]. With an actuator dF/dt = k1 u - k2 v the force loop `force` is part
     of it, run `ratio` times in every h; without, the force is the reference. Coulomb friction is
@@ -51,7 +52,8 @@ def linear_plant(
 
 
 def commanded_plant(m: float, f: float, h: float, actuator: Actuator) -> tuple[Array, Array]:
-    """(A, B) in z^-1 from the held command to the position, without a force loop; see above.
+    """(A, B) in z^-1 from the zero-order-hold command to the position, without a force loop; see
+    above.
 
     Raises BadSpecification where m or h is not positive, or f is negative.
     """
@@ -72,8 +74,8 @@ def force_loop(
 ) -> tuple[Array, Array]:
     """`ratio` samples of a machine (n, n) under its force loop, and what the reference enters by.
 
-    step, entry: of h [s], under a held command; the force is the last state. The integral of the
-    force error comes behind it. Raises BadSpecification where the loop is unstable.
+    step, entry: of h [s], under a zero-order-hold command; the force is the last state. The
+    integral of the force error comes behind it. Raises BadSpecification where the loop is unstable.
     """
     n = len(entry)
     error = np.zeros(n + 1)
@@ -97,7 +99,7 @@ def force_loop(
 
 
 def zoh_step(a: Array, b: Array, h: float) -> tuple[Array, Array]:
-    """Step of x' = a x + b u over h with u held."""
+    """Step of x' = a x + b u over h with u constant."""
     n = len(b)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n] = a, b

@@ -1,6 +1,6 @@
 """The sampled closed loop, compiled: one plant, or WIDTH plants as a structure of arrays.
 
-Sample k: y and F are measured, u follows from them, and is held over [k, k+1), which the plant
+Sample k: y and F are measured, u follows from them, and is constant over [k, k+1), which the plant
 covers in one exact step (`identification.simulation.karnopp_step`). Paper, figures 5 and 10;
 figure 1, upper.
 """
@@ -20,7 +20,7 @@ from identification.simulation.karnopp_lanes import (
     advance,
     place,
     prepare_lanes,
-    settle_flagged,
+    resolve_flagged,
     work_space,
 )
 from identification.simulation.karnopp_step import (
@@ -32,11 +32,11 @@ from identification.simulation.karnopp_step import (
     MODES,
     STUCK,
     exact_step,
+    mode_at,
     mode_row,
     mode_table,
     parameters,
     resolve,
-    settled_mode,
 )
 
 Leading = tuple[float, float, float, float, float]
@@ -91,8 +91,8 @@ def loop_kernel(
 ) -> None:
     """One plant p (1, 11) with actuator and force loop: out (4, n) takes y, v, F, u; modes (n,).
 
-    The position controller runs at every `ratio`-th sample and its force reference is held between.
-    feed: T r at those samples; x: state of the position controller (deg+1,); pi: gains of the
+    The position controller runs at every `ratio`-th sample and its force reference is a zero-order
+    hold. feed: T r at those samples; x: state of the position controller (deg+1,); pi: gains of the
     force error and of its sum; limit: of the command [V], or infinite; noise (n,) on y and F.
     """
     table = np.zeros((MODES, COLUMNS))
@@ -101,7 +101,7 @@ def loop_kernel(
     k1, k2 = plant[K1], plant[K2]
     k_p, k_int = pi
     y, v, force = start
-    mode = settled_mode(plant, v, force)
+    mode = mode_at(plant, v, force)
     v = 0.0 if mode == STUCK else v
     row = mode_row(table, mode)
     r_0, integral, wanted = R[0], 0.0, 0.0
@@ -138,7 +138,7 @@ def motor_kernel(
     out: Array,
     modes: IntArray,
 ) -> None:
-    """One plant with a motor, F = k1 u held over the sample; arguments as in `loop_kernel`.
+    """One plant with a motor, F = k1 u constant over the sample; arguments as in `loop_kernel`.
 
     The recursion of the controller takes the command as clipped: its anti-windup.
     """
@@ -147,7 +147,7 @@ def motor_kernel(
     mode_table(plant, h, table)
     k_a = plant[K1]
     y, v, _ = start
-    mode = STUCK if v == 0.0 else settled_mode(plant, v, 0.0)
+    mode = STUCK if v == 0.0 else mode_at(plant, v, 0.0)
     row = mode_row(table, mode)
     for k in range(len(feed)):
         measured = y + noise_y[k]
@@ -155,7 +155,7 @@ def motor_kernel(
         shift(x, R, S, measured, u)
         force = k_a * u
         if force < row[F_LO] or force > row[F_HI]:
-            mode = settled_mode(plant, v, force)
+            mode = mode_at(plant, v, force)
             v = 0.0 if mode == STUCK else v
             row = mode_row(table, mode)
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, force, u
@@ -265,7 +265,7 @@ def march_loop(
         if keep:
             record_sample(s, modes, base, k, traces)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
+            resolve_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
 
 
 @compiled
@@ -317,7 +317,7 @@ def march_motor(
         if keep:
             record_sample(s, modes, base, k, traces)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
+            resolve_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
 
 
 @compiled

@@ -26,7 +26,7 @@ class OfForce:
 
 
 def pressures(area_p: float, area_n: float, mean: float, supply: float = 0.0) -> dict[str, OfForce]:
-    """Chamber pressures p_p, p_n [Pa] that make the force, their mean held (a four-way valve).
+    """Chamber pressures p_p, p_n [Pa] that make the force, their mean constant (a four-way valve).
 
     area_p, area_n [m^2], mean pressure and supply [Pa] of F = S_p p_p - S_n p_n - (S_p - S_n)
     supply, which is how a log's force is made from its pressures. Raises BadModel where an area

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from design.compensator import Compensator
 from design.drive_law import forgetting
 from design.feed_forward import FeedForward
-from design.filters import PASS, CompensatorFilters, Sampled, sampled, settled
+from design.filters import PASS, CompensatorFilters, Sampled, sampled, steady_state
 from design.force_pi import ForcePI
 from design.loop import Cascade, LoopNoise, LoopRun, observer_form, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
@@ -227,11 +227,11 @@ def moved_reference(servo: Servo, reference: Array, h: float) -> Array:
     """The reference [m], (n,) every h [s], as the servo moves it: at most at its speed and with its
     acceleration; the servo takes it as it is."""
     law = servo_law(servo, h)
-    held = servo_memory(servo, law, float(reference[0]), 0.0).held
+    past = servo_memory(servo, law, float(reference[0]), 0.0).past
     out = np.array(reference, dtype=np.float64)
     for i, r in enumerate(out.tolist()):
         if servo.acceleration is not None:
-            out[i] = profiled(law.rate, law.acceleration, held, r)
+            out[i] = profiled(law.rate, law.acceleration, past, r)
         elif i:
             out[i] = out[i - 1] + min(max(r - out[i - 1], -law.rate), law.rate)
     return out
@@ -283,10 +283,11 @@ def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
         kalman[3:] = np.diag([variance, 1e-6, 1e2]).reshape(9)
     first = F_0 if law.friction == DISTURBANCE else y_0
     return Memory(
-        x=np.zeros(1), pid=np.zeros(3), z_r=settled(Sampled(law.b_r, law.a_r), y_0),
-        z_v=settled(Sampled(law.b_v, law.a_v), first), z_e=settled(Sampled(law.b_e, law.a_e), y_0),
+        x=np.zeros(1), pid=np.zeros(3), z_r=steady_state(Sampled(law.b_r, law.a_r), y_0),
+        z_v=steady_state(Sampled(law.b_v, law.a_v), first),
+        z_e=steady_state(Sampled(law.b_e, law.a_e), y_0),
         z_c=np.zeros(law.b_c.size), kalman=kalman, last=np.zeros(4),
-        held=np.array([y_0, 0.0, 0.0, 0.0, y_0, 0.0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
+        past=np.array([y_0, 0.0, 0.0, 0.0, y_0, 0.0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
         now=np.zeros(1),
     )  # fmt: skip
 

@@ -54,7 +54,7 @@ class Law(NamedTuple):
 
     SCHEDULED_LAW: knots (k,) of what it is scheduled over, rows (k n,) of its table, see
     `design.schedule`; decay: of what was not carried out, span: step of the reference [m] from
-    which its direction is told.
+    which its direction is known.
     """
 
     position: int
@@ -104,7 +104,7 @@ class Memory(NamedTuple):
     z_c: Array
     kalman: Array
     last: Array
-    held: Array
+    past: Array
     turn: IntArray
     now: Array
 
@@ -113,7 +113,7 @@ class Memory(NamedTuple):
 def kalman_step(c: Array, s: Array, h: float, y: float, F: float) -> None:
     """One sample of the friction observer `c` (6,), its memory s (12,): predict by F, correct by y.
 
-    The velocity is stepped exactly under a held force: v+ = e v + (1 - e)/F_v (F - F_f).
+    The velocity is stepped exactly under a zero-order-hold force: v+ = e v + (1 - e)/F_v (F - F_f).
     """
     f = c[K_FVP] if s[1] >= 0.0 else c[K_FVN]
     e = np.exp(-f * h / c[K_M])
@@ -165,32 +165,32 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
 
 
 @compiled_exact
-def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
+def profiled(rate: float, acceleration: float, past: Array, r: float) -> float:
     """The reference [m] moved towards r within its speed and acceleration, so that it stops there.
 
     One whose acceleration does not leap is a path and taken as it is, however fast; after a step
     or a kink it is caught up with, speed and acceleration being relative to what it goes on with.
     From a speed v the way to a stop is v^2/(2 a) at most.
     """
-    left, step = r - held[R_MOVED], held[R_STEP]
-    behind, pace = held[R_BEFORE] - held[R_MOVED], r - held[R_BEFORE]
-    turn = pace - held[R_PACE]
-    smooth = abs(turn - held[R_TURN]) <= PATH_TURN * acceleration
+    left, step = r - past[R_MOVED], past[R_STEP]
+    behind, pace = past[R_BEFORE] - past[R_MOVED], r - past[R_BEFORE]
+    turn = pace - past[R_PACE]
+    smooth = abs(turn - past[R_TURN]) <= PATH_TURN * acceleration
     smooth = smooth and abs(turn) <= PATH_ACCELERATION * acceleration
-    held[R_BEFORE], held[R_PACE], held[R_TURN] = r, pace, turn
+    past[R_BEFORE], past[R_PACE], past[R_TURN] = r, pace, turn
     change = acceleration
     if smooth:
-        held[R_GOES] = pace
+        past[R_GOES] = pace
         step += turn  # it turns with the path
         change = max(acceleration - abs(turn), LEAST_CHASE * acceleration)
-    goes = held[R_GOES]
+    goes = past[R_GOES]
     most = abs(goes) + rate
     path = smooth and behind == 0.0
     gap = left - goes  # to where the reference goes on, at what it goes on with
     near = abs(left - step) <= change and abs(gap) <= change
     if path or (near and abs(left) <= most):
-        held[R_STEP] = left
-        held[R_MOVED] = r
+        past[R_STEP] = left
+        past[R_MOVED] = r
     else:
         way = 1.0 if gap >= 0.0 else -1.0
         ahead, speed = abs(gap), way * (step - goes)
@@ -199,9 +199,9 @@ def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
             faster = speed
             if speed > 0.0 and ahead - speed < speed * (speed - change) / (2.0 * change):
                 faster = speed - change
-        held[R_STEP] = min(max(goes + way * faster, -most), most)
-        held[R_MOVED] += held[R_STEP]
-    return float(held[R_MOVED])
+        past[R_STEP] = min(max(goes + way * faster, -most), most)
+        past[R_MOVED] += past[R_STEP]
+    return float(past[R_MOVED])
 
 
 @compiled_exact
@@ -277,22 +277,22 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     """
     aim = r
     if c.acceleration < math.inf:
-        aim = profiled(c.rate, c.acceleration, s.held, r)
+        aim = profiled(c.rate, c.acceleration, s.past, r)
     elif c.rate < math.inf:
-        aim = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
-        s.held[R_MOVED] = aim
+        aim = s.past[R_MOVED] + min(max(r - s.past[R_MOVED], -c.rate), c.rate)
+        s.past[R_MOVED] = aim
     acts = c.ratio == 1 or s.turn[0] == 0
     if c.position == SCHEDULED_LAW and acts:
         if c.friction == FEED_FORWARD:
             look_up(c, s, aim, s.last[ADDED])
         else:
-            look_up(c, s, aim, c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F)
+            look_up(c, s, aim, c.k_a * s.past[U_BEFORE] if c.k_a != 0.0 else F)
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
     if c.friction == FEED_FORWARD:
         added = friction_force(c, s, aim, y, 0.0) if acts else s.last[ADDED]
     elif c.friction != NO_COUNTERMEASURE:
-        force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
+        force = c.k_a * s.past[U_BEFORE] if c.k_a != 0.0 else F
         added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
     if c.k_a != 0.0 or c.k_i == 0.0:
         free = asked + added / c.k_a if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE else asked
@@ -302,8 +302,8 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     else:
         wanted = asked + added if c.friction != NO_COUNTERMEASURE else asked
         total = min(max(wanted, -c.force_limit), c.force_limit)
-        before = s.held[INTEGRAL_SUM]
-        u, free, s.held[INTEGRAL_SUM] = force_command(total, F, before, c.k_i, c.k_int, c.limit)
+        before = s.past[INTEGRAL_SUM]
+        u, free, s.past[INTEGRAL_SUM] = force_command(total, F, before, c.k_i, c.k_int, c.limit)
         s.last[WANTED] = total - added if c.friction != NO_COUNTERMEASURE else total
         taken = s.last[WANTED]
         if u != free and c.k_i > 0.0:
@@ -316,7 +316,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     by_load = c.position == SCHEDULED_LAW and c.over == OVER_LOAD
     by_load = by_load and c.friction != FEED_FORWARD
     if c.k_a != 0.0 and (by_friction or by_load):
-        s.held[U_BEFORE] = u
+        s.past[U_BEFORE] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0
     return float(u)

@@ -18,11 +18,11 @@ from identification.simulation.karnopp_step import (
     MODES,
     STUCK,
     exact_step,
+    mode_at,
     mode_row,
     mode_table,
     parameters,
     resolve,
-    settled_mode,
 )
 
 SERVO_ROWS = 9
@@ -69,7 +69,7 @@ def servo_kernel(
     past = len(history) - len(modes)
     bristle = place_of(codes, ON_BRISTLE)
     motor = law.k_a != 0.0
-    mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
+    mode = STUCK if motor and v == 0.0 else mode_at(plant, v, F)
     a, u = 0.0, 0.0
     y_load, v_load = start[0], start[1]
     for k in range(len(modes)):
@@ -96,9 +96,9 @@ def servo_kernel(
                 gained = dt * pull / load[LOAD_MASS]
                 y_load += dt * (v_load + 0.5 * gained)
                 v_load += gained
-            held = (state[0], state[1], state[2] - pull, state[3], state[4])
+            pulled = (state[0], state[1], state[2] - pull, state[3], state[4])
             moved = effect_step(
-                plant, count, codes, addresses, q, s, z, spare, bristle, now + j * dt, held, u, g,
+                plant, count, codes, addresses, q, s, z, spare, bristle, now + j * dt, pulled, u, g,
                 dt,
             )  # fmt: skip
             state = (moved[0], moved[1], moved[2] + pull, moved[3], moved[4])
@@ -128,7 +128,7 @@ def plain_servo_kernel(
     k1, k2 = plant[K1], plant[K2]
     motor = law.k_a != 0.0
     y, v, F = start
-    mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
+    mode = STUCK if motor and v == 0.0 else mode_at(plant, v, F)
     v = 0.0 if mode == STUCK else v
     row = mode_row(table, mode)
     for k in range(len(modes)):
@@ -138,7 +138,7 @@ def plain_servo_kernel(
         if motor:
             F, g = g, 0.0
             if row[F_LO] > F or row[F_HI] < F:
-                mode = settled_mode(plant, v, F)
+                mode = mode_at(plant, v, F)
                 v = 0.0 if mode == STUCK else v
                 row = mode_row(table, mode)
         out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = y, v, F, u, measured

@@ -20,7 +20,7 @@ INTEGRAL_OVER_LOOP = 6.0  # k_p T_i: the integral's time over the loop's
 HALVINGS = 40
 BOTH_GAINS = ("g_p", "g_n")
 SLOW_END = "delay, lag, gains high"
-SETTLES, LONGEST_RESPONSE = 8.0, 20_000  # time constants and periods of a step response
+SETTLING_CONSTANTS, LONGEST_RESPONSE = 8.0, 20_000  # time constants and periods of a step response
 NEAR = 10.0  # bands from the target, within which the integral works
 
 
@@ -132,7 +132,9 @@ def tuned(
 
 def step_overshoot(A: Array, B: Array, k_p: float) -> float:
     """Overshoot of the position's step, relative to it, under k_p [1/s] alone."""
-    dies = int(np.ceil(SETTLES / (1.0 - float(np.max(np.abs(np.roots(add(A, k_p * B))))))))
+    dies = int(
+        np.ceil(SETTLING_CONSTANTS / (1.0 - float(np.max(np.abs(np.roots(add(A, k_p * B)))))))
+    )
     y = lfilter(k_p * B, add(A, k_p * B), np.ones(min(dies, LONGEST_RESPONSE)))
     return float(np.max(y)) - 1.0
 

@@ -51,27 +51,27 @@ def _jit(function: Callable[Arguments, Result], **options: Any) -> Callable[Argu
 
 
 class _Compiling(event.Listener):
-    """Tells when the first of the kernels under compilation begins, and when the last ends."""
+    """Reports when the first of the kernels under compilation begins, and when the last ends."""
 
-    def __init__(self, told: Callable[[bool], None]) -> None:
-        self._told, self._depth = told, 0
+    def __init__(self, report: Callable[[bool], None]) -> None:
+        self._report, self._depth = report, 0
 
     def on_start(self, event: Any) -> None:
         self._depth += 1
         if self._depth == 1:
-            self._told(True)
+            self._report(True)
 
     def on_end(self, event: Any) -> None:
         self._depth -= 1
         if self._depth == 0:
-            self._told(False)
+            self._report(False)
 
 
 @contextmanager
-def while_compiling(told: Callable[[bool], None]) -> Iterator[None]:
-    """Within the block, told whenever kernels that are in no cache begin to be compiled (True), and
-    when they have been (False)."""
-    with event.install_listener("numba:compile", _Compiling(told)):
+def while_compiling(report: Callable[[bool], None]) -> Iterator[None]:
+    """Within the block, `report` is called whenever kernels that are in no cache begin to be
+    compiled (True), and when they have been (False)."""
+    with event.install_listener("numba:compile", _Compiling(report)):
         yield
 
 
@@ -169,8 +169,8 @@ def _made_of(kernel: Any, seen: set[object]) -> Iterator[str]:
     seen.add(function)
     yield _text_of(function)
     names = frozenset(_names_in(function.__code__))
-    held = [cell.cell_contents for cell in function.__closure__ or ()]
-    for value in (*function.__annotations__.values(), *held):
+    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+    for value in (*function.__annotations__.values(), *enclosed):
         yield from _meant_by("", value, names, seen)
     for name in sorted(names & function.__globals__.keys()):
         yield from _meant_by(name, function.__globals__[name], names, seen)

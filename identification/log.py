@@ -43,7 +43,7 @@ class Log:
     `y` position [m], `F` applied force F_e [N], `u` command [V, or the
     rig's command_unit], `r` reference [m]; any further
     name is a signal that effects may use. lost (n,): rows that the logger has lost, whose values
-    lie between those of their neighbours. held: F is a zero-order hold, constant from each row to
+    lie between those of their neighbours. zoh: F is a zero-order hold, constant from each row to
     the next. of_place (n,): the part of F [N] that acts at a place, over each sample, and is not
     commanded (gravity, cogging), None for none. Arrays are read-only copies. Raises BadLog where
     the lengths differ or `t` is missing.
@@ -52,7 +52,7 @@ class Log:
     name: str
     signals: Mapping[str, Array]
     lost: BoolArray | None = None
-    held: bool = False
+    zoh: bool = False
     of_place: Array | None = None
 
     def __post_init__(self) -> None:

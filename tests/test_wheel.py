@@ -37,10 +37,12 @@ def test_every_module_is_there(names: list[PurePosixPath]) -> None:
 
 
 def test_cards_are_there_and_no_python_among_them(names: list[PurePosixPath]) -> None:
-    held = {path.relative_to("workbench/_datasets") for path in names if "_datasets" in path.parts}
+    contained = {
+        path.relative_to("workbench/_datasets") for path in names if "_datasets" in path.parts
+    }
     cards = {PurePosixPath(p.relative_to(ROOT / "datasets")) for p in _cards()}
-    assert cards <= held
-    assert not [path for path in held if path.suffix == ".py"]
+    assert cards <= contained
+    assert not [path for path in contained if path.suffix == ".py"]
 
 
 def test_the_description_needs_no_file_of_the_checkout(wheel: Path) -> None:

@@ -21,7 +21,7 @@ from workbench.threads import one_thread
 Clock = Callable[[], float]  # s
 Stages = Mapping[str, tuple[float, float]]
 
-BEAT = 1.0  # s between two looks at the clock, whatever the computation does
+BEAT = 1.0  # s between two readings of the clock, whatever the computation does
 FIRST_GUESS = 30.0  # s, of a computation of which nothing is known yet
 AT_LEAST = 0.3  # of what is left of the bar, for a stage that begins late
 ALL_BUT = 0.99  # of the bar, that only the end itself fills

@@ -45,7 +45,7 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     assumed = {
         name: used(one)
         for name, one in every.items()
-        if name in known.untold and name != "k_a" and used(one) != 0.0
+        if name in known.not_identifiable and name != "k_a" and used(one) != 0.0
     } | lost_bands(model)
     free = np.exp(UNIDENTIFIED_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)

@@ -20,7 +20,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
 
 FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design
-IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has then done 80 %
+FORCE_LOOP_SAMPLES = 5  # of the force loop in one of the position loop; it has then done 80 %
 LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
 WHOLE_SAMPLE = 1e-3  # of a sample, up to which a delay counts as whole
 MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
@@ -74,7 +74,7 @@ def periods(model: Model) -> tuple[float, ...]:
     now = model.controller
     base = now.law.h if now else model.period
     if isinstance(model.simulated.actuator, Actuator):
-        base = max(base, IN_FORCE_SAMPLES * force_period(model))
+        base = max(base, FORCE_LOOP_SAMPLES * force_period(model))
     return tuple(n * base for n in MULTIPLES if n == 1 or n * base <= LONGEST_PERIOD)
 
 
@@ -185,7 +185,7 @@ def dead_time(model: Model) -> float:
 def delayed(b: Array, samples: float) -> Array:
     """The numerator B(z^-1) of a plant whose input acts so many samples later.
 
-    A part of a sample is shared between its two ends, as the mean of a held command is.
+    A part of a sample is shared between its two ends, as the mean of a zero-order-hold command is.
     """
     whole = math.floor(samples + WHOLE_SAMPLE)
     part = max(samples - whole, 0.0)

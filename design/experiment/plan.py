@@ -226,7 +226,7 @@ def experiment(
         separation=_apart(seen[1][0], keys) if seen and rivals else (),
         safety=safety,
         efficiency=float(np.exp((plan.joined - plan.bound) / per)),
-        chaotic=seen[1][0].loose if seen else 1.0,
+        chaotic=seen[1][0].chaotic if seen else 1.0,
         tried=plan.tried,
         seed=wanted.seed,
         remarks=tuple(_remarks(model, safety.scale)),

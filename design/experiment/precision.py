@@ -37,7 +37,7 @@ class Machine:
     def chance_penalty(self, information: Information) -> float:
         """What it costs that a part of a run is sensitive to chance."""
         return PER_CHAOTIC * max(
-            information.loose - (CHAOTIC_WHOLE if self.whole else CHAOTIC_WINDOWS), 0.0
+            information.chaotic - (CHAOTIC_WHOLE if self.whole else CHAOTIC_WINDOWS), 0.0
         )
 
 

@@ -149,15 +149,15 @@ def no_body(columns: Columns) -> BadLog:
             " by Park's transform with the electrical angle"
         )
     pair = _followed(columns.signals)
-    if pair is not None and (told := _hardly_moves(pair, columns.signals)):
-        return BadLog(f"{columns.log.where}: {told}")
+    if pair is not None and (reason := _hardly_moves(pair, columns.signals)):
+        return BadLog(f"{columns.log.where}: {reason}")
     if pair is not None:
         return BadLog(
             f"{columns.log.where}: column {pair[0].shown} follows its reference {pair[1].shown},"
             " and no force and no command of the motor is logged; log its current, torque or force"
             " too: reference and position alone identify no friction"
         )
-    unsigned = f"; {told}" if (told := without_sign(columns.signals)) else ""
+    unsigned = f"; {reason}" if (reason := without_sign(columns.signals)) else ""
     there = ", ".join(one.shown for one in columns.signals) or "none"
     left_out = "; ".join(
         f"left out: column {one.shown}: {why}"

@@ -11,12 +11,12 @@ from design.machine.surrounding_lines import surrounding_lines
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.estimates import Events, silent_reason
-from identification.estimation.first_look import FirstLook, first_look
-from identification.estimation.imposed_motion import WHY_NOT
+from identification.estimation.preliminary_fit import PreliminaryFit, preliminary_fit
+from identification.estimation.prescribed_motion import WHY_NOT
 from identification.estimation.recorded_logs import (
     RecordedLogs,
     commanded,
-    led_by_rig,
+    is_prescribed,
     recorded_logs,
 )
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
@@ -113,10 +113,10 @@ def identifiable_by_log(
     """Whether each of the nine, and of the actuator's parameters, is identified by a fit of the
     logs.
 
-    fit: the fit itself, or a first look at it; open_run: whether its run may be followed or not.
+    fit: the fit itself, or its first part; open_run: whether its run may be followed or not.
     """
-    run = {} if fit.imposed else identifiability(recorded)
-    prescribed = led_by_rig(recorded)
+    run = {} if fit.prescribed else identifiability(recorded)
+    prescribed = is_prescribed(recorded)
     out = []
     for name in NAMES:
         found, by_run = fit.estimates.get(name), open_run and name not in FIVE
@@ -138,7 +138,7 @@ def identifiable_by_log(
             one = fit.estimates[name]
             why = one.reason or "the force follows the command as a linear actuator's"
             out.append(Identifiable(name, one.value is not None, why))
-    elif not recorded.held:
+    elif not recorded.zoh:
         why, add = "no command is logged", MEND["k"]
         if commanded(recorded.plain):
             why, add = "the force does not follow the command as a linear actuator's", ""
@@ -153,7 +153,7 @@ def _identifiable(
     """By what a parameter is identified, and within what share of it."""
     assert found.value is not None and found.low is not None and found.high is not None
     half = 0.5 * (found.high - found.low) / abs(found.value)
-    if fit.imposed:
+    if fit.prescribed:
         which = "the force equation" if prescribed else "the equation of motion alone"
         return Identifiable(name, True, f"to {half:.1%} by {which}", within=half)
     within = run.within if run is not None and run.can else half
@@ -225,7 +225,7 @@ def identifiability_of_runs(
         if not scaled:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
             rig = replace(rig, force_per_command=1.0)
-        first = first_look(runs, rig, drive) if fit is None else FirstLook(fit)
+        first = preliminary_fit(runs, rig, drive) if fit is None else PreliminaryFit(fit)
         around = first.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
@@ -235,7 +235,7 @@ def identifiability_of_runs(
     ways = _ways(recorded.logs, m)
     seen = identifiable_by_log(recorded, ways, first.fit, open_run=first.open)
     shown = None
-    if effects and not led_by_rig(recorded):
+    if effects and not is_prescribed(recorded):
         shown = tellable_effects(recorded, built_in())
     said = surrounding_lines(around, rig, scaled=scaled)
     return RunsIdentifiability(motion, ways, seen, remarks=said, effects=shown, surroundings=around)

@@ -29,7 +29,7 @@ from identification.arx.residual_tests import residual_tests
 from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import is_unexplained
+from identification.estimation.prescribed_motion import is_unexplained
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
@@ -166,7 +166,7 @@ def _correlation(fit: KarnoppFit) -> ParameterCorrelation:
 
 
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
-    """All nine; those that the fit held have their assumed value."""
+    """All nine; those that the fit kept fixed have their assumed value."""
     units = friction_units(rig.motion)
     unseen = "fixed at a value that does not matter for these logs"
     return {
@@ -223,8 +223,8 @@ def _force_error(logs: Sequence[Log], fit: KarnoppFit, rig: Rig) -> ForceError |
     if fit.left is not None:
         return ForceError(*fit.left)
     try:
-        held = rig.kind == "motor" or fit.surroundings.held
-        return force_error(logs[0], fit.friction, Smoothing(held=held))
+        zoh = rig.kind == "motor" or fit.surroundings.zoh
+        return force_error(logs[0], fit.friction, Smoothing(zoh=zoh))
     except (NotIdentifiable, BadLog):
         return None
 

@@ -166,7 +166,7 @@ def trace_velocity(
     numbers = valve_estimates(record, left.fitted, _units(train))
     named = next((one for one in left.rivals if one.key == left.named), None)
     noise = (unseen or record).noise
-    model = _model(train, numbers, named.left if named else left.held, noise, ())
+    model = _model(train, numbers, named.left if named else left.unextended, noise, ())
     if left.named is not None:
         beside = estimates_beside(left.fitted, STRUCTURES[left.named].adds, _units(train))
         model = replace(model, effects={left.named: beside})

@@ -73,7 +73,8 @@ class FitSummary:
     drive: what the fitted run was driven by; stiffness [N/m] couples a force-driven one to the
     measured position. force_relative, force_rms [N]: the mechanical equation on sliding samples.
     command_period [s]: after which the drive gives its next command, None where that is the log's;
-    of a run driven by a measured force: for which that is held, None where it is not.
+    of a run driven by a measured force: for which that is constant (zero-order hold), None without
+    one.
     """
 
     drive: Drive

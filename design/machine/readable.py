@@ -1,4 +1,4 @@
-"""Units in which a machine's numbers are held, estimates in other units brought to them, and
+"""Units in which a machine's numbers are kept, estimates in other units brought to them, and
 numbers as an engineer reads them: no exponents, lengths in mm, digits that say something."""
 
 import math

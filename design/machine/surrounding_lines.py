@@ -35,7 +35,7 @@ def surrounding_lines(around: Surroundings, rig: Rig, *, scaled: bool = True) ->
             " offset, a wrong area or supply pressure): F_cp and F_cn are estimated with it, as"
             " equal within a tenth"
         )
-    if around.held:
+    if around.zoh:
         until = "until" if around.lag.value else "from"
         lines.append(f"the force acts as it stands {until} its row, constant between rows")
     elif around.lag.value:

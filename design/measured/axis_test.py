@@ -17,7 +17,7 @@ from design.measured.axis_limits import MEANING_OF, Allowed, Light, light_of, li
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
 from identification.estimation.estimates import counted, reported_estimate
-from identification.estimation.imposed_motion import WHY_NOT
+from identification.estimation.prescribed_motion import WHY_NOT
 from identification.estimation.surroundings import surroundings
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.surroundings import Surroundings

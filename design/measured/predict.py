@@ -13,7 +13,7 @@ from identification.effects._base import Acting
 from identification.errors import BadLog, BadModel
 from identification.estimation.latent_force import LatentForces, latent_forces
 from identification.estimation.recorded_logs import RecordedLogs, plain_share, with_share
-from identification.estimation.regression.held_command import with_period
+from identification.estimation.regression.intersample_command import with_period
 from identification.estimation.structure_fit import ABOVE_BAND
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
@@ -92,7 +92,7 @@ def predict(
     log = of_one_instant(with_motor_force(with_applied_force(log, model.rig), plant), model)
     body = of_body(log, plant)
     restarts = None if window is None else _restarts(body, window)
-    how = Smoothing(held=model.holds_force)
+    how = Smoothing(zoh=model.holds_force)
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
     run, refused = _run(model, log, body, chosen, restarts)
@@ -262,14 +262,14 @@ def with_applied_force(log: Log, rig: Rig) -> Log:
 
 def of_one_instant(log: Log, model: Model) -> Log:
     """The log with its force at the instants of its position, where its columns are apart and no
-    effect of the model says so, and held between them as the model's logs showed it."""
-    held = model.holds_force and model.rig.kind != "motor"
-    if "input_delay" in model.effects or (model.lag is None and not held):
+    effect of the model says so, and constant between them as the model's logs showed it."""
+    zoh = model.holds_force and model.rig.kind != "motor"
+    if "input_delay" in model.effects or (model.lag is None and not zoh):
         return log
     drive = model.simulated.actuator
     gives = drive.k_a if isinstance(drive, Motor) else None
     lag = NOT_SHOWN if model.lag is None else Size(used(model.lag))
-    return Surroundings(lag=lag, gives=gives, held=held).of_one_instant(log)
+    return Surroundings(lag=lag, gives=gives, zoh=zoh).of_one_instant(log)
 
 
 def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
@@ -280,7 +280,7 @@ def missing_force(model: Model, logs: Sequence[Log]) -> LatentForces | None:
         return None
     given = [of_one_instant(with_applied_force(log, model.rig), model) for log in logs]
     drive: Drive = "command" if model.rig.kind == "motor" else "force"
-    read = RecordedLogs((), model.rig, drive, imposed=model.prescribed_motion).of(given)
+    read = RecordedLogs((), model.rig, drive, prescribed=model.prescribed_motion).of(given)
     recorded = with_share(read, plain_share(read))
     plants = [seen_moving(model, log) for log in given]
     plant = max(plants, key=lambda one: one.friction.dv_p - one.friction.dv_n)

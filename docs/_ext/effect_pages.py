@@ -27,7 +27,7 @@ SIGNALS = {
     "reversal": "the way since the motion reversed",
 }  # fmt: skip
 MUST = {
-    "y": "a motion over the stroke, so that place can be told from speed",
+    "y": "a motion over the stroke, so that place can be distinguished from speed",
     "v": "sliding at many speeds, slow ones too",
     "F": "forces that vary apart from speed: acceleration, braking, a load",
     "u": "the command itself, and changes of its sign",

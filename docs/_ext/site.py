@@ -54,9 +54,9 @@ def _make(app: Sphinx) -> None:
         path.write_text(text, "utf-8")
     if not app.config.run_pages:
         return
-    with ExitStack() as held:
-        work = Path(held.enter_context(tempfile.TemporaryDirectory(prefix="pages-")))
-        url = held.enter_context(registry_url())
+    with ExitStack() as stack:
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pages-")))
+        url = stack.enter_context(registry_url())
         pages = Pages(home, work, {"POSTGRES": url})
         try:
             pages.run()

@@ -125,9 +125,9 @@ def select_arx(
     fitted on the estimation runs alone. Raises BadLog, BadModel, and NotIdentifiable where no
     order at all can be estimated.
     """
-    fitted, held = _runs(logs, validation, split)
+    fitted, held_out = _runs(logs, validation, split)
     largest = orders.largest
-    fit, test = factor_of(fitted, largest), factor_of(held, largest)
+    fit, test = factor_of(fitted, largest), factor_of(held_out, largest)
     if test.rows <= largest.size:
         raise BadLog(
             f"{test.rows} validation samples after the first {largest.lag} of each run; more than "
@@ -135,13 +135,13 @@ def select_arx(
         )
     found = list(_candidates(fit, test, orders, h, offset))
     best = min(found, key=lambda candidate: candidate.one_step_rms)
-    errors = [one_step_errors(best.model, u, y) for u, y in held]
+    errors = [one_step_errors(best.model, u, y) for u, y in held_out]
     independent = effective_samples(errors)
     floor = (ROUNDING_SHARE * float(np.linalg.norm(test.R[:, -1]))) ** 2 / test.rows
-    shortlist = _best_of_size(found, held)
+    shortlist = _best_of_size(found, held_out)
     if criterion == "simulation":
         best = min(shortlist, key=lambda candidate: candidate.simulation_rms)
-        independent = effective_samples([simulation_errors(best.model, u, y) for u, y in held])
+        independent = effective_samples([simulation_errors(best.model, u, y) for u, y in held_out])
     tolerance = SIGMAS**2 / independent
 
     def error(candidate: ArxCandidate) -> float:
@@ -199,12 +199,14 @@ def _one_step_rms(test: Factor, order: Order, model: ArxModel) -> float:
     return float(np.linalg.norm(errors) / np.sqrt(test.rows))
 
 
-def _best_of_size(found: Sequence[ArxCandidate], held: Sequence[Run]) -> list[ArxCandidate]:
+def _best_of_size(found: Sequence[ArxCandidate], held_out: Sequence[Run]) -> list[ArxCandidate]:
     out = []
     for size in sorted({candidate.size for candidate in found}):
         same = [candidate for candidate in found if candidate.size == size]
         best = min(same, key=lambda candidate: candidate.one_step_rms)
-        out.append(ArxCandidate(best.model, best.one_step_rms, _simulation_rms(best.model, held)))
+        out.append(
+            ArxCandidate(best.model, best.one_step_rms, _simulation_rms(best.model, held_out))
+        )
     return out
 
 

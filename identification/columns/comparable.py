@@ -16,8 +16,8 @@ from identification.log import Log
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.even_clock import LONGEST_GAP
 from identification.signals.offsets import OF_TURN, unwrapped
-from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, held_for, new_values
-from identification.signals.stamps import even_stamps, sound_rows, stretches, told_of_starts
+from identification.signals.renewal import LONGEST_HOLD, USUAL_FROM, hold_length, new_values
+from identification.signals.stamps import even_stamps, sound_rows, starts_in_words, stretches
 from identification.thresholds import OF_ACCOUNT, TWICE
 
 MOST_MISSING = 0.1  # of a column that is used
@@ -55,8 +55,8 @@ def at_sound_rows(columns: Sequence[Column]) -> tuple[list[Column], tuple[str, .
             clock = replace(one, values=even, x=even)
             if late or ((said or len(at) < len(rows)) and ticks(clock)):
                 if len(runs) > 1:
-                    told = told_of_starts(one.values[rows], runs)
-                    said = (*said, f"the {told}, of which this is what the longest shows")
+                    starts = starts_in_words(one.values[rows], runs)
+                    said = (*said, f"the {starts}, of which this is what the longest shows")
                 return [clock if c is one else replace(c, values=c.values[at], x=c.values[at])
                         for c in columns], (*said, late)  # fmt: skip
     return list(columns), ()
@@ -127,15 +127,15 @@ def on_grid(one: Column, t: Array, x: Array, step: float, size: int) -> Column:
     values: its steps are no motion.
     """
     good = np.isfinite(x)
-    held = held_for(x) if _may_be_position(one) else 1
-    held = held if USUAL_FROM <= held <= LONGEST_HOLD else 1
-    if held > 1:
-        good = np.isin(np.arange(len(x)), np.union1d(0, new_values(x, held)))
+    hold = hold_length(x) if _may_be_position(one) else 1
+    hold = hold if USUAL_FROM <= hold <= LONGEST_HOLD else 1
+    if hold > 1:
+        good = np.isin(np.arange(len(x)), np.union1d(0, new_values(x, hold)))
     count = min(round((t[-1] - t[0]) / step) + 1, 50 * len(t))
     even = np.interp(t[0] + step * np.arange(count), t[good], x[good])
     whole = len(even) // size
     means = np.asarray(even[: whole * size].reshape(whole, size).mean(axis=1))
-    return replace(one, x=means, renewed=max(1.0, held / size))
+    return replace(one, x=means, renewed=max(1.0, hold / size))
 
 
 def _may_be_position(one: Column) -> bool:

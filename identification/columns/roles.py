@@ -318,8 +318,8 @@ def _reasons(best: _Choice) -> dict[str, str]:
     law = best.way.law
     of = f"{law.share:.0%} of it is inertia and friction"
     work = f", and friction takes {abs(law.work):.0%} of its work" if abs(law.work) > 0.1 else ""
-    told = CONSTANT_WHY if are_constant(best.way.columns) else f"{of} along the position{work}"
-    out = dict.fromkeys(best.way.columns, told)
+    reason = CONSTANT_WHY if are_constant(best.way.columns) else f"{of} along the position{work}"
+    out = dict.fromkeys(best.way.columns, reason)
     two = best.way.kind == "electro-pneumatic"
     if two:
         out = dict.fromkeys(out, f"of the difference of the two {of}")

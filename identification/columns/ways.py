@@ -105,11 +105,11 @@ def ways_of(
 
 
 def _are_several(one: Column, other: Column) -> bool:
-    """Whether two columns are the same of several motors, by what a number alone tells apart."""
+    """Whether two columns are the same of several motors, distinguished by a number alone."""
     heads = one.header, other.header
     names = [[word for word in words_of(head.name) if not word.isdigit()] for head in heads]
-    told = {"position", "force", "command"} & set(heads[0].means)
-    return bool(told) and names[0] == names[1] and heads[0].unit == heads[1].unit
+    roles_named = {"position", "force", "command"} & set(heads[0].means)
+    return bool(roles_named) and names[0] == names[1] and heads[0].unit == heads[1].unit
 
 
 def _is_set_point(seen: Seen, k: int) -> bool:

@@ -53,9 +53,9 @@ class DriftTest:
     "not_judged" (`reason` says why: nothing is identifiable, or the minimum detectable
     change of the Coulomb levels is too large). moved: of the fewest parameters that explain a
     drift, those that surely have a part in it; unsure: names of the others, and of those that
-    explain it as well. shifts: every tested parameter on this log; not_judged: the others, with the
-    reason; could_have_seen: minimum detectable relative change of each tested one on this log or,
-    if it lasts, by the mean.
+    explain it as well. shifts: every tested parameter on this log; inconclusive: the others, with
+    the reason; could_have_seen: minimum detectable relative change of each tested one on this log
+    or, if it lasts, by the mean.
     single, alone, mean: the statistic of all parameters of this log, of the largest one, and of the
     mean over logs, None where nothing is tested; found_by: which of them alarmed ("log": the first
     two). chi_square: what the log's own refit leaves; allowed: up to which the structure fits.
@@ -66,7 +66,7 @@ class DriftTest:
     verdict: DriftVerdict
     moved: tuple[Shift, ...]
     shifts: Mapping[str, Shift]
-    not_judged: Mapping[str, str]
+    inconclusive: Mapping[str, str]
     single: Statistic | None
     mean: Statistic | None
     found_by: FoundBy | None

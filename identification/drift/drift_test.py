@@ -8,8 +8,8 @@ than noise of them (`own_logs`): a machine that it never followed has not change
 second statistic over the logs since the model became active (`mewma`) finds what changes slowly.
 
 A log that no parameters bring the model to follow is said to have another structure; that is no
-drift. "None" is said only where the test could have seen a change that matters of the Coulomb
-levels; else the log is inconclusive.
+drift. "None" is said only where the test has a minimum detectable change below one that matters of
+the Coulomb levels; else the log is inconclusive.
 """
 
 from collections.abc import Mapping, Sequence
@@ -124,16 +124,16 @@ def estimate_under_test(
     measured = own + of_model
     sd = np.sqrt(np.diag(measured) + varied)
     reasons = _inconclusive(model, found, log, sd, settings.widest)
-    told = np.array([name not in reasons for name in model.names])
-    if not np.any(told):
+    identifiable = np.array([name not in reasons for name in model.names])
+    if not np.any(identifiable):
         first = next(iter(reasons.values()), "")
         why = f"{log}: none of the model's parameters is identifiable; {first}"
         return _silent(log, "not_judged", why, reasons, found, state)
-    at = np.flatnonzero(told)
+    at = np.flatnonzero(identifiable)
     here = LogChange(
         tuple(at.tolist()), change[at], measured[np.ix_(at, at)], varied[at], settings.margin
     )
-    after = taken_in(state, change, own, told, settings.smoothing, varied)
+    after = taken_in(state, change, own, identifiable, settings.smoothing, varied)
     over = mean_change(after, of_model, settings.margin)
     tests = _tests(here, over, settings)
     by = tests.found_by
@@ -145,7 +145,7 @@ def estimate_under_test(
         verdict="drift" if by else ("not_judged" if coarse else "none"),
         moved=which,
         shifts=_shifts(model, here.beyond_usual),
-        not_judged=reasons,
+        inconclusive=reasons,
         single=tests.single,
         mean=tests.mean,
         found_by=by,
@@ -217,7 +217,9 @@ def too_coarse(
     to be seen, or of a model with neither at least one parameter.
     """
     limit = settings.to_be_seen
-    asked = [name for name in COULOMB_NAMES if name in model.names and name not in model.untold]
+    asked = [
+        name for name in COULOMB_NAMES if name in model.names and name not in model.not_identifiable
+    ]
     if max([seen.get(name, np.inf) for name in asked] or [min(seen.values())]) <= limit:
         return ""
     said = ", ".join(
@@ -238,10 +240,10 @@ def _inconclusive(
     changes, and the widest that is allowed."""
     out: dict[str, str] = {}
     for name, sd in zip(model.names, deviations, strict=True):
-        if name in model.untold:
-            out[name] = f"not identified in the active model ({model.untold[name]})"
-        elif name in found.untold:
-            out[name] = found.untold[name]
+        if name in model.not_identifiable:
+            out[name] = f"not identified in the active model ({model.not_identifiable[name]})"
+        elif name in found.not_identifiable:
+            out[name] = found.not_identifiable[name]
         elif name not in found.names:
             out[name] = f"{log}: not identifiable from this log"
         elif not sd <= widest:
@@ -249,7 +251,7 @@ def _inconclusive(
                 f"{log}: a change of it is known to {100 * sd:.2g} % only, at most"
                 f" {100 * widest:.2g} % needed; excite it more, or log for longer"
             )
-    return {**{n: r for n, r in model.untold.items() if n not in model.names}, **out}
+    return {**{n: r for n, r in model.not_identifiable.items() if n not in model.names}, **out}
 
 
 def _moved(
@@ -301,11 +303,11 @@ def _shift(model: ReferenceModel, i: int, change: float, sd: float) -> Shift:
 
 
 def _silent(
-    log: str, verdict: DriftVerdict, reason: str, not_judged: Mapping[str, str],
+    log: str, verdict: DriftVerdict, reason: str, inconclusive: Mapping[str, str],
     found: LogEstimate | None, state: DriftState,
 ) -> DriftTest:  # fmt: skip
     """A verdict without changes; the state stays as it was."""
     return DriftTest(
-        log, verdict, (), {}, dict(not_judged), None, None, None,
+        log, verdict, (), {}, dict(inconclusive), None, None, None,
         found.chi_square if found else None, found.allowed if found else None, reason, state,
     )  # fmt: skip

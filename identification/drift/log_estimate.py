@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.drift.reference_model import ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.parameters import values_of
 from identification.estimation.windowed_run.run_errors import misfit
@@ -23,16 +23,16 @@ from identification.thresholds import ADEQUATE, ASTRAY, TWICE
 class LogEstimate:
     """Parameters of one log: values (d,) and covariance (d, d) by `names`.
 
-    untold: parameters that the log does not identify, with the reason; they are among `names` all
-    the same. chi_square: what the best fit leaves per value; allowed: up to which the structure
-    fits. as_usual: the equation of motion of a motor, whose run is not followed, leaves about as
-    much as that of the model's logs.
+    not_identifiable: parameters that the log does not identify, with the reason; they are among
+    `names` all the same. chi_square: what the best fit leaves per value; allowed: up to which the
+    structure fits. as_usual: the equation of motion of a motor, whose run is not followed, leaves
+    about as much as that of the model's logs.
     """
 
     names: tuple[str, ...]
     values: Array
     covariance: Array
-    untold: Mapping[str, str]
+    not_identifiable: Mapping[str, str]
     chi_square: float
     allowed: float
     as_usual: bool = False
@@ -50,17 +50,17 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
     prescribed motion, BadLog where a signal is missing.
     """
     drive = None if model.rig.kind == "motor" else model.drive
-    if model.imposed:
+    if model.prescribed:
         if model.plant.effects:
             raise NotIdentifiable(
                 f"{log.name}: prescribed motion, in which effects show in the force equation"
                 " only; trace this log together with those of the model"
             )
         recorded = recorded_logs([log], model.rig, drive)
-        found = fit_imposed(recorded, "as the active model")
+        found = fit_prescribed(recorded, "as the active model")
         return _of_fit(found, allowed_misfit(model.chi_square))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    if not found.imposed:
+    if not found.prescribed:
         return _of_fit(found, allowed_misfit(model.chi_square))
     # The equation has less error, or no run of this structure is followed.
     recorded = recorded_logs([log], model.rig, drive)
@@ -68,7 +68,7 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
     left = min(misfit(one, recorded.logs, recorded.drive) for one in (own, model.plant))
     estimate = _of_fit(replace(found, chi_square=left), allowed_misfit(model.chi_square))
     usual = model.force_relative
-    if not recorded.held or usual is None or found.left is None:
+    if not recorded.zoh or usual is None or found.left is None:
         return estimate
     return replace(estimate, as_usual=found.left[0] <= TWICE * usual)
 
@@ -93,6 +93,8 @@ def allowed_misfit(active: float) -> float:
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:
     plant = Plant(found.friction, found.actuator, found.effects)
-    untold = {name: e.reason or "" for name, e in found.estimates.items() if not e.known}
+    not_identifiable = {name: e.reason or "" for name, e in found.estimates.items() if not e.known}
     values = values_of(plant, found.free)
-    return LogEstimate(found.free, values, found.covariance, untold, found.chi_square, allowed)
+    return LogEstimate(
+        found.free, values, found.covariance, not_identifiable, found.chi_square, allowed
+    )

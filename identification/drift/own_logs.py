@@ -57,13 +57,15 @@ def own_logs_of(
     changes, apart = [], []
     for one in found:
         change, own = relative_change(model, one)
-        told = np.array([n in one.names and n not in one.untold and n not in model.untold
-                         for n in model.names], dtype=np.bool_)  # fmt: skip
-        at = np.flatnonzero(told)
+        without = {*one.not_identifiable, *model.not_identifiable}
+        identifiable = np.array(
+            [n in one.names and n not in without for n in model.names], dtype=np.bool_
+        )
+        at = np.flatnonzero(identifiable)
         both = (own + model.relative_covariance)[np.ix_(at, at)]
         square = float(change[at] @ np.linalg.solve(both, change[at])) if len(at) else 0.0
         apart.append(square / max(len(at), 1))
-        changes.append(np.where(told, change, np.nan))
+        changes.append(np.where(identifiable, change, np.nan))
     left = tuple(one.chi_square for one in found)
     return OwnLogs(model.names, _root_mean_square(changes), tuple(apart), left, parts)
 

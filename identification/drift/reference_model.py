@@ -53,8 +53,8 @@ class ReferenceModel:
     """A machine's model against which its new logs are tested, in SI.
 
     names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
-    key.name; untold: those that the model does not identify, with the reason. drive: what drove
-    its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
+    key.name; not_identifiable: those that the model does not identify, with the reason. drive: what
+    drove its fit; chi_square: what the fit left, 1 for the sensors' noise; prescribed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is evaluated, 0
     where it is not known. own_logs: how far its own logs lie from it, None where a single one
     leaves noise alone, or that is not known. key: names the model in a `DriftState`.
@@ -69,8 +69,8 @@ class ReferenceModel:
     rig: Rig
     drive: Drive
     chi_square: float = 1.0
-    imposed: bool = False
-    untold: Mapping[str, str] = field(default_factory=dict)
+    prescribed: bool = False
+    not_identifiable: Mapping[str, str] = field(default_factory=dict)
     key: str = ""
     fastest: float = 0.0
     own_logs: OwnLogs | None = None

@@ -63,7 +63,7 @@ class Param:
         """Whether it is a size that an effect may do without."""
         return self.linear and self.default == 0.0
 
-    def held(self, value: float) -> bool:
+    def at_default(self, value: float) -> bool:
         """Whether it is such a part, and at its default."""
         return self.optional and value == self.default
 

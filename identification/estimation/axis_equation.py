@@ -57,7 +57,7 @@ def axis_equation(log: Log, rig: Rig) -> AxisEquation:
     Bortz (2021); inverse dynamic model by least squares, Gautier, Khalil, CDC 1988; deviation of a
     median, Huber, Robust Statistics (1981).
     """
-    one = motion_log(log, held=rig.kind == "motor", by_command=False)
+    one = motion_log(log, zoh=rig.kind == "motor", by_command=False)
     up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
     if not slides_enough(up, down):
         raise NotIdentifiable(
@@ -65,7 +65,7 @@ def axis_equation(log: Log, rig: Rig) -> AxisEquation:
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
     rows = _converged(one)
-    fit = fewest_terms([rows], None if one.held else Lateness.of([one.sliding], [log]))
+    fit = fewest_terms([rows], None if one.zoh else Lateness.of([one.sliding], [log]))
     names = [FIVE[k] for k in fit.used]
     values = dict(zip(names, fit.theta.tolist(), strict=True))
     levels = np.array([values.get(name, 0.0) for name in ("F_cp", "F_cn")])

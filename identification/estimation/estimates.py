@@ -23,7 +23,7 @@ from identification.thresholds import AS_GOOD_AS_NONE, EVENTS_NEEDED
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
-HELD = "fixed at its default: the logs do not support another value"
+FIXED_AT_DEFAULT = "fixed at its default: the logs do not support another value"
 NO_CHANGE_WHY = "no interval: nothing that these logs show changes with it"
 EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 
@@ -268,8 +268,8 @@ def of_effect(p: Param, value: float, sd: float | None, beside: float = 0.0) -> 
     A part of the law's form that no log has moved from its default is given as that, without an
     interval: it belongs to the equation.
     """
-    if p.held(value) and not sd:
-        return Estimate(value, p.unit, reason=HELD)
+    if p.at_default(value) and not sd:
+        return Estimate(value, p.unit, reason=FIXED_AT_DEFAULT)
     share = p.name == "asymmetry" or p.name in AT_REST  # of the effect itself
     return reported_estimate(
         value, p.unit, sd, bounds=(p.low, p.high), at_bound=LEAST_SD * abs(p.typical or 1.0),

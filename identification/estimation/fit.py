@@ -19,24 +19,24 @@ from dataclasses import replace
 import numpy as np
 
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.imposed_motion import (
-    fit_imposed,
+from identification.estimation.converged_fit import converged_fit
+from identification.estimation.late_position import what_acts_beside
+from identification.estimation.prescribed_motion import (
     fit_one_way,
+    fit_prescribed,
     of_one_way,
     way_of,
 )
-from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import (
     RecordedLogs,
     acts_directly,
     commanded,
-    led_by_rig,
+    is_prescribed,
     recorded_logs,
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.row_fit import rough
 from identification.estimation.run_or_equation import answered, likeliest
-from identification.estimation.settling import settled
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import (
     FittedStructure,
@@ -49,7 +49,7 @@ from identification.estimation.surroundings import (
     widened_friction,
 )
 from identification.estimation.two_masses import of_two_masses, two_masses
-from identification.estimation.windowed_run.parameters import even, loose
+from identification.estimation.windowed_run.parameters import even, is_unanchored
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
@@ -106,13 +106,13 @@ def fit_beside(
 ) -> KarnoppFit:  # fmt: skip
     """As `fit_plant`, of logs of which it is known what acts beside the applied force.
 
-    quick: as a first look has it, without a search or whole runs, and without a second mass where
-    inertia does not show.
+    quick: as a preliminary fit has it, without a search or whole runs, and without a second mass
+    where inertia does not show.
     """
     report = on_progress or quiet
     report("refining", 0.0)
     alone = [beside.taken_out(log) for log in logs]
-    up = way_of(alone, held=rig.kind == "motor")
+    up = way_of(alone, zoh=rig.kind == "motor")
     turns = bool(beside.orders) and up is not None
     try:
         recorded = recorded_logs(alone, rig, drive, halt)
@@ -157,7 +157,7 @@ def _near_prior(
     near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
     if near.misfit > COMPLETE:
         return _plain_fit(recorded, rng, report, by=by, near=near)
-    fit = likeliest(settled(near.plant, recorded, near.misfit, report), recorded)
+    fit = likeliest(converged_fit(near.plant, recorded, near.misfit, report), recorded)
     return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
 
 
@@ -171,13 +171,13 @@ def _plain_fit(
     with orders of the turn; raises NotIdentifiable where no run is near, which a long fit would not
     bring there.
     """
-    begin, settle, other = rng.spawn(3)
+    begin, last, other = rng.spawn(3)
     recorded, found = by_exact_force(recorded, plain_structure(recorded, begin), other)
     if turns and found.misfit > HOPELESS:
         raise NotIdentifiable(ONE_WAY_WHY)
     if near is not None and near.misfit < found.misfit:
         found = found.refined(near)
-    fit = _with_actuator(finished(found, recorded, settle, report, by=by, quick=quick), recorded)
+    fit = _with_actuator(finished(found, recorded, last, report, by=by, quick=quick), recorded)
     return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
 
 
@@ -192,11 +192,11 @@ def finished(
     actuator spoils is driven by the measured force instead.
     """
     search, other, forced_rng = rng.spawn(3)
-    if found.imposed and led_by_rig(recorded) and not recorded.steps:
-        return as_sliding_shows(fit_imposed(recorded, PRESCRIBED_WHY), recorded)
+    if found.prescribed and is_prescribed(recorded) and not recorded.steps:
+        return as_sliding_shows(fit_prescribed(recorded, PRESCRIBED_WHY), recorded)
     # A motor's stops are searched already.
-    hopeless = loose(found.plant, recorded.drive) and rough(found.outcomes)
-    followed = found.misfit <= COMPLETE and not found.imposed
+    hopeless = is_unanchored(found.plant, recorded.drive) and rough(found.outcomes)
+    followed = found.misfit <= COMPLETE and not found.prescribed
     if not (quick or followed or recorded.by_motor or hopeless):
         found = searched(found, recorded, search, report, SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
@@ -213,14 +213,14 @@ def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> Kar
     """The fit of a plant with effects, from where it was; once more with its band searched,
     where that leaves more than noise."""
     logs, drive = recorded.logs, recorded.drive
-    held = even(prior)
-    best: Refit = refit(prior, logs, drive, prior=held, effort="near")
+    fixed = even(prior)
+    best: Refit = refit(prior, logs, drive, prior=fixed, effort="near")
     if best.misfit > COMPLETE:
         p = prior.friction
         band = max(p.dv_p, -p.dv_n)
-        again = refit(prior, logs, drive, prior=held, band=band)
+        again = refit(prior, logs, drive, prior=fixed, band=band)
         best = again if again.misfit < best.misfit else best
-    return settled(best.plant, recorded, best.misfit, report, refined=best)
+    return converged_fit(best.plant, recorded, best.misfit, report, refined=best)
 
 
 def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:

@@ -72,7 +72,7 @@ def independent_ensembles(
     done, now = 0, min(WARM_STEPS, steps)
     with ThreadPoolExecutor(len(seeds)) as pool:
         while True:
-            states = list(pool.map(_walked, samplers, states, repeat(now), shown))
+            states = list(pool.map(_sampled, samplers, states, repeat(now), shown))
             chains = np.array([one.get_chain(discard=done) for one in samplers])
             done += now
             found = _compared(chains, samplers, done)
@@ -103,7 +103,7 @@ def _state(first: Array, rng: np.random.Generator) -> Any:
     return emcee.State(first, random_state=drawn.get_state())
 
 
-def _walked(sampler: Any, state: Any, steps: int, report: Callable[[int], None]) -> Any:
+def _sampled(sampler: Any, state: Any, steps: int, report: Callable[[int], None]) -> Any:
     """The state after so many more steps; report: is given the steps made in all."""
     with np.errstate(invalid="ignore"):  # of walkers where none can be
         for after in sampler.sample(state, iterations=steps, skip_initial_state_check=True):

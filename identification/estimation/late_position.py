@@ -97,7 +97,7 @@ def what_acts_beside(
         return follows(samples)
 
     in_loop = not motor or any("r" in log for log in logs)
-    if found.lag.value and not found.held and not believed(found.lag.value / h):
+    if found.lag.value and not found.zoh and not believed(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
     if not motor or not (found.lag.value or h >= SLOW_LOG):
         return found

@@ -66,8 +66,8 @@ class Rougher(NamedTuple):
 class LatentForce:
     """The force on a log's body that a model lacks, towards +y.
 
-    t [s], y [m], force, sd [N], slides (where the log tells of it), each (n,); log_density (n,): of
-    each measured sample given those before it, 0 where it is not judged.
+    t [s], y [m], force, sd [N], slides (where the log is informative), each (n,); log_density (n,):
+    of each measured sample given those before it, 0 where it is not tested.
     """
 
     t: Array
@@ -142,7 +142,7 @@ class _Least(NamedTuple):
 class _Known:
     """What a plant says of one log's chain, but for size and memory of d, its state `at`.
 
-    z: what is measured, R: its variance, seen: where; slides, free: where d is judged, and where
+    z: what is measured, R: its variance, seen: where; slides, free: where d is estimated, and where
     the body may go anywhere, (n,) each.
     """
 
@@ -217,7 +217,7 @@ def latent_forces(
         best = min(pool.map(lambda tau: least(tau, rougher or Rougher()), memories))
         if rougher is None:
             noises = [Rougher(x) for x in WHITE_NOISES]
-            if not all(one.imposed for one in logs):  # then the force is what is measured
+            if not all(one.prescribed for one in logs):  # then the force is what is measured
                 noises += [Rougher(force=x) for x in WHITE_NOISES]
             tried = [
                 (share * best.sigma, best.tau, more) for more in noises for share in SIGMA_SHARES
@@ -258,13 +258,13 @@ def _known(plant: Plant, one: MotionLog, slowest: float) -> _Known:
     F, n, slides = np.asarray(log["F"]), len(log), _slides(one, slowest)
     p, viscous = plant.friction, 0.5 * (plant.friction.F_vp + plant.friction.F_vn)
     noise_F = max(one.noise.F, LEAST_NOISE_F * _largest(plant, log))
-    if one.imposed:
+    if one.prescribed:
         left, none = force_along(log, F, plant, Along(y, v, a, d)) - F, np.zeros((N, N))
         known = Chain(none, none, none, none, np.zeros((n, N)), np.zeros(N), np.zeros(N))
         return _Known(one, 0, left, np.full(n, noise_F**2), slides, slides, ~slides, known)
     free = ~(slides & np.append(slides[1:], False))
     opposed = opposing_force(log, plant, y, v, d)
-    force = (F if one.held else _over_sample(F)) - _over_sample(opposed)
+    force = (F if one.zoh else _over_sample(F)) - _over_sample(opposed)
     push, A = _pushed(p.m, viscous, log.h)
     c = np.where(free, 0.0, force)[:, np.newaxis] * push
     # Where its direction is open the body may go as any force of the log could send it.

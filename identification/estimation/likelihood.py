@@ -22,11 +22,11 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadModel
+from identification.estimation.converged_fit import between_samples_sd
 from identification.estimation.gauss_newton import smooth_jacobian
-from identification.estimation.imposed_motion import force_fit
+from identification.estimation.prescribed_motion import force_fit
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.settling import between_samples_sd
 from identification.estimation.windowed_run.likely_square import LikelyLog
 from identification.estimation.windowed_run.parameters import (
     even,
@@ -88,7 +88,7 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
     `LikelyWindows`, Ribatet, Cooley, Davison (2012).
     """
     recorded = recorded_logs(logs, rig, fit.drive)
-    if fit.imposed:
+    if fit.prescribed:
         return _by_force(recorded)
     if recorded.by_motor and not fit.noise_F:
         recorded = recorded.with_exact_force()
@@ -102,7 +102,7 @@ def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Like
     logs, drive = recorded.logs, recorded.drive
     seconds = longest_window(plant, logs, drive) if fit.whole else RUN_WINDOW
     own, center = plant, values_of(plant, fit.free)
-    if any(one.walks(drive) for one in logs):
+    if any(one.has_random_walk(drive) for one in logs):
         own = refit(plant, logs, drive, prior=even(plant), effort="near").plant
     windows = LikelyWindows.of(own, logs, drive, fit.free, covariance, seconds, center)
     further = between_samples_sd(fit.free, center, recorded)
@@ -165,7 +165,7 @@ class LikelyWindows:
         if len(own) < len(logs):
             raise BadModel(f"{logs[0].log.name}: the fitted plant's run cannot be followed")
         posed = cls(plant, drive, tuple(names), tuple(logs), own, *_bounds(plant, names))
-        if any(one.walks(drive) for one in logs):
+        if any(one.has_random_walk(drive) for one in logs):
             factor, stretch = posed.stretched(covariance)
             return replace(posed, factor=factor, stretch=stretch, fit=fit)
         left = float(posed.squares(posed.center[np.newaxis])[0]) / posed.count / NOISE_LOSS

@@ -87,21 +87,23 @@ def sample_posterior(
     found = likelihood_of(fit, logs, rig)
     seeding, walking, between = rng.spawn(3)
     seeds = _seeds(found, seeding)
-    walks = independent_ensembles(found.cost, seeds, walking, steps=steps, on_progress=on_progress)
-    chains = np.moveaxis(walks.chains, 2, 1)
+    sampled = independent_ensembles(
+        found.cost, seeds, walking, steps=steps, on_progress=on_progress
+    )
+    chains = np.moveaxis(sampled.chains, 2, 1)
     chains = chains.reshape(len(seeds), -1, len(found.names))
     return Posterior(
         names=found.names,
         chains=chains + found.further * between.standard_normal(chains.shape),
-        r_hat=dict(zip(found.names, walks.r_hat.tolist(), strict=True)),
-        ess=dict(zip(found.names, walks.ess.tolist(), strict=True)),
+        r_hat=dict(zip(found.names, sampled.r_hat.tolist(), strict=True)),
+        ess=dict(zip(found.names, sampled.ess.tolist(), strict=True)),
         way=found.way,
-        acceptance=walks.acceptance,
+        acceptance=sampled.acceptance,
         walkers=seeds.shape[1],
-        steps=walks.steps,
-        evaluations=walks.evaluations,
-        converged=walks.converged,
-        verdict=_verdict(found, walks),
+        steps=sampled.steps,
+        evaluations=sampled.evaluations,
+        converged=sampled.converged,
+        verdict=_verdict(found, sampled),
     )
 
 
@@ -126,15 +128,15 @@ def _seeds(found: Likelihood, rng: np.random.Generator) -> Array:
     return np.asarray(picked.reshape(ENSEMBLES, -1, d))
 
 
-def _verdict(found: Likelihood, walks: SampledChains) -> str:
+def _verdict(found: Likelihood, sampled: SampledChains) -> str:
     """One line: whether the ensembles agree, by what figures, and what to do where not."""
-    worst, least = int(np.argmax(walks.r_hat)), int(np.argmin(walks.ess))
+    worst, least = int(np.argmax(sampled.r_hat)), int(np.argmin(sampled.ess))
     figures = (
-        f"R-hat at most {walks.r_hat[worst]:.3f} ({found.names[worst]}), at least"
-        f" {walks.ess[least]:.0f} independent draws ({found.names[least]})"
+        f"R-hat at most {sampled.r_hat[worst]:.3f} ({found.names[worst]}), at least"
+        f" {sampled.ess[least]:.0f} independent draws ({found.names[least]})"
     )
-    if walks.converged:
-        return f"converged: {figures}, of {len(walks.chains)} ensembles on {found.way}"
+    if sampled.converged:
+        return f"converged: {figures}, of {len(sampled.chains)} ensembles on {found.way}"
     return (
         f"not converged, so no interval: {figures}; R-hat up to {R_HAT_MOST} and {ESS_LEAST:.0f}"
         " draws needed: log for longer, or fix what is not identifiable from the logs"

@@ -15,7 +15,8 @@ from identification.estimation.regression.equation_rows import (
     integral,
 )
 from identification.estimation.regression.force_terms import unseen_lag
-from identification.estimation.regression.held_command import (
+from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.intersample_command import (
     UNSEEN,
     between_samples,
     could_show,
@@ -25,9 +26,8 @@ from identification.estimation.regression.held_command import (
     share_between,
     unseen,
 )
-from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import settled_rows
+from identification.estimation.regression.motion_rows import converged_rows
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
@@ -45,7 +45,7 @@ from identification.thresholds import WORSE
 class RecordedLogs:
     """Logs of one machine with their motion.
 
-    drive: what drives their runs; imposed: the motion is prescribed by a rig; halt: whether
+    drive: what drives their runs; prescribed: the motion is prescribed by a rig; halt: whether
     whatever is made of them is to go on; share: of the step of the command to the next sample, by
     which its mean between them is another than the logged one: it is in these logs, and `given`
     puts it into others; share_sd: its deviation; exact: a motor's force has no noise. remarks: what
@@ -55,7 +55,7 @@ class RecordedLogs:
     logs: tuple[MotionLog, ...]
     rig: Rig
     drive: Drive
-    imposed: bool = False
+    prescribed: bool = False
     halt: Halt = field(default_factory=Halt)
     share: float = 0.0
     share_sd: float = 0.0
@@ -68,14 +68,14 @@ class RecordedLogs:
         return self.rig.kind == "motor"
 
     @property
-    def held(self) -> bool:
+    def zoh(self) -> bool:
         """Whether the force is a zero-order hold: a motor's, or one that the logs show to be so."""
-        return self.by_motor or any(one.held for one in self.logs)
+        return self.by_motor or any(one.zoh for one in self.logs)
 
     @property
     def may_change_between(self) -> bool:
         """Whether a motor drives them whose force changes between their samples, or may do so for
-        all that they show; one that is held exactly does not."""
+        all that they show; an exact zero-order hold does not."""
         seen = self.exact or could_show(Size(self.share, self.share_sd))
         return self.by_motor and (is_faster_loop(self.share) or not seen)
 
@@ -92,16 +92,16 @@ class RecordedLogs:
     @property
     def command_period(self) -> float | None:
         """Time [s] after which the loop gives its next command, or for which a measured force is
-        held; None where it is the samples', and of a force that is not held."""
+        held; None where it is the samples', and of a force that is no such hold."""
         h = self.logs[0].log.h
-        return period_of(self.share, h) or (h if self.held and not self.by_motor else None)
+        return period_of(self.share, h) or (h if self.zoh and not self.by_motor else None)
 
     @property
     def instant_sd(self) -> float:
-        """Deviation [s] of the instants at which the force of these logs acts: of a held one by the
-        share above, of another as likely anywhere within half a sample of its row."""
+        """Deviation [s] of the instants at which the force of these logs acts: of a zero-order hold
+        by the share above, of another as likely anywhere within half a sample of its row."""
         h = self.logs[0].log.h
-        return self.share_sd * h if self.held else unseen_lag(h)
+        return self.share_sd * h if self.zoh else unseen_lag(h)
 
     @property
     def moved(self) -> tuple[int, int]:
@@ -128,20 +128,20 @@ class RecordedLogs:
     def record(self, log: Log) -> MotionLog:
         """Another log of the machine with its motion."""
         one = motion_log(
-            log, held=self.by_motor, by_command=self.by_command,
-            rotary=self.rig.motion == "rotary", imposed=self.imposed,
+            log, zoh=self.by_motor, by_command=self.by_command,
+            rotary=self.rig.motion == "rotary", prescribed=self.prescribed,
             between=None if self.exact else self._unseen(log),
         )  # fmt: skip
         return replace(one, halt=self.halt)
 
     def _unseen(self, log: Log) -> float:
-        """Noise of a held force [N] that the loop adds between the samples of a log."""
-        return unseen(log, self.share) if self.by_motor or log.held else 0.0
+        """Noise of a zero-order-hold force [N] that the loop adds between the samples of a log."""
+        return unseen(log, self.share) if self.by_motor or log.zoh else 0.0
 
     def given(self, log: Log) -> MotionLog:
         """A log as it was read, with its motion."""
         (slower,) = needed([log], self.rig)
-        return self.record(between_samples(slower, self.share, self.held))
+        return self.record(between_samples(slower, self.share, self.zoh))
 
     def with_exact_force(self) -> "RecordedLogs":
         """The logs of a motor with a force that has no noise."""
@@ -153,10 +153,10 @@ class RecordedLogs:
 
 
 def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
-    """The logs at the rates that their motion needs; those with a command or a held force as they
-    are: what it does between its samples is in no mean, and makes other stops
+    """The logs at the rates that their motion needs; those with a command or a zero-order hold as
+    they are: what it does between its samples is in no mean, and makes other stops
     (`benchmarks/drives.py`, 4 kHz)."""
-    if rig.kind == "motor" or commanded(logs) or any(log.held for log in logs):
+    if rig.kind == "motor" or commanded(logs) or any(log.zoh for log in logs):
         return list(logs)
     return [at_needed_rate(log) for log in logs]
 
@@ -197,7 +197,7 @@ def with_share(recorded: RecordedLogs, found: Size) -> RecordedLogs:
     recorded, share = replace(recorded, share_sd=found.sd), found.value
     if share == 0.0:
         return recorded
-    means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
+    means = [between_samples(one.log, share, recorded.zoh) for one in recorded.logs]
     said = (
         f"the command changes between the samples of {recorded.name}, as of a loop that is faster:"
         f" taken as its mean until the next sample ({share:.2g} of the step to it)"
@@ -212,7 +212,7 @@ def plain_share(recorded: RecordedLogs) -> Size:
     """Share of the command's step to the next sample, as a machine without effects shows it; of a
     motor by windows of sliding one way, or by those that may hold reversals, whose width the logs
     choose, whichever show it better. Ours: `regression/README.md`, (13)."""
-    logs, motor = recorded.logs, recorded.held
+    logs, motor = recorded.logs, recorded.zoh
     if not (motor or recorded.by_command):
         return NOT_SHOWN
     # Near standstill a fine encoder shows what the equation of sliding does not hold.
@@ -222,7 +222,7 @@ def plain_share(recorded: RecordedLogs) -> Size:
         rates = [rate_column(one) for one in logs]
         found = share_between(shown.rows, np.concatenate(rates), motor, shown.slowest)
     if motor:
-        made = settled_rows(logs)
+        made = converged_rows(logs)
         rates = [rate_column(one, of.windows) for one, of in zip(logs, made, strict=True)]
         other = share_between(stacked([of.rows for of in made]), np.concatenate(rates), motor)
         found = min(found, other, key=lambda one: one.sd)
@@ -287,7 +287,7 @@ def explains_force(logs: Sequence[Log], dead_zones: Sequence[float] = ()) -> boo
     dead_zones: quantiles of the command's size, behind a dead zone of one of which it may do so.
     Source: the paper's dF/dt = k1 u - k2 v, in weak form (Messenger, Bortz 2021).
     """
-    seen = [motion_log(log, held=False, by_command=True) for log in logs]
+    seen = [motion_log(log, zoh=False, by_command=True) for log in logs]
     sizes = np.quantile(np.concatenate([np.abs(log["u"]) for log in logs]), dead_zones)
     return any(_left_by_actuator(seen, size) * WORSE <= 1.0 for size in (0.0, *sizes.tolist()))
 
@@ -309,7 +309,7 @@ def left_share(found: Fitted, sd: Array, rate: Array) -> float:
     return left if found.theta[0] > 0 else max(left, 1.0)
 
 
-def led_by_rig(recorded: RecordedLogs) -> bool:
+def is_prescribed(recorded: RecordedLogs) -> bool:
     """Whether the motion is prescribed by a rig, so that no run of its own is to be followed."""
     if recorded.by_motor or commanded(recorded.plain):
         return False

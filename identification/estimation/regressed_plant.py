@@ -117,9 +117,9 @@ def far_beyond(sd: float | None, value: float, typical: float) -> bool:
     return sd is not None and not sd < FAR_BEYOND * max(abs(value), abs(typical))
 
 
-def _limit(coulomb: float, held: float) -> float:
+def _limit(coulomb: float, bearing: float) -> float:
     """A stick limit [N] to begin from; a body at rest against a stop bears more than any."""
-    return min(max(USUAL_STICK * coulomb, held), MOST_STICK * coulomb)
+    return min(max(USUAL_STICK * coulomb, bearing), MOST_STICK * coulomb)
 
 
 def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:
@@ -175,7 +175,7 @@ def effect_sd(
     """Standard deviations of an effect's parameters for the prior; 0 holds one at its value."""
     out: dict[str, float] = {}
     for p in effect.params:
-        if p.held(values[p.name]):
+        if p.at_default(values[p.name]):
             out[p.name] = 0.0
         else:
             out[p.name] = SHAPE * abs(values[p.name]) if values[p.name] else 0.0

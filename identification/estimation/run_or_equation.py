@@ -1,11 +1,12 @@
 """What answers for a machine: its run over whole logs, in windows, or the equation of motion.
 
 One place decides. A rig that prescribes the motion, or a run by a measured force that is not the
-body's own, leaves the equation. Else the run is settled, whole where it is followed so
-(`settling`); and where it leaves clearly more of the equation than the equation's own least squares
-do on held-out stretches, or identifies less of mass and sliding friction without following the log,
-the equation answers after all. Where the force or command is noisy, mass and sliding friction are
-those of largest likelihood, if the run's are significantly less likely (`prediction_error`).
+body's own, leaves the equation. Else the fit converges on the run, whole where it is followed so
+(`converged_fit`); and where it leaves clearly more of the equation than the equation's own least
+squares do on held-out stretches, or identifies less of mass and sliding friction without following
+the log, the equation answers after all. Where the force or command is noisy, mass and sliding
+friction are those of largest likelihood, if the run's are significantly less likely
+(`prediction_error`).
 """
 
 from contextlib import suppress
@@ -16,27 +17,27 @@ from scipy.linalg import block_diag
 
 from identification.effects._base import AT_REST
 from identification.errors import NotIdentifiable
+from identification.estimation.converged_fit import (
+    between_samples_sd,
+    converged_fit,
+    is_adequate,
+    structure_estimates,
+)
 from identification.estimation.estimates import effect_estimates
-from identification.estimation.imposed_motion import (
+from identification.estimation.prediction_error import prediction_error_fit
+from identification.estimation.prescribed_motion import (
     FEWEST_COMPARED,
-    fit_imposed,
     fit_one_way,
+    fit_prescribed,
     is_unexplained,
     withheld,
     without_estimates,
 )
-from identification.estimation.prediction_error import prediction_error_fit
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL
 from identification.estimation.regression.motion_rows import rows_and_windows
 from identification.estimation.regression.row_fit import first_stage, rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
-from identification.estimation.settling import (
-    between_samples_sd,
-    is_adequate,
-    settled,
-    structure_estimates,
-)
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import values_of
 from identification.model.estimates import KarnoppFit
@@ -102,20 +103,20 @@ def answered(
     quick: not over whole runs, and not in windows where the equation is surer. Source: as
     `on_the_floor`, Stone (1974).
     """
-    if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
-        why = LOST_WHY if found.imposed else "no free run follows these logs"
+    if recorded.drive == "force" and (found.prescribed or is_no_run(found.misfit)):
+        why = LOST_WHY if found.prescribed else "no free run follows these logs"
         if recorded.steps:
             raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
-        return fit_imposed(recorded, why)
+        return fit_prescribed(recorded, why)
     if quick and not is_adequate(found.misfit):
         fit = by_equation_if_surer(found.plant.friction, recorded)
         if fit is not None:
             return fit
     try:
-        fit = settled(found.plant, recorded, found.misfit, report, quick=quick)
+        fit = converged_fit(found.plant, recorded, found.misfit, report, quick=quick)
     except Halted:
         with recorded.halt.closing():
-            fit = settled(found.plant, recorded, found.misfit, report, quick=True)
+            fit = converged_fit(found.plant, recorded, found.misfit, report, quick=True)
     return on_the_floor(fit, recorded)
 
 
@@ -170,7 +171,7 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
 
     Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
-    if not (fit.adequate and any(one.walks(recorded.drive) for one in recorded.logs)):
+    if not (fit.adequate and any(one.has_random_walk(recorded.drive) for one in recorded.logs)):
         return fit
     rows = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
     if MECHANICAL not in rows:  # too little slides
@@ -190,13 +191,13 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     own = np.sqrt(np.diag(fit.covariance))
     sd = {name: float(own[i]) for name, i in zip(stops, at, strict=True)}
     sd |= dict(zip(found.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    told = structure_estimates(found.plant, sd, recorded)
-    told |= effect_estimates(found.plant.effects, sd)
+    reported = structure_estimates(found.plant, sd, recorded)
+    reported |= effect_estimates(found.plant.effects, sd)
     return replace(
         fit,
         friction=found.plant.friction,
         effects=found.plant.effects,
-        estimates={**fit.estimates, **{name: told[name] for name in found.names}},
+        estimates={**fit.estimates, **{name: reported[name] for name in found.names}},
         free=(*found.names, *stops),
         covariance=block_diag(covariance, fit.covariance[np.ix_(at, at)]),
         remarks=(*fit.remarks, LIKELIEST_WHY),
@@ -261,7 +262,7 @@ def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
     (1989), 8.6)."""
     if recorded.steps:
         return None
-    for by in (fit_imposed, fit_one_way):
+    for by in (fit_prescribed, fit_one_way):
         with suppress(NotIdentifiable):
             return by(recorded, why)
     return None

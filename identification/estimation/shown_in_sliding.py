@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.estimates import widened
-from identification.estimation.imposed_motion import WHY_NOT
+from identification.estimation.prescribed_motion import WHY_NOT
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.regression.force_terms import of_one_speed
@@ -50,7 +50,7 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     Source: information of least squares, Aitken, Proc. R. Soc. Edinburgh 55 (1936) 42; the rules
     are ours.
     """
-    if recorded.by_command and fit.adequate and not fit.imposed:
+    if recorded.by_command and fit.adequate and not fit.prescribed:
         return fit  # its run is that of an actuator's command, and shows how the body turns back
     p = fit.friction
     theta = np.array([getattr(p, name) for name in FIVE])
@@ -66,24 +66,24 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if fit.estimates["m"].known:
         if share < MATERIAL:
             reasons["m"] = WHY_NOT["m"].format(share=f"{share:.1%}")
-        elif fit.imposed and _by_turning(every, steady[0] | steady[1], 0):
+        elif fit.prescribed and _by_turning(every, steady[0] | steady[1], 0):
             reasons["m"] = TURNING_WHY
         elif _is_a_springs(every, y, p.m):
             reasons["m"] = SPRING_WHY.format(p.m, units_of(recorded.rig.motion)["m"])
-    by_rig = fit.imposed and not fit.estimates["m"].known  # in strokes that are all alike
+    by_rig = fit.prescribed and not fit.estimates["m"].known  # in strokes that are all alike
     for way, kept in zip(COLUMNS_OF_WAYS, steady, strict=True):
         stated = by_rig and fit.estimates[FIVE[way[1]]].known and _is_mostly(every, kept, way[1])
         together = stated or _by_turning(every, kept, way[1])
         if together and of_one_speed(every.at(kept), way[1]):
             reasons |= _together(every.at(kept), way, recorded.rig)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
-    if recorded.by_command or (fit.imposed and not recorded.held):
+    if recorded.by_command or (fit.prescribed and not recorded.zoh):
         return fit  # the equation of a measured force has an unknown instant beside it
     if recorded.drive == "force" and fit.adequate:
         left = (every.b - every.X @ theta) / every.sd
         fit = _as_unsure(fit, float(np.median(np.abs(left))) / MEDIAN_OF_NOISE)
     rate = np.zeros(len(FIVE))
-    if recorded.held and not fit.whole:  # whole runs know it better than the rows do
+    if recorded.zoh and not fit.whole:  # whole runs know it better than the rows do
         changes = [one.windows.first @ np.asarray(log["F"]) for one, log in logged]
         rate = solve_rows(replace(every, b=np.concatenate(changes))).theta
     return _of_any_instant(fit, rate, recorded.instant_sd)

@@ -52,10 +52,10 @@ def sliding_likelihoods(variants: Sequence[Sequence[Log]], *, rotary: bool) -> A
 def _fitted(logs: Sequence[Log], rotary: bool) -> _Fitted | None:
     """What the equation of motion says of logs; None where it shows no inertia."""
     try:
-        moved = [motion_log(log, held=False, by_command=False) for log in logs]
+        moved = [motion_log(log, zoh=False, by_command=False) for log in logs]
     except UserError:
         return None
-    found = lagged_rows(moved, NO_LAG, True, logs[0].held)
+    found = lagged_rows(moved, NO_LAG, True, logs[0].zoh)
     if found is None or inertia_has_no_part(moved):
         return None
     theta = found.left(found.every, WITH_PLACE[rotary])[1][:, 0]
@@ -69,6 +69,6 @@ def _without_place(one: MotionLog, sizes: Array) -> Log:
     """The log without a force of these sizes times y, and sin y and cos y."""
     y = np.asarray(one.log["y"])
     force = np.column_stack([y, np.sin(y), np.cos(y)])[:, : len(sizes)] @ sizes
-    if one.held:
+    if one.zoh:
         force = 0.5 * (force + np.append(force[1:], force[-1:]))
     return one.log.with_signals(F=np.asarray(one.log["F"]) - force)

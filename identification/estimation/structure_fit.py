@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.effects._base import Effect
 from identification.errors import UserError
-from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
+from identification.estimation.recorded_logs import RecordedLogs, is_prescribed
 from identification.estimation.regressed_plant import (
     RegressedPlant,
     first_plant,
@@ -18,9 +18,9 @@ from identification.estimation.regressed_plant import (
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.regression.held_command import is_faster_loop
+from identification.estimation.regression.intersample_command import is_faster_loop
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
-from identification.estimation.windowed_run.parameters import even, loose, on_bristle
+from identification.estimation.windowed_run.parameters import even, is_unanchored, on_bristle
 from identification.estimation.windowed_run.plant_search import searched_plant
 from identification.estimation.windowed_run.refinement import (
     Effort,
@@ -49,21 +49,22 @@ ABOVE_BAND = 1.3  # times the band, above which sliding friction is compared
 class FittedStructure:
     """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
 
-    imposed: the motion is prescribed, so the plant has no free run to be refined on; misfit: of the
-    free run, 1 where it leaves the sensors' noise; fit: what it converged to, where it has been.
+    prescribed: the motion is prescribed, so the plant has no free run to be refined on; misfit: of
+    the free run, 1 where it leaves the sensors' noise; fit: what it converged to, where it has
+    been.
     """
 
     stage: EffectRows
     outcomes: Mapping[str, RowFit]
     plant: Plant
     sd: Mapping[str, float]
-    imposed: bool
+    prescribed: bool
     misfit: float = np.inf
     fit: KarnoppFit | None = None
 
     def refined(self, done: Refit) -> "FittedStructure":
         """The same with the plant that a refinement has come to."""
-        return replace(self, plant=done.plant, sd=done.sd, misfit=done.misfit, imposed=False)
+        return replace(self, plant=done.plant, sd=done.sd, misfit=done.misfit, prescribed=False)
 
 
 def fitted_structure(
@@ -93,12 +94,12 @@ def fitted_structure(
     hopeless = missing and (bool(effects) or rough(outcomes))
     done: Refit | None = None
     try:
-        free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
+        free, followed = is_unanchored(plant, drive), ADEQUATE if effects else COMPLETE
         if free and not (missing or on_bristle(plant)):
             stopped = stick_search(plant, logs, drive, rng)
             done = refit(stopped, logs, drive, prior=prior, effort="near")
             # A noisy force's run that seems to follow may have a band in place of its limits.
-            if done.misfit > followed or any(one.walks(drive) for one in logs):
+            if done.misfit > followed or any(one.has_random_walk(drive) for one in logs):
                 stopped = stick_search(without_band(plant, logs), logs, drive, rng)
                 other = refit(stopped, logs, drive, prior=prior, effort="near")
                 done = _better(done, other, recorded)
@@ -162,7 +163,7 @@ def _refined(
     plant, prior = regressed.plant, dict(regressed.prior)
     done = refit(plant, logs, drive, band=max(regressed.slow, 1e-4), prior=prior, effort=effort)
     done = done if before is None or done.misfit <= before.misfit else before
-    if near is None or loose(plant, drive) or done.misfit <= COMPLETE:
+    if near is None or is_unanchored(plant, drive) or done.misfit <= COMPLETE:
         return done
     same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
     beside = replace(plant, friction=replace(plant.friction, **same))
@@ -178,7 +179,7 @@ def band(model: FittedStructure) -> float:
     p = model.plant.friction
     # A run that is not followed may have any band; most of the sliding is compared all the same.
     widest = widest_band(model.stage.logs)
-    return 0.0 if model.imposed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)
+    return 0.0 if model.prescribed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)
 
 
 def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedStructure:
@@ -194,8 +195,8 @@ def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedS
         return _from_first_estimate(stage, first, recorded)
     model = fitted_structure(stage, first, (), recorded, regressed)
     # It takes long where nothing brings a run back, and hardly has a chance where much is left.
-    hard = loose(model.plant, recorded.drive) or rough(model.outcomes)
-    if model.imposed or model.misfit <= COMPLETE or hard:
+    hard = is_unanchored(model.plant, recorded.drive) or rough(model.outcomes)
+    if model.prescribed or model.misfit <= COMPLETE or hard:
         return model
     return searched(model, recorded, search)
 
@@ -208,7 +209,7 @@ def by_exact_force(
     shows is no error of the force. Ours."""
     noisy = recorded.by_motor and any(one.noise.F > 0.0 for one in recorded.logs)
     changes = is_faster_loop(recorded.share)
-    if not noisy or found.imposed or found.misfit > COMPLETE or changes:
+    if not noisy or found.prescribed or found.misfit > COMPLETE or changes:
         return recorded, found
     exact = recorded.with_exact_force()
     again = plain_structure(exact, rng)
@@ -219,8 +220,8 @@ def _from_first_estimate(
     stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
 ) -> FittedStructure:
     plant = first_plant(recorded)
-    model = FittedStructure(stage, first, plant, {}, led_by_rig(recorded))
-    if model.imposed:
+    model = FittedStructure(stage, first, plant, {}, is_prescribed(recorded))
+    if model.prescribed:
         return model
     try:
         band = max(plant.friction.dv_p, -plant.friction.dv_n)

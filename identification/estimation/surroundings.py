@@ -18,12 +18,12 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import effect_estimates, reported_estimate, widened
-from identification.estimation.held_force import whole_samples_late
+from identification.estimation.force_hold import whole_samples_late
 from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.lagged_rows import FEWEST_WINDOWS, LaggedRows, lagged_rows
 from identification.estimation.regression.motion_log import again, motion_log
-from identification.estimation.regression.motion_rows import settled_rows
+from identification.estimation.regression.motion_rows import converged_rows
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
     OF_EQUATION,
@@ -91,35 +91,35 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
 def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
     """The same beside orders of a turn that are known."""
     logs = [known.taken_out(log) for log in logs]
-    held = rig.kind == "motor"
+    zoh = rig.kind == "motor"
     try:
-        moved = [motion_log(log, held=held, by_command=False) for log in logs]
+        moved = [motion_log(log, zoh=zoh, by_command=False) for log in logs]
     except UserError:
         return NO_SURROUNDINGS
     # Between an actuator's command and the torque that it makes, gravity is an effect as any other.
     turns = acts_directly(logs, rig) and max(float(np.ptp(log["y"])) for log in logs) > TURNS
     turns = turns and rig.motion == "rotary"
-    looked = _looked_far(moved, turns, held, known)
-    if looked is None:
+    found_at = _found_far(moved, turns, zoh, known)
+    if found_at is None:
         return NO_SURROUNDINGS
-    found, used = looked
-    lag, sampled = _lag(found, used, held), False
+    found, used = found_at
+    lag, sampled = _lag(found, used, zoh), False
     hold = None
     if rig.kind == "force":
         nearest = LAG_STEP * round(lag.value / LAG_STEP)
         of_a_hold = {0.5: 0.0, -0.5: 0.0}  # as which a hold shows in the rows: no line so late
         line = of_a_hold.get(nearest, lag.value)
         hold = whole_samples_late(logs, line, rotary=rig.motion == "rotary")
-    if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
+    if zoh and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`intersample_command`)
         lag = NOT_SHOWN
-    if held and lag.value:
+    if zoh and lag.value:
         current = lagged_rows(moved, found.lags, turns, False, known) or found
-        other = _lag(current, used, held)
+        other = _lag(current, used, zoh)
         left = current.least(used), found.least(used), found.rows / OVERLAP
         sampled = bool(other.value) and is_likelier(*left)
         lag, found = (other, current) if sampled else (lag, found)
     h = logs[0].h
-    gives = rig.force_per_command if held else None
+    gives = rig.force_per_command if zoh else None
     theta, each = _with_left_out(found, used, lag.value)
     force = sine = cosine = NOT_SHOWN
     if used is GRAVITY:
@@ -133,7 +133,7 @@ def _beside(logs: Sequence[Log], rig: Rig, known: Surroundings) -> Surroundings:
         usual = float(np.median(np.concatenate([one.speed for one in moved])))
         force = _constant_force(theta, each, usual)
     lag = Size(lag.value * h, lag.sd * h) if hold is None else Size(hold * h)
-    return Surroundings(lag, force, sine, cosine, (), gives, sampled, held=hold is not None)
+    return Surroundings(lag, force, sine, cosine, (), gives, sampled, zoh=hold is not None)
 
 
 def _constant_force(theta: Array, each: Array, usual: float) -> Size:
@@ -157,8 +157,8 @@ def _constant_force(theta: Array, each: Array, usual: float) -> Size:
     return found
 
 
-def _looked_far(
-    moved: Sequence[MotionLog], turns: bool, held: bool, known: Surroundings
+def _found_far(
+    moved: Sequence[MotionLog], turns: bool, zoh: bool, known: Surroundings
 ) -> tuple[LaggedRows, Sequence[int]] | None:
     """The equation's rows at lags that reach as far as the best of them, and the columns used; the
     nearest ones where none of these is the best within its reach; None where there are too few."""
@@ -167,7 +167,7 @@ def _looked_far(
     most = OF_A_STROKE * sum(len(one.log) for one in moved) / strokes
     for latest in (one * LAG for one in FARTHER if one == 1.0 or one * LAG < most):
         lags = np.arange(-LAG, latest + LAG_STEP / 2, LAG_STEP)
-        found = lagged_rows(moved, lags, turns, held, known)
+        found = lagged_rows(moved, lags, turns, zoh, known)
         if found is None:
             break
         found = found.with_inertia(PLAIN)
@@ -238,11 +238,11 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
     Of these logs' own coefficients, by (1) of `README.md` (Gautier, Khalil 1988). Raises
     NotIdentifiable where too little of them slides.
     """
-    held = rig.kind == "motor" and not around.sampled
-    moved = [motion_log(log, held=held, by_command=False) for log in logs]
+    zoh = rig.kind == "motor" and not around.sampled
+    moved = [motion_log(log, zoh=zoh, by_command=False) for log in logs]
     lags = np.unique([0.0, around.lag.value / logs[0].h])
     turns = bool(around.sine.value or around.cosine.value)
-    found = lagged_rows(moved, lags, turns, held)
+    found = lagged_rows(moved, lags, turns, zoh)
     if found is None:
         raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
     left = np.sqrt(found.left(found.every, GRAVITY if turns else PLAIN)[0] / found.rows)
@@ -258,7 +258,7 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     The cosine, about a constant force over a small angle, is 0 where blocks that a fit has not seen
     are predicted no worse without it, and as unsure as beside the rest. Source: Stone (1974).
     """
-    rows = stacked([one.rows for one in settled_rows(moved, gravity=True)])
+    rows = stacked([one.rows for one in converged_rows(moved, gravity=True)])
     if len(rows.b) < FEWEST_WINDOWS:
         return None
     theta, each = solve_rows(rows).theta, without_each_block(rows)
@@ -328,8 +328,8 @@ def apart(lag: float) -> bool:
     return abs(lag) >= FAR_LESS
 
 
-def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
-    """The lag in samples, nothing where none shows beyond doubt; held: of a motor's command."""
+def _lag(found: LaggedRows, used: Sequence[int], zoh: bool) -> Size:
+    """The lag in samples, nothing where none shows beyond doubt; zoh: of a motor's command."""
     left, theta = found.left(found.every, used)
     best = int(np.argmin(left))
     none = int(np.argmin(np.abs(found.lags)))
@@ -340,7 +340,7 @@ def _lag(found: LaggedRows, used: Sequence[int], held: bool) -> Size:
         return NOT_SHOWN  # in what the equation errs itself, a lag and inertia look alike
     lag = _lowest(found.lags, left)
     # A measured force is of any instant about its row: a lag within that need explain nothing.
-    about = not held and abs(lag) <= HALF
+    about = not zoh and abs(lag) <= HALF
     if not (about or (apart(lag) and explains(without, float(left[best])))):
         return NOT_SHOWN
     return _significant(found, used)

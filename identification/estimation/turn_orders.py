@@ -90,7 +90,7 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     """
     if rig.motion != "rotary" or not turns(max(float(np.ptp(log["y"])) for log in logs)):
         return ()
-    found = _turning(logs, held=rig.kind == "motor")
+    found = _turning(logs, zoh=rig.kind == "motor")
     if found is None:
         return ()
     found = found.without_outliers(_chosen(found))
@@ -120,9 +120,9 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
     Raises NotIdentifiable where too little of them slides. By (2) of `README.md` (Hanselman;
     Gautier, Khalil 1988).
     """
-    held = rig.kind == "motor"
+    zoh = rig.kind == "motor"
     without, left = (
-        _turning(some, held) for some in (logs, [around.of_place.taken_out(log) for log in logs])
+        _turning(some, zoh) for some in (logs, [around.of_place.taken_out(log) for log in logs])
     )
     if without is None or left is None:
         raise NotIdentifiable(
@@ -192,12 +192,12 @@ def _kept(X: Array) -> Array:
     return np.asarray(X[:, np.any(X != 0.0, axis=0)])
 
 
-def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
+def _turning(logs: Sequence[Log], zoh: bool) -> _Turning | None:
     """Rows of the equation, thinned to so many; None where too few slide."""
     moved: list[MotionLog] = []
     for log in logs:
         try:  # slow motion is smoothed until its direction is significant
-            moved.append(motion_log(log, held=held, by_command=False, imposed=True))
+            moved.append(motion_log(log, zoh=zoh, by_command=False, prescribed=True))
         except UserError:
             continue
     rates = [np.abs(one.signals["v"][one.signals["d"] != 0]) for one in moved]

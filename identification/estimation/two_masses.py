@@ -67,7 +67,7 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     """
     h = logs[0].h
     try:
-        cut = _windows(logs, held=rig.kind == "motor", length=round(RUN_SECONDS / h))
+        cut = _windows(logs, zoh=rig.kind == "motor", length=round(RUN_SECONDS / h))
     except UserError:
         return None
     lowest, highest = LEAST_CYCLES / RUN_SECONDS, HIGHEST_SHARE / h
@@ -114,12 +114,12 @@ def of_two_masses(fit: KarnoppFit, found: Resonance) -> KarnoppFit:
     sizes = {"m": found.mass, "F_cp": found.F_cp, "F_cn": found.F_cn, "F_vp": found.F_vp}
     sizes["F_vn"] = found.F_vn
     values = {name: max(one.value, 0.0) for name, one in sizes.items()}
-    told = {
+    reported = {
         name: reported_estimate(one.value, fit.estimates[name].unit, one.sd, bounds=(0.0, np.inf))
         for name, one in sizes.items()
     }
     return replace(
-        fit, friction=replace(fit.friction, **values), estimates={**fit.estimates, **told}
+        fit, friction=replace(fit.friction, **values), estimates={**fit.estimates, **reported}
     )  # fmt: skip
 
 
@@ -210,11 +210,11 @@ def _left(
     return np.asarray(b - X @ theta), theta
 
 
-def _windows(logs: Sequence[Log], *, held: bool, length: int) -> list[_Window]:
+def _windows(logs: Sequence[Log], *, zoh: bool, length: int) -> list[_Window]:
     """Windows of the logs in which the body moves."""
     out: list[_Window] = []
     for log in logs:
-        one = motion_log(log, held=held, by_command=False)
+        one = motion_log(log, zoh=zoh, by_command=False)
         v, F, y = one.signals["v"], np.asarray(log["F"]), np.asarray(log["y"])
         up, down = 1.0 * (v > 0.0), 1.0 * (v < 0.0)
         inputs = np.column_stack([F, -up, down, -v * up, -v * down])

@@ -52,14 +52,14 @@ def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
 
     Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
     """
-    told = _information(first_plant(recorded), recorded)
-    if told is None:
+    known = _information(first_plant(recorded), recorded)
+    if known is None:
         return {}
-    relative = np.sqrt(np.diag(told.covariance)) / told.unit
+    relative = np.sqrt(np.diag(known.covariance)) / known.unit
     least = NO_SURER if recorded.by_command else NO_SURER_CHAOTIC
     return {
         name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]]))
-        for name, sd in zip(told.names, relative, strict=True)
+        for name, sd in zip(known.names, relative, strict=True)
     }
 
 
@@ -73,12 +73,12 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
     y = np.concatenate([log["y"] for log in recorded.plain])
     stroke = (float(np.min(y)), float(np.max(y)))
     rivals = [sought(one, plant, stroke) for one in library.values() if not one.signals]
-    told = _information(plant, recorded, rivals)
-    if told is None:
+    known = _information(plant, recorded, rivals)
+    if known is None:
         return {}
-    own = range(len(told.names) - len(rivals))
+    own = range(len(known.names) - len(rivals))
     place = {one.key: len(own) + i for i, one in enumerate(rivals)}
-    return {key: float(np.sqrt(discriminated(told.matrix, at, own))) for key, at in place.items()}
+    return {key: float(np.sqrt(discriminated(known.matrix, at, own))) for key, at in place.items()}
 
 
 def _information(

@@ -47,20 +47,20 @@ NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which 
 class Information:
     """What runs identify of a plant's parameters `names` (d,).
 
-    unit (d,): sizes in which the parameters are counted; matrix (d, d): J'J in these units; loose:
-    share of the samples in which the run is sensitive to chance. Runs of their own add up.
+    unit (d,): sizes in which the parameters are counted; matrix (d, d): J'J in these units;
+    chaotic: share of the samples in which the run is sensitive to chance. Runs of their own add up.
     """
 
     names: tuple[str, ...]
     unit: Array
     matrix: Array
-    loose: float = 0.0
+    chaotic: float = 0.0
 
     def __add__(self, other: "Information") -> "Information":
         """Of both runs together, in the units of this one; they have the same names."""
         ratio = self.unit / other.unit
         both = self.matrix + other.matrix * np.outer(ratio, ratio)
-        return Information(self.names, self.unit, both, max(self.loose, other.loose))
+        return Information(self.names, self.unit, both, max(self.chaotic, other.chaotic))
 
     @property
     def covariance(self) -> Array:
@@ -97,20 +97,22 @@ def information(
     nothing has zeros.
     """
     names, x, unit = unknowns(plant, drive)
-    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
+    J, chaotic = lasting_jacobian(
+        lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost
+    )
     columns, here = [J], errors_of(plant) if rivals else np.zeros(0)
     for one in rivals:
         changed = errors_of(replace(plant, effects=(*plant.effects, one))) - here
         changed = np.where(np.isfinite(changed), changed, 0.0)
         columns.append(soft(changed, FAR_CHANGE)[:, np.newaxis])
     both, every = np.hstack(columns), (*names, *(one.key for one in rivals))
-    return Information(every, np.append(unit, np.ones(len(rivals))), both.T @ both, loose)
+    return Information(every, np.append(unit, np.ones(len(rivals))), both.T @ both, chaotic)
 
 
 def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:
     """Names (d,) of what a fit would look for, their values in units of their sizes, and these."""
-    held = even(plant)
-    names = tuple(name for name in names_of(plant, drive) if name not in held)
+    fixed = even(plant)
+    names = tuple(name for name in names_of(plant, drive) if name not in fixed)
     values = values_of(plant, names)
     unit = units_in(plant, names, values)
     return names, values / unit, unit
@@ -130,8 +132,8 @@ def lasting_jacobian(
     apart = np.abs(up - down)
     lasts = apart <= LASTING_SHARE * np.maximum(np.abs(up), np.abs(down))
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
-    luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_CHANCE), axis=1)
-    return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
+    by_chance = np.any(~lasts & ~(apart * LASTING_STEP < BY_CHANCE), axis=1)
+    return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(by_chance))
 
 
 def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:

@@ -75,9 +75,9 @@ class Response:
     def seen(self) -> BoolArray:
         """Where the logs show it: enough averages, and more coherence than chance gives, (k,)."""
         free = np.maximum(self.averages - 1.0, 1e-9)
-        luck = 1.0 - CHANCE_LEVEL ** (1.0 / free)
+        by_chance = 1.0 - CHANCE_LEVEL ** (1.0 / free)
         enough = self.averages >= EVENTS_NEEDED
-        return np.asarray(enough & (self.coherence >= np.maximum(HALF, luck)))
+        return np.asarray(enough & (self.coherence >= np.maximum(HALF, by_chance)))
 
     @property
     def sure(self) -> BoolArray:

@@ -33,7 +33,7 @@ class Recording:
     """One run every h [s], (n,) each: position y [m], applied force F [N], what is left of it
     without friction [N], reference r [m] or None.
 
-    held: the forces are commands, held over each period.
+    zoh: the forces are commands, constant over each period.
     """
 
     h: float
@@ -41,7 +41,7 @@ class Recording:
     F: Array
     linear: Array
     r: Array | None
-    held: bool
+    zoh: bool
 
     @property
     def duration(self) -> float:
@@ -130,13 +130,13 @@ def spectra_of(runs: Sequence[Recording], band: Band, names: tuple[str, ...]) ->
 def coefficients_of(one: Recording, band: Band, name: str) -> ComplexArray:
     """Of a run's stretches, (s, k): the forces, the accelerations of position and reference, and
     the second derivative of the force."""
-    held = hold(band.f, one.h) if one.held else 1.0
+    zoh = hold(band.f, one.h) if one.zoh else 1.0
     if name == "a":
         return second_derivative(one.y, one.h, band)
     if name == "r":
         assert one.r is not None
         return second_derivative(one.r, one.h, band)
     if name == "F_2":
-        return second_derivative(one.F, one.h, band) * held
+        return second_derivative(one.F, one.h, band) * zoh
     # As long as a second difference of them.
-    return coefficients((one.F if name == "F" else one.linear)[1:-1], one.h, band) * held
+    return coefficients((one.F if name == "F" else one.linear)[1:-1], one.h, band) * zoh

@@ -91,7 +91,7 @@ def fit_modes(response: Response) -> Modes | None:
         if more is None or not _earns(data, best, more):
             break
         best = more
-    return _told(data, best)
+    return _reported(data, best)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +217,7 @@ def _felt(data: _Data, f: float) -> bool:
     return all(np.count_nonzero(side) >= EVENTS_NEEDED for side in (data.f < f, data.f > f))
 
 
-def _told(data: _Data, p: Array) -> Modes:
+def _reported(data: _Data, p: Array) -> Modes:
     """The fit with its peaks and their deviations."""
     left, theta = data.solved(p)
     misfit = float(np.mean(left**2))

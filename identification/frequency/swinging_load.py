@@ -81,26 +81,26 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
     names = ("a", "linear", *instruments_of(runs))
     both = _longest(list(zip(runs, rests, strict=True)))
     runs = [one for one, _ in both]
-    looked_at = [
-        _Looked(band, names, [[coefficients_of(one, band, k) for k in names] for one in runs], both)
+    bands = [
+        _Band(band, names, [[coefficients_of(one, band, k) for k in names] for one in runs], both)
         for band in cut(runs)[:BANDS_TRIED]
     ]
-    first, last = looked_at[0].band.f, looked_at[-1].band.f
+    first, last = bands[0].band.f, bands[-1].band.f
     low, high = FROM_LOWEST * float(first[first > 0.0][0]), float(last[-1]) / 2.0
     if not low < high:
         return None
-    none = float(np.mean(np.log(np.concatenate([one.left() for one in looked_at]))))
+    none = float(np.mean(np.log(np.concatenate([one.left() for one in bands]))))
     every = np.geomspace(low, high, LOAD_HERTZ_TRIED)
-    tried = [_tried(looked_at, f, DAMPING_TRIED, mass) for f in every]
+    tried = [_tried(bands, f, DAMPING_TRIED, mass) for f in every]
     best = min(tried, key=lambda one: one[0])
     step = float(np.log(every[1] / every[0]))
     for finer in FINER:
         for way in FINER_STEPS:
             f = best[1].anti_resonance * np.exp(way * finer * step)
-            best = min(best, _tried(looked_at, f, best[1].damping, mass), key=lambda one: one[0])
+            best = min(best, _tried(bands, f, best[1].damping, mass), key=lambda one: one[0])
     for damping in DAMPINGS_TRIED:
         f = best[1].anti_resonance
-        best = min(best, _tried(looked_at, f, damping, mass), key=lambda one: one[0])
+        best = min(best, _tried(bands, f, damping, mass), key=lambda one: one[0])
     left, load = best
     inside = SHARE_BOUNDS[0] < load.share < SHARE_BOUNDS[1]
     return load if inside and leaves_less(left, none) else None
@@ -119,7 +119,7 @@ def _longest(both: list[tuple[Recording, Rests]]) -> list[tuple[Recording, Rests
 
 
 @dataclass(frozen=True, eq=False)
-class _Looked:
+class _Band:
     """A band of frequencies, the coefficients of the signals `names` of every run in it, the runs
     and where they rest."""
 
@@ -147,14 +147,12 @@ class _Looked:
         return cross_spectra(self.band, (*self.names, "pull"), each)
 
 
-def _tried(
-    looked_at: Sequence[_Looked], f: float, damping: float, mass: float
-) -> tuple[float, Load]:
+def _tried(bands: Sequence[_Band], f: float, damping: float, mass: float) -> tuple[float, Load]:
     """What a load of this anti-resonance leaves (mean logarithm), its share of the mass found."""
     unit = Load(f, damping, 1.0)
-    every = [one.with_pull(unit) for one in looked_at]
+    every = [one.with_pull(unit) for one in bands]
     above = below = 0.0
-    for one, spectra in zip(looked_at, every, strict=True):
+    for one, spectra in zip(bands, every, strict=True):
         Z = (*one.instruments, "pull") if one.instruments else ()
         force, pull = responses_with_reach(spectra, "a", ["linear", "pull"], Z, REACHES[1])
         weight = np.where(pull.averages > 0.0, pull.coherence / np.maximum(pull.sd, 1e-3) ** 2, 0.0)
@@ -164,7 +162,7 @@ def _tried(
     share = float(np.clip(above / max(below, 1e-300) / mass, 0.0, 1.0))
     left = [
         left_over(_pulled(spectra, share * mass), "a", ["linear"], one.instruments)
-        for one, spectra in zip(looked_at, every, strict=True)
+        for one, spectra in zip(bands, every, strict=True)
     ]
     return float(np.mean(np.log(np.concatenate(left)))), Load(f, damping, share)
 
@@ -180,5 +178,5 @@ def _pulled(spectra: Spectra, size: float) -> Spectra:
 def _pull(run: Recording, rest: Rests, load: Load, band: Band) -> ComplexArray:
     """Coefficients (s, k) of what the load pulls with at rest, of a mass of 1 kg."""
     pull = np.where(rest.where, load.beyond(rest.a, run.h), 0.0)
-    held = hold(band.f, run.h) if run.held else 1.0
-    return coefficients(pull[1:-1], run.h, band) * held
+    zoh = hold(band.f, run.h) if run.zoh else 1.0
+    return coefficients(pull[1:-1], run.h, band) * zoh

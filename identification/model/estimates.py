@@ -103,6 +103,6 @@ class KarnoppFit:
     falling: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
-    def imposed(self) -> bool:
+    def prescribed(self) -> bool:
         """Whether no run was followed, only the force equation of a prescribed motion."""
         return all(np.isnan(one.position_rms) for one in self.logs)

@@ -38,15 +38,16 @@ class Smoothing:
     """How a log becomes a regression.
 
     `cutoff` [Hz] of the position's smoothing (from the log where None) and its `method`; `factor`:
-    the parallel filter passes 0.8/factor of the band (0.4 `cutoff` where None); `held`: the force
-    is a command held over each period, so a central difference sees the mean of two neighbours;
-    `threshold` [m/s]: slower samples count as stuck (five times the velocity's noise where None).
+    the parallel filter passes 0.8/factor of the band (0.4 `cutoff` where None); `zoh`: the force
+    is a command, constant over each period, so a central difference sees the mean of two
+    neighbours; `threshold` [m/s]: slower samples count as stuck (five times the velocity's noise
+    where None).
     """
 
     cutoff: float | None = None
     method: Method = "butterworth"
     factor: int | None = None
-    held: bool = False
+    zoh: bool = False
     threshold: float | None = None
 
 
@@ -122,7 +123,7 @@ def regression(log: Log, how: Smoothing | None = None) -> Regression:
     h = _even_period(log)
     motion = differentiate(log["y"], h, how.cutoff, how.method)
     threshold = SURE_SLIDING * motion.v_noise if how.threshold is None else how.threshold
-    force = zoh_force(log["F"]) if how.held or log.held else np.array(log["F"])
+    force = zoh_force(log["F"]) if how.zoh or log.zoh else np.array(log["F"])
     up, down = motion.v > threshold, motion.v < -threshold
     columns = np.column_stack([motion.a, up, -1.0 * down, motion.v * up, motion.v * down])
     factor = max(1, round(1.0 / (motion.cutoff * h))) if how.factor is None else how.factor
@@ -186,7 +187,8 @@ def force_predicted(log: Log, p: Karnopp, how: Smoothing | None = None) -> Array
 
 
 def zoh_force(F: Array) -> Array:
-    """Mean of each sample of a held force and the one before it: what a central difference sees."""
+    """Mean of each sample of a zero-order-hold force and the one before it: what a central
+    difference sees."""
     out = np.array(F, dtype=np.float64)
     out[1:] = 0.5 * (F[1:] + F[:-1])
     return out

@@ -47,7 +47,7 @@ class Surroundings:
     +y; sine, cosine [N m]: gravity's of the angle; orders: of a turn, in which cogging repeats,
     the largest first; resonance: of a second mass, which is not taken out. gives [N per unit of
     u]: a motor's, whose force is its command's; None elsewhere. sampled: its column is a current
-    measured at instants, no command that is held until the next; held: the column of a measured
+    measured at instants, no command that is constant until the next; zoh: the column of a measured
     force is such a command.
     """
 
@@ -59,7 +59,7 @@ class Surroundings:
     gives: float | None = None
     sampled: bool = False
     resonance: Resonance | None = None
-    held: bool = False
+    zoh: bool = False
 
     @property
     def none(self) -> bool:
@@ -74,7 +74,7 @@ class Surroundings:
         Samples at its ends whose force is not known are left out.
         """
         if self.none:
-            return replace(log, held=True) if self.held and not log.held else log
+            return replace(log, zoh=True) if self.zoh and not log.zoh else log
         whole, behind = self._with_whole_force(log)
         unknown, n = int(np.ceil(abs(behind))), len(log)
         first, last = (unknown, n) if behind > 0.0 else (0, n - unknown)
@@ -82,7 +82,7 @@ class Surroundings:
 
     def of_one_instant(self, log: Log) -> Log:
         """The log with its force or command moved to the instants of its position, all samples."""
-        late = Surroundings(self.lag, gives=self.gives, sampled=self.sampled, held=self.held)
+        late = Surroundings(self.lag, gives=self.gives, sampled=self.sampled, zoh=self.zoh)
         return late._with_whole_force(log)[0]
 
     def of_angle(self, y: Array) -> Array:
@@ -90,7 +90,7 @@ class Surroundings:
         the period that follows it where the force is held for so long."""
         force = sum((one.force(y) for one in self.orders), np.zeros(len(y)))
         force = force - self.sine.value * np.sin(y) - self.cosine.value * np.cos(y)
-        stands = self.gives or self.held
+        stands = self.gives or self.zoh
         return 0.5 * (force + np.append(force[1:], force[-1:])) if stands else force
 
     @property
@@ -112,7 +112,7 @@ class Surroundings:
             signals["u"] = np.interp(at - behind, at, log["u"])
         whole = log.with_signals(**signals)
         known = of_place if log.of_place is None else log.of_place + of_place
-        return replace(whole, held=log.held or self.held, of_place=known), behind
+        return replace(whole, zoh=log.zoh or self.zoh, of_place=known), behind
 
     @property
     def effects(self) -> tuple[Acting, ...]:

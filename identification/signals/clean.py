@@ -19,13 +19,13 @@ from identification.signals.even_clock import (
     LONGEST_GAP,
     even_clock,
     gaps_in,
+    hours_in_words,
     in_counts,
-    told_of_hours,
 )
 from identification.signals.frozen import clipped, frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
-from identification.signals.renewal import held_for, new_values
+from identification.signals.renewal import hold_length, new_values
 from identification.signals.steps import beside_gaps, small_spikes, white_noise
 
 LONGEST_REPAIR = 3
@@ -85,7 +85,7 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         clock = f"rows in bursts, {holes} holes between them" if holes else "uneven clock"
         said.append(f"{log.name}: {clock}, resampled every {1e3 * runs[0].h:.3g} ms")
     if len(runs) > 1 or lost > LONGEST_GAP * runs[0].h:
-        hours = told_of_hours(gaps_in(log["t"], log.h), log.h)
+        hours = hours_in_words(gaps_in(log["t"], log.h), log.h)
         said.append(
             f"{log.name}: in {len(runs)} runs; {lost:.4g} s in gaps or short runs left out{hours}"
         )
@@ -137,8 +137,8 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
         bad.extend(jumped)
     log, ends = _within_range(log, first_row)
     bad += ends
-    told = [one for one in bad if one.done != "interpolated"]
-    return Repaired(log, (*remarks, *lines(told)), tuple(bad))
+    reported = [one for one in bad if one.done != "interpolated"]
+    return Repaired(log, (*remarks, *lines(reported)), tuple(bad))
 
 
 def _without_ends(log: Log, first_row: int) -> tuple[Repaired, int]:
@@ -276,7 +276,7 @@ def limits(log: Log, name: str, done: Done = "kept") -> list[BadSamples]:
     signal that the logger holds only new values count: the next has to be the same.
     """
     x = log[name]
-    step = held_for(x)
+    step = hold_length(x)
     new = x if step == 1 else x[new_values(x, step)]
     low, high = float(x.min()), float(x.max())
     if low == high or len(np.unique(x)) < _LEVELS:
@@ -299,9 +299,9 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     while np.any(new := spikes(log, name, rotary) & ~spiking):  # one may hide another beside it
         spiking |= new
         log = log.with_signals(**{name: _bridged(t, raw, spiking)})
-    settled = ~beside_gaps(t)  # over a gap of the clock any motion is a step
+    sound = ~beside_gaps(t)  # over a gap of the clock any motion is a step
     for _ in range(_ROUNDS if name in _SMALL else 0):
-        new = small_spikes(log[name]) & settled & ~spiking
+        new = small_spikes(log[name]) & sound & ~spiking
         if not np.any(new):
             break
         spiking |= new

@@ -27,7 +27,7 @@ MOST_STEPS = 1e8  # in the range of a position that is counted
 SAME_LEVEL = 100.0  # units in the last place of a usual value: rounding makes no other level
 WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
-FILTER_SETTLED = 8.0
+FILTER_RESPONSE = 8.0
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def low_pass(x: Array, h: float, cutoff: float, order: int = ORDER) -> Array:
     if cutoff * h >= 0.5:
         return np.array(x, dtype=np.float64)
     sections = signal.butter(order, cutoff, fs=1.0 / h, output="sos")
-    pad = min(np.shape(x)[-1] - 1, int(np.ceil(FILTER_SETTLED / (cutoff * h))))
+    pad = min(np.shape(x)[-1] - 1, int(np.ceil(FILTER_RESPONSE / (cutoff * h))))
     return np.asarray(signal.sosfiltfilt(sections, x, padlen=pad), dtype=np.float64)
 
 

@@ -71,7 +71,7 @@ def _borders(t: Array, h: float) -> list[int]:
     return [0, *cuts.tolist(), len(t)]
 
 
-def told_of_hours(leaps: Array, h: float) -> str:
+def hours_in_words(leaps: Array, h: float) -> str:
     """The end of what is said of leaps of a clock [s] of period h [s], where one is of whole hours,
     as of a clock that was set; else empty."""
     hours = np.rint(leaps / _HOUR)
@@ -154,7 +154,7 @@ def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array
     """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`,
     the times of its own clock: a command `u` is held until the next, any other is as
     `between_rows`."""
-    return _held(t, values, grid, h) if name == "u" else between_rows(t, values, grid, h)
+    return _zoh(t, values, grid, h) if name == "u" else between_rows(t, values, grid, h)
 
 
 def between_rows(t: Array, values: Array, grid: Array, h: float) -> Array:
@@ -167,14 +167,14 @@ def between_rows(t: Array, values: Array, grid: Array, h: float) -> Array:
     from scipy.interpolate import PchipInterpolator
 
     if _two_valued(values):
-        return _held(t, values, grid, h)
+        return _zoh(t, values, grid, h)
     return np.asarray(PchipInterpolator(t, values)(np.clip(grid, t[0], t[-1])))
 
 
-def _held(t: Array, values: Array, grid: Array, h: float) -> Array:
+def _zoh(t: Array, values: Array, grid: Array, h: float) -> Array:
     """The last value at the middle of each new period."""
-    held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
-    return np.asarray(values[np.maximum(held, 0)])
+    latest = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
+    return np.asarray(values[np.maximum(latest, 0)])
 
 
 def in_counts(values: Array, logged: Array) -> Array:

@@ -57,7 +57,7 @@ def fir_lowpass(cutoff: float, h: float, order: int = 40) -> Filter:
 
 
 def apply_filter(filt: Filter, x: Array) -> Array:
-    """`x` through the filter, causal, settled on x[0] at the start; shape of `x`."""
+    """`x` through the filter, causal, at the steady state of x[0] at the start; shape of `x`."""
     from scipy.signal import lfilter, lfilter_zi
 
     x = np.asarray(x, dtype=np.float64)

@@ -76,11 +76,11 @@ def _white(r: Array) -> bool:
     return statistic <= float(chi2.ppf(1.0 - CHANCE, LAGS))
 
 
-def corrected_share(walk: float, noise: float) -> float:
+def corrected_share(random_walk: float, noise: float) -> float:
     """Share g of its distance to the measured force by which a run's force is best corrected at
     every sample: the steady gain of a Kalman filter of a random walk in white noise."""
-    if walk <= 0.0 or noise <= 0.0:
+    if random_walk <= 0.0 or noise <= 0.0:
         return 0.0
-    q, R = walk**2, noise**2
+    q, R = random_walk**2, noise**2
     before = 0.5 * (q + np.sqrt(q * q + 4.0 * q * R))
     return float(before / (before + R))

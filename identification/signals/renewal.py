@@ -19,8 +19,8 @@ FEWEST_NEW = 40  # new values, which give the step
 MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
 LONGEST_HOLD = 20  # samples for which a logger repeats a value; a command has longer steps
-RENEWED_AT, HELD_FOR = "the position is renewed at", "is renewed every"
-HELD_SIGNALS = {
+RENEWED_AT, RENEWED_EVERY = "the position is renewed at", "is renewed every"
+ZOH_SIGNALS = {
     "u": "the command",
     "F": "the force",
     "p_p": "the pressure p_p",
@@ -37,12 +37,12 @@ class Renewed(NamedTuple):
 
 
 def renewed(log: Log) -> Renewed:
-    """The log; of one whose position is held for several samples, those at which it is new.
+    """The log; of one whose position is constant over several samples, those at which it is new.
 
-    Other signals are then means: a command, which is held itself, until the next new position;
+    Other signals are then means: a command, a zero-order hold itself, until the next new position;
     whatever else was measured, around it.
     """
-    step = held_for(log["y"]) if "y" in log else 1
+    step = hold_length(log["y"]) if "y" in log else 1
     if step < USUAL_FROM:
         return Renewed(log, ())
     at = new_values(log["y"], step)
@@ -58,21 +58,22 @@ def renewed(log: Log) -> Renewed:
     return Renewed(Log(log.name, signals), (said,))
 
 
-def held_drives(log: Log) -> tuple[str, ...]:
+def zoh_remarks(log: Log) -> tuple[str, ...]:
     """What is said of commands, forces and pressures renewed more slowly than the position."""
-    least = max(USUAL_FROM - 1, held_for(log["y"]) if "y" in log else 1)
-    held = {name: held_for(log[name]) for name in HELD_SIGNALS if name in log}
+    least = max(USUAL_FROM - 1, hold_length(log["y"]) if "y" in log else 1)
+    steps = {name: hold_length(log[name]) for name in ZOH_SIGNALS if name in log}
     return tuple(
-        f"{log.name}: {HELD_SIGNALS[name]} {HELD_FOR} {step} rows, at {1.0 / (step * log.h):.3g} Hz"
-        f" (zero-order hold), the log is written at {1.0 / log.h:.3g} Hz: a measured one is up to"
+        f"{log.name}: {ZOH_SIGNALS[name]} {RENEWED_EVERY} {step} rows,"
+        f" at {1.0 / (step * log.h):.3g} Hz (zero-order hold), the log is written at"
+        f" {1.0 / log.h:.3g} Hz: a measured one is up to"
         f" {1e3 * step * log.h:.3g} ms old, which looks like a delay; log it in every row"
-        for name, step in held.items()
+        for name, step in steps.items()
         if least < step <= LONGEST_HOLD
     )
 
 
-def held_for(y: Array) -> int:
-    """Samples for which a position or another signal is held, 1 where it is not."""
+def hold_length(y: Array) -> int:
+    """Samples for which a position or another signal keeps a value, 1 where it changes in each."""
     if not np.all(np.isfinite(y)):
         return 1
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identification.arrays import Array, BoolArray
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.differentiate import resolution
-from identification.signals.even_clock import LONGEST_GAP, told_of_hours
+from identification.signals.even_clock import LONGEST_GAP, hours_in_words
 from identification.thresholds import HALF, OF_ACCOUNT
 
 MOST_FAULTY = 0.01  # of the rows: more is a file that is laid out otherwise
@@ -84,8 +84,8 @@ def even_stamps(t: Array) -> tuple[Array, str]:
         waited = int(np.argmin(together))  # rows that were in the buffer before it was first read
         rest, said = even_stamps(t[waited:]) if waited > SHORTEST_LOG else (t, "")
         before = np.arange(-waited, 0) * (rest[1] - rest[0]) + rest[0]
-        told = f"{rows_of(waited)} that waited before the first are put before it; {said}"
-        return (np.concatenate([before, rest]), told) if said else (t, "")
+        remark = f"{rows_of(waited)} that waited before the first are put before it; {said}"
+        return (np.concatenate([before, rest]), remark) if said else (t, "")
     if buffered:
         return line, f"rows stamped about {at_a_time:.0f} at a time, late: taken as even rows"
     said = f"{rows_of(int(np.sum(same)))} with the time of the row before and other values"
@@ -117,13 +117,13 @@ def rows_of(count: int) -> str:
     return "a row" if count == 1 else f"{count} rows"
 
 
-def told_of_starts(t: Array, parts: Sequence[slice]) -> str:
+def starts_in_words(t: Array, parts: Sequence[slice]) -> str:
     """What the clock does between the parts that `stretches` made of it."""
     h = float(np.median(np.diff(t)))
     back = np.array([t[one.start - 1] - t[one.start] for one in parts if one.start])
     if any(abs(t[one.start] - t[0]) <= LONGEST_GAP * h for one in parts[1:]):
         return f"clock begins again: {len(parts)} runs"
-    said = f"clock goes back by {np.max(back):.4g} s{told_of_hours(back, h)}"
+    said = f"clock goes back by {np.max(back):.4g} s{hours_in_words(back, h)}"
     return f"{said}: {len(parts)} runs"
 
 

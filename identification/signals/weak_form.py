@@ -24,13 +24,13 @@ HOP = 0.25  # of a window, between the starts of two
 @dataclass(frozen=True, eq=False)
 class WeakWindows:
     """Rows over one log as operators (rows, n): weighted mean of a signal, of its first and second
-    derivative, of a signal held over each period and of one that is straight in between; `start`
-    (rows,) and `length` in samples."""
+    derivative, of a signal constant over each period and of one that is straight in between;
+    `start` (rows,) and `length` in samples."""
 
     mean: sparse.csr_array
     first: sparse.csr_array
     second: sparse.csr_array
-    held: sparse.csr_array
+    zoh: sparse.csr_array
     kinked: sparse.csr_array
     start: IntArray
     length: int
@@ -47,14 +47,15 @@ class WeakWindows:
     def at(self, index: IntArray) -> "WeakWindows":
         """The windows of these numbers (k,)."""
         return WeakWindows(
-            self.mean[index], self.first[index], self.second[index], self.held[index],
+            self.mean[index], self.first[index], self.second[index], self.zoh[index],
             self.kinked[index], self.start[index], self.length,
         )  # fmt: skip
 
 
 @lru_cache
 def weights(length: int, h: float) -> tuple[Array, Array, Array, Array, Array]:
-    """Weights (length + 1,) of mean, first and second derivative, of a held and a kinked signal."""
+    """Weights (length + 1,) of mean, first and second derivative, of a zero-order-hold and a kinked
+    signal."""
     bump = poly.polypow([1.0, 0.0, -1.0], POWER)
     x = np.linspace(-1.0, 1.0, length + 1)
     scale = 0.5 * length * h  # x = t/scale
@@ -90,8 +91,8 @@ def windows(starts: IntArray, length: int, n: int, h: float) -> WeakWindows:
     made = (
         sparse.csr_array((np.tile(w, r), column, row), shape=(r, n)) for w in weights(length, h)
     )
-    mean, first, second, held, kinked = made
-    return WeakWindows(mean, first, second, held, kinked, starts, length)
+    mean, first, second, zoh, kinked = made
+    return WeakWindows(mean, first, second, zoh, kinked, starts, length)
 
 
 def all_windows(n: int, length: int, h: float) -> WeakWindows:

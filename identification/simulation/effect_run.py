@@ -91,7 +91,7 @@ def effect_run_kernel(
     addresses: IntArray,
     q: Array,
     s: Array,
-    held: bool,
+    forced: bool,
     gain: float,
     k_a: float,
     t: Array,
@@ -116,7 +116,7 @@ def effect_run_kernel(
     plant = parameters(p, 0)
     k1, k2 = plant[K1], plant[K2]
     z, z_0, spare = np.zeros(len(codes)), np.zeros(len(codes)), np.zeros(len(codes))
-    if held:  # a measured force has its losses in it
+    if forced:  # a measured force has its losses in it
         codes = np.where(codes == ON_ACTUATOR, -1, codes)
     bristle = place_of(codes, ON_BRISTLE)
     acting = effective_commands(codes, addresses, q, s, z, t, u, h)
@@ -131,7 +131,7 @@ def effect_run_kernel(
         g = k1 * acting[k]
         if k_a != 0.0:
             F, g = k_a * acting[k], 0.0
-        elif held:
+        elif forced:
             F = force[k] + k2 * (y_m[k] - y)
             following = k + 1 if k + 1 < len(u) else k
             g = slope[k] + k2 * (y_m[following] - y_m[k]) / h

@@ -34,8 +34,8 @@ from identification.simulation.karnopp_step import (
     STUCK,
     Parameters,
     glided,
+    mode_at,
     resolve_until,
-    settled_mode,
 )
 
 AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to rest
@@ -110,7 +110,7 @@ def effect_step(
             slow = slowest < AWAY * p[DV_P], fastest > AWAY * p[DV_N]
             at_middle = (now, ym, vm, Fm, u)
             shifted = with_friction(acts, codes, addresses, q, s, z, p, at_middle, slow, k_e)
-            mode = settled_mode(shifted, v, F + extra)
+            mode = mode_at(shifted, v, F + extra)
             if still and mode != STUCK:  # what friction owes to the rest goes with the first motion
                 if acts & STATES:
                     z[:] = spare
@@ -148,7 +148,8 @@ def effect_step(
 def acting_command(
     codes: IntArray, addresses: IntArray, q: Array, s: Array, z: Array, t: float, u: float, h: float
 ) -> float:
-    """Command that reaches the actuator in place of `u` [V], held for h [s]; z (k,) goes on."""
+    """Command that reaches the actuator in place of `u` [V], constant over h [s]; z (k,) goes
+    on."""
     for i in range(len(codes)):
         if codes[i] == ON_COMMAND:
             d, given = 1.0 if u >= 0.0 else -1.0, u
@@ -162,7 +163,7 @@ def acting_command(
 
 @compiled
 def delayed(history: Array, k: int, late: float) -> float:
-    """Mean over sample k of the held command (n,) that is `late` samples old."""
+    """Mean over sample k of the zero-order-hold command (n,) that is `late` samples old."""
     whole = int(np.floor(late))
     part = late - whole
     newer: float = history[max(k - whole, 0)]

@@ -31,11 +31,11 @@ from identification.simulation.karnopp_step import (
     STUCK,
     exact_step,
     kernel_parameters,
+    mode_at,
     mode_row,
     mode_table,
     parameters,
     resolve,
-    settled_mode,
 )
 
 Restarts = tuple[IntArray, Array, Array] | tuple[IntArray, Array, Array, Array]
@@ -59,7 +59,7 @@ class FreeRun:
 def run_kernel(
     p: Array,
     h: float,
-    held: bool,
+    forced: bool,
     gain: float,
     u: Array,
     force: Array,
@@ -74,7 +74,7 @@ def run_kernel(
 ) -> None:
     """One plant p (1, 11) along one log: out[:3] takes position, velocity, force; modes (n,).
 
-    held: take the force from `force` and `slope` at every sample, corrected by k2 (y_m - y);
+    forced: take the force from `force` and `slope` at every sample, corrected by k2 (y_m - y);
     gain: share of its distance to `force` by which the run's own force is corrected at a sample,
     where it is not held; at, at_y, at_v, at_f: samples at which the run restarts, and from where.
     """
@@ -92,16 +92,16 @@ def run_kernel(
         if moved_here:
             y, v, f = at_y[window], at_v[window], at_f[window]
             window += 1
-        if held:
+        if forced:
             f = force[k] + k2 * (y_m[k] - y)
             following = k + 1 if k + 1 < len(u) else k
             g = slope[k] + k2 * (y_m[following] - y_m[k]) / h
         shown = f
         if gain > 0.0 and not moved_here:
             f += gain * (force[k] - f)
-        nudged = held or gain > 0.0
-        if moved_here or (nudged and (f < row[F_LO] or f > row[F_HI])):
-            mode = settled_mode(plant, v, f)
+        observed = forced or gain > 0.0
+        if moved_here or (observed and (f < row[F_LO] or f > row[F_HI])):
+            mode = mode_at(plant, v, f)
             v = 0.0 if mode == STUCK else v
         if mode != before:
             row = mode_row(table, mode)
@@ -116,7 +116,8 @@ def run_kernel(
 
 
 def force_slope(force: Array, h: float, hold: bool) -> Array:
-    """Slope of the force between samples [N/s]: 0 where it is held (a motor), else linear."""
+    """Slope of the force between samples [N/s]: 0 where it is a zero-order hold (a motor), else
+    linear."""
     if hold:
         return np.zeros(len(force))
     return np.append(np.diff(force) / h, 0.0)
@@ -146,20 +147,21 @@ def free_run(
     if drive == "command" and not isinstance(plant.actuator, Actuator | Motor):
         raise BadModel("the model has no actuator: drive the run by the force, not by the command")
     motor = isinstance(plant.actuator, Motor)
-    held = drive == "force" or motor
+    forced = drive == "force" or motor
     k1, k2 = 0.0, stiffness
-    if isinstance(plant.actuator, Actuator) and not held:
+    if isinstance(plant.actuator, Actuator) and not forced:
         k1, k2 = plant.actuator.k1, plant.actuator.k2
-    gain = 0.0 if held else gain
-    k_a, force = _force(plant, log, drive, seen=held or gain > 0.0)
+    gain = 0.0 if forced else gain
+    k_a, force = _force(plant, log, drive, seen=forced or gain > 0.0)
     begun = _begun(log, start, force, restarts)
     out, modes = np.zeros((4, len(log))), np.zeros(len(log), dtype=np.int64)
     u = read_only(log["u"] if "u" in log else np.zeros(len(log)))
     force = read_only(force)
-    slope = force_slope(force, log.h, hold=motor or log.held or not held)
+    slope = force_slope(force, log.h, hold=motor or log.zoh or not forced)
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
+    driven = p, log.h, forced, gain
     if not plant.effects:
-        run_kernel(p, log.h, held, gain, u, force, slope, log["y"], *begun, out, modes)
+        run_kernel(*driven, u, force, slope, log["y"], *begun, out, modes)
         out[3] = out[0]
     else:
         table, signals = effect_table(plant.effects), signal_table(plant.effects, log)
@@ -167,15 +169,13 @@ def free_run(
         if outside(table.codes):  # the body moves as that of the plain plant, stepped exactly
             acting = effective_commands(*own, np.zeros(len(table.codes)), log["t"], u, log.h)
             force = read_only(k_a * acting) if k_a != 0.0 else force
-            run_kernel(
-                p, log.h, held, gain, read_only(acting), force, slope, log["y"], *begun, out, modes
-            )
+            run_kernel(*driven, read_only(acting), force, slope, log["y"], *begun, out, modes)
             shown_run(p, log.h, *own, log["t"], u, begun[0], out)
         else:
             count = pieces(table, log.h, bristle_step)
             few = fewer(table, count, bristle_step)
             effect_run_kernel(
-                p, log.h, few, count, *own, held, gain, k_a, log["t"], u, force, slope, log["y"],
+                p, log.h, few, count, *own, forced, gain, k_a, log["t"], u, force, slope, log["y"],
                 *begun, out, modes,
             )  # fmt: skip
     _refuse_lost(log, out[0])
@@ -186,7 +186,7 @@ def released(
     friction: Sequence[Karnopp], force: Array, h: float, *, hold: bool, level: float
 ) -> Array:
     """Positions (k, n) [m] of bodies of such friction, which rest at `level` and are free under the
-    force (n,) [N], held between samples or linear.
+    force (n,) [N], constant between samples or linear.
 
     Source: as `free_run`.
     """

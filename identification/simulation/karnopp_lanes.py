@@ -30,10 +30,10 @@ from identification.simulation.karnopp_step import (
     C,
     Row,
     exact_step,
+    mode_at,
     mode_table,
     parameters,
     resolve,
-    settled_mode,
 )
 
 WIDTH = 16
@@ -94,7 +94,7 @@ def place(
     s: Array, modes: IntArray, tables: Array, p: Array, lane: int, y: float, v: float, force: float
 ) -> None:
     """Set a lane's state; a body inside the band with too little force is at rest."""
-    mode = settled_mode(parameters(p, lane), v, force)
+    mode = mode_at(parameters(p, lane), v, force)
     s[Y * WIDTH + lane] = y
     s[V * WIDTH + lane] = 0.0 if mode == STUCK else v
     s[F * WIDTH + lane] = force
@@ -112,7 +112,7 @@ def prepare_lanes(p: Array, h: float, tables: Array, s: Array) -> None:
 
 
 @compiled
-def settle_flagged(
+def resolve_flagged(
     flagged: int,
     s: Array,
     modes: IntArray,
@@ -132,7 +132,7 @@ def settle_flagged(
             v, force = s[V_OLD * WIDTH + lane], out[at + WIDTH + lane]
             mode, plant = modes[lane], parameters(p, lane)
             if force < s[F_LO * WIDTH + lane] or force > s[F_HI * WIDTH + lane]:
-                mode = settled_mode(plant, v, force)
+                mode = mode_at(plant, v, force)
                 v = 0.0 if mode == STUCK else v
             y, v, force, mode = resolve(
                 plant, out[at + lane], v, force, mode, s[G * WIDTH + lane], h
@@ -165,7 +165,7 @@ def march(
             flat[at + WIDTH + i] = force
             flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * command)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, flat, at)
+            resolve_flagged(flagged, s, modes, tables, p, h, flat, at)
 
 
 @compiled
@@ -196,11 +196,11 @@ def march_corrected(
             flagged |= int(outside) << i
             flagged |= advance(s, i, h, f, s[GAIN * WIDTH + i] * command)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, s, BEFORE_Y * WIDTH)
+            resolve_flagged(flagged, s, modes, tables, p, h, s, BEFORE_Y * WIDTH)
 
 
 @compiled
-def march_held(
+def march_forced(
     p: Array,
     tables: Array,
     s: Array,
@@ -226,7 +226,7 @@ def march_held(
             flagged |= int(outside) << i
             flagged |= advance(s, i, h, f, slope_k + coupling * slope_y_k)
         if flagged:
-            settle_flagged(flagged, s, modes, tables, p, h, flat, at)
+            resolve_flagged(flagged, s, modes, tables, p, h, flat, at)
 
 
 @compiled

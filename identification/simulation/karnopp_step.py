@@ -36,7 +36,7 @@ Row = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
 RATE_STEP = 0.35  # longest stretch of one series, in units of the fastest rate: its rest is 1e-14
-BRIEF_STEP = 0.1  # the same, of a shorter series
+SHORT_STEP = 0.1  # the same, of a shorter series
 # Within a quarter of an oscillation acceleration rises while it is negative, and the force in the
 # band does not fall below its limit and come back; in longer samples every step is followed.
 QUARTER = 1.5
@@ -66,7 +66,7 @@ def parameters(p: Array, lane: int) -> Parameters:
 
 
 @compiled
-def settled_mode(p: Parameters, v: float, force: float) -> int:
+def mode_at(p: Parameters, v: float, force: float) -> int:
     """Mode of a body at velocity `v` under `force`: eq. (1), with the edge of the band."""
     dv_p, dv_n, f_sp, f_sn = p[DV_P], p[DV_N], p[F_SP], p[F_SN]
     slip_p = p[F_CP] + p[F_VP] * dv_p
@@ -152,7 +152,7 @@ def _after_exit(mode: int, p: Parameters, force: float, found: int) -> tuple[flo
 
 
 @compiled_inline
-def _held_exit(
+def _constant_speed_exit(
     mode: int, p: Parameters, force: float, slope: float, left: float
 ) -> tuple[float, int]:
     """Time and next mode of a body at constant velocity (stuck, or along an edge)."""
@@ -197,7 +197,7 @@ def resolve_until(
         pieces += 1
         if mode in (STUCK, EDGE_P, EDGE_N):
             slope = g - k2 * v
-            tau, following = _held_exit(mode, p, force, slope, left)
+            tau, following = _constant_speed_exit(mode, p, force, slope, left)
             y += v * tau
             force += slope * tau
             left -= tau
@@ -259,9 +259,9 @@ def glided(
     after = speed + h * (c1 + h * (c2 + h * (c3 + h * (c4 + h * (c5 + h * c6)))))
     moved = h * (c1 / 2 + h * (c2 / 3 + h * (c3 / 4 + h * (c4 / 5 + h * (c5 / 6 + h * c6 / 7)))))
     moved = h * (speed + moved)
-    brief = alpha * h < BRIEF_STEP and abs(beta) * h * h < BRIEF_STEP * BRIEF_STEP
+    short = alpha * h < SHORT_STEP and abs(beta) * h * h < SHORT_STEP * SHORT_STEP
     on = min(speed, speed + c1 * h, after) > edge and mode in (SLIP_P, SLIP_N)
-    return side * moved, side * after, brief and on
+    return side * moved, side * after, short and on
 
 
 @compiled

@@ -121,7 +121,7 @@ class HeldOut:
             return min(of_force**2, self._of_rest)
         if self._of_equation is not None:
             return min(self._of_equation, self._of_rest)
-        runs = plain is not self.model and not plain.imposed and not self.model.imposed
+        runs = plain is not self.model and not plain.prescribed and not self.model.prescribed
         by_run = runs and plain.misfit > ADEQUATE
         return min(share_left(self.was, self.now, self.noise, by_run), self._of_rest)
 
@@ -233,8 +233,8 @@ class HeldOut:
         plain = self.plain.model
         if (
             not self.seen
-            or plain.imposed
-            or self.model.imposed
+            or plain.prescribed
+            or self.model.prescribed
             or self._measured_force_is_explained
         ):
             return ""
@@ -266,7 +266,7 @@ class HeldOut:
 
     @cached_property
     def _likelier_plain(self) -> FittedStructure:
-        """The plain model against which effects, where there are any, are held."""
+        """The plain model against which effects, where there are any, are tested."""
         plain = self.plain.model
         if self.model is plain:
             return plain

@@ -49,7 +49,9 @@ def errors_of(
         out[name] = Errors(
             force_rms=force,
             force_relative=force / size if force is not None and size else None,
-            position_rms=None if model.imposed else position_rms(model.plant, over or logs, drive),
+            position_rms=None
+            if model.prescribed
+            else position_rms(model.plant, over or logs, drive),
             actuator_rms=rms(left[ACTUATOR]) if ACTUATOR in left else None,
         )
     return out
@@ -72,9 +74,9 @@ def on_test(
 ) -> OnTest:  # fmt: skip
     """What a model of these errors leaves of the logs; beside: another with which it is compared,
     whose weights of the run's errors it has."""
-    if model.imposed:
+    if model.prescribed:
         return OnTest(errors, None)
-    weighed_by = None if beside is None or beside.imposed else beside.plant
+    weighed_by = None if beside is None or beside.prescribed else beside.plant
     return OnTest(errors, misfit(model.plant, logs, drive, weighed_by=weighed_by))
 
 
@@ -136,18 +138,19 @@ def predicted(left: OnTest, noise: Errors) -> bool:
 def lacks(model: FittedStructure, errors: Errors, noise: Errors) -> bool:
     """Whether a model lacks something of account on the logs of its fit, with these errors there.
 
-    A free run that leaves far more than noise, and more than a trifle of the motion; or force far
-    beyond noise, of a prescribed motion beyond noise, and more than a trifle of the Coulomb level.
+    A free run that leaves far more than noise, and more than a negligible part of the motion; or
+    force far beyond noise, of a prescribed motion beyond noise, and more than a negligible part of
+    the Coulomb level.
     """
     force, floor, p = errors.force_rms, noise.force_rms or 0.0, model.plant.friction
-    least = ADEQUATE if model.imposed else ASTRAY
+    least = ADEQUATE if model.prescribed else ASTRAY
     beyond = 0.0 if force is None else force**2 - floor**2
     by_force = (
         force is not None
         and force**2 > least * floor**2
         and beyond > (MATERIAL * max(p.F_cp, p.F_cn)) ** 2
     )
-    if model.imposed:
+    if model.prescribed:
         return by_force
     by_run = model.misfit > ASTRAY and off(model) > AS_GOOD_AS_NONE
     return by_run or (by_force and model.misfit > COMPLETE)

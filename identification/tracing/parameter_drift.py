@@ -91,7 +91,7 @@ def _own_misfit(mine: RowFit) -> float:
 
 def is_refined(one: Change, after: FittedStructure) -> bool:
     """Whether the run, which follows the training logs, has the changed value already."""
-    if one.name not in FIVE or after.imposed or after.misfit > COMPLETE:
+    if one.name not in FIVE or after.prescribed or after.misfit > COMPLETE:
         return False
     value, half = float(getattr(after.plant.friction, one.name)), NORMAL_95 * one.sd
     return abs(one.after - value) <= max(half, MATERIAL * abs(value))

@@ -21,9 +21,9 @@ from identification.estimation.windowed_run.run_errors import misfit
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import (
     RecordedRows,
-    imposed_rows,
-    told_by_speed,
+    prescribed_rows,
     without_load_dependent,
+    without_speed_effects,
 )
 
 REFINEMENT = "the refinement of the plain model to its end"
@@ -33,7 +33,7 @@ REFINEMENT = "the refinement of the plain model to its end"
 class PlainModel:
     """The model without effects and what it leaves.
 
-    rows: the logs, imposed where a rig leads them; start, first: its regression and fits of the
+    rows: the logs, prescribed where a rig moves them; start, first: its regression and fits of the
     equations; model: refined on its free run; library: the effects that are worth a trial, none
     where it leaves nothing but noise; recorded: the logs as the estimator takes them.
     """
@@ -47,26 +47,26 @@ class PlainModel:
 
 
 def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) -> PlainModel:
-    """The plain model of the rows; raises NotIdentifiable where these tell nothing.
+    """The plain model of the rows; raises NotIdentifiable where these identify nothing.
 
     Halted, it is the best so far.
     """
     recorded, halt = rows.recorded, rows.recorded.halt
     recorded, model = by_exact_force(recorded, plain_structure(recorded, rng), rng.spawn(1)[0])
     rows = replace(rows, recorded=recorded)
-    # Imposed, and the inertia not only hidden by what is missing.
-    imposed = model.imposed and inertia_has_no_part(rows.logs)
-    if rows.refused is not None and not imposed:
+    # Prescribed, and the inertia not only hidden by what is missing.
+    prescribed = model.prescribed and inertia_has_no_part(rows.logs)
+    if rows.refused is not None and not prescribed:
         raise rows.refused
-    if imposed:
-        rows = imposed_rows(rows)
+    if prescribed:
+        rows = prescribed_rows(rows)
         model = plain_structure(rows.recorded, rng)
-        library, said = told_by_speed(without_load_dependent(library, rows.logs), rows.logs)
+        library, said = without_speed_effects(without_load_dependent(library, rows.logs), rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
     if halt.reached():
         halt.left_out(REFINEMENT)
     start = model.stage
-    if model.imposed:
+    if model.prescribed:
         return PlainModel(rows, start, model.outcomes, model, library, recorded)
     logs = rows.logs
     if model.misfit <= ADEQUATE:  # else its stops are not the machine's

@@ -67,19 +67,19 @@ def recorded_rows(train: Sequence[Log], rig: Rig, halt: Halt | None = None) -> R
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(slower)
     recorded, refused = _prescribed_if_needed(recorded)
     recorded = with_clocks(recorded, slower_remarks(train, slower))
-    told = (COMMAND_SAYS_LITTLE,) if drive == "force" and commanded(slower) else ()
-    return RecordedRows(recorded, refused, (*recorded.remarks, *told))
+    remark = (COMMAND_SAYS_LITTLE,) if drive == "force" and commanded(slower) else ()
+    return RecordedRows(recorded, refused, (*recorded.remarks, *remark))
 
 
-def imposed_rows(rows: RecordedRows) -> RecordedRows:
+def prescribed_rows(rows: RecordedRows) -> RecordedRows:
     """The same logs as a rig's that prescribes the motion; raises NotIdentifiable as above."""
-    recorded = _imposed(rows.recorded)
+    recorded = _prescribed(rows.recorded)
     _enough(recorded.logs)
     return RecordedRows(recorded, None, rows.remarks)
 
 
-def _imposed(recorded: RecordedLogs) -> RecordedLogs:
-    return replace(recorded, imposed=True).of(recorded.plain)
+def _prescribed(recorded: RecordedLogs) -> RecordedLogs:
+    return replace(recorded, prescribed=True).of(recorded.plain)
 
 
 def _prescribed_if_needed(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIdentifiable | None]:
@@ -90,7 +90,7 @@ def _prescribed_if_needed(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIden
     except NotIdentifiable as error:
         if recorded.drive != "force":
             raise
-        moved = _imposed(recorded)
+        moved = _prescribed(recorded)
         try:
             _enough(moved.logs)
         except NotIdentifiable:
@@ -99,7 +99,9 @@ def _prescribed_if_needed(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIden
     return recorded, None
 
 
-def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library, tuple[str, ...]]:
+def without_speed_effects(
+    library: Library, logs: Sequence[MotionLog]
+) -> tuple[Library, tuple[str, ...]]:
     """The library without effects of speed alone, where a rig moved at much the same speed; and
     what to say of it.
 

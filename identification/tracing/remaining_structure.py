@@ -28,9 +28,9 @@ from identification.tracing.residuals import joined, signals_at, signals_of
 from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30
-BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
+BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are estimated
 THINNED = 10  # samples of a free run of which one is judged
-SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
+SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples not by chance
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
 
 
@@ -66,7 +66,7 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
         every["F"] = o.rows.b - o.fit.residual * o.rows.sd
         if motor:
             every.pop("u", None)
-    if equation == REST:  # as it is told there, it is the position's own noise
+    if equation == REST:  # as it is defined there, it is the position's own noise
         every.pop("v")
     if any(effect.place.elastic for effect, _ in choice.end.chosen):
         every.pop("reversal", None)  # its rise is judged in the free run
@@ -110,7 +110,7 @@ def _with_command(names: tuple[str, ...], motor: bool) -> tuple[str, ...]:
 
 def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
     """Rows of sliding above the band of a free run that is followed, or else the regression's."""
-    followed = not after.imposed and after.misfit <= ASTRAY
+    followed = not after.prescribed and after.misfit <= ASTRAY
     slowest = min(o.slowest, band(after)) if followed else o.slowest
     return np.asarray(o.rows.speed >= slowest)
 
@@ -121,13 +121,13 @@ def strongest(
     """The strongest of the structures left in the equations and in the free run,
     however little it is, as something surely is missing."""
     found = remaining_structure(choice, after)
-    if after.imposed:
+    if after.prescribed:
         return found
 
-    def told(one: Dependence) -> float:
+    def share(one: Dependence) -> float:
         return one.explained if one.depends_on else 0.0
 
-    found = max(found, in_run(after, logs, drive), key=told)
+    found = max(found, in_run(after, logs, drive), key=share)
     return found if found.depends_on else in_run(after, logs, drive, least=SLIGHT_SHARE)
 
 
@@ -135,7 +135,7 @@ def in_run(
     after: FittedStructure, logs: Sequence[MotionLog], drive: Drive, least: float | None = None
 ) -> Dependence:  # fmt: skip
     """Signals on which the free run's position error depends, or its rate, or its curvature (the
-    force that is missing); or else how large they are, where their sign is a matter of luck.
+    force that is missing); or else how large they are, where their sign is a matter of chance.
 
     least: share of the rate or curvature that a signal explains where it is named; None: as usual.
     """

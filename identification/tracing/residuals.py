@@ -78,7 +78,7 @@ def run_residual(
 
     None where a model's inertia is of no account, or its run cannot be followed.
     """
-    if before.imposed or after.imposed:
+    if before.prescribed or after.prescribed:
         return None
     found: list[list[Array]] = []
     for model in (before,) if after is before else (before, after):
@@ -115,7 +115,7 @@ def signals_at(stage: EffectRows, equation: str) -> dict[str, Array]:
     each = []
     for i, (one, middle) in enumerate(zip(stage.logs, _places(stage, equation), strict=True)):
         own = {k: v[middle] for k, v in signals_of(one).items()}
-        rows = {MECHANICAL: one.sliding if one.held else None, ACTUATOR: one.whole}.get(equation)
+        rows = {MECHANICAL: one.sliding if one.zoh else None, ACTUATOR: one.whole}.get(equation)
         if rows is not None:
             own["du"] = rows.first @ one.signals["u"]
         if equation == BREAKAWAY:

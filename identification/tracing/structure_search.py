@@ -73,14 +73,14 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     loses. By the likelihood ratio, Wilks, Ann. Math. Stat. 9 (1938) 60, of the position measured
     under a latent force (`latent_force`, (1)); prediction-error method, Ljung (1999), 7.2.
     """
-    if model.imposed or not choice.steps:
+    if model.prescribed or not choice.steps:
         return model
     slowest = choice.base[MECHANICAL].slowest
     model, names, bent, lacks = _by_equations(
         model, choice.end, choice.base, choice.effects, setting.recorded, slowest
     )
-    walks = any(one.walks(setting.drive) for one in setting.logs)
-    if not (bent or walks):
+    drifts = any(one.has_random_walk(setting.drive) for one in setting.logs)
+    if not (bent or drifts):
         return model
     best = setting.halt.tried(
         LIKELIEST,
@@ -89,7 +89,7 @@ def likelier(choice: Choice, model: FittedStructure, setting: Setting) -> Fitted
     )
     if best is None or not best.is_known:
         return model
-    if walks and best.is_likelier:
+    if drifts and best.is_likelier:
         return replace(model, plant=best.plant, sd={**model.sd, **best.sd})
     if not bent:
         return model
@@ -119,9 +119,9 @@ def _by_equations(
 
 
 def likelier_plain(plain: PlainModel, slowest: float) -> FittedStructure:
-    """The plain model as effects are to be held against it: as its equations have it, where those
+    """The plain model as effects are tested against it: as its equations have it, where those
     are likelier than its run, so that what this bent is not laid to an effect. As `likelier`."""
-    if plain.model.imposed:
+    if plain.model.prescribed:
         return plain.model
     return _by_equations(plain.model, plain.start, plain.first, (), plain.rows.recorded, slowest)[0]
 
@@ -137,10 +137,10 @@ def _searched(plant: Plant) -> set[str]:
     }
 
 
-def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:
+def finished_plain(plain: PlainModel, rng: np.random.Generator, report: Progress) -> PlainModel:
     """The plain model as the estimator gives it, where no effect was found.
 
-    Its run is then that of the fit, if this is driven as the logs are judged.
+    Its run is then that of the fit, if this is driven as the logs are tested.
     """
     recorded = plain.recorded
     asking = recorded.halt.asking(report)
@@ -153,7 +153,7 @@ def settled_plain(plain: PlainModel, rng: np.random.Generator, report: Progress)
     if fit is None:
         return plain
     model = replace(plain.model, fit=fit)
-    if fit.drive == recorded.drive and not fit.imposed:
+    if fit.drive == recorded.drive and not fit.prescribed:
         plant = Plant(fit.friction, fit.actuator)
         with recorded.halt.closing():
             left = misfit(plant, recorded.logs, recorded.drive)

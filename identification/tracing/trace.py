@@ -12,8 +12,8 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
-from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
+from identification.estimation.prescribed_motion import way_of
 from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.run_or_equation import STEPS_WHY
@@ -32,13 +32,13 @@ from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import FEWEST_ROWS
+from identification.tracing.restored_surroundings import orders_alone, with_surroundings
 from identification.tracing.result import Trace
 from identification.tracing.structure_search import (
+    finished_plain,
     refinement,
     selection,
-    settled_plain,
 )
-from identification.tracing.surroundings_told import orders_alone, with_surroundings
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
 MOVE_IT = (
@@ -84,45 +84,45 @@ def trace(
     still = bool(test) and not any(_slides(log, rig) for log in test)
     if still:  # nothing could be proved of an effect
         library = {}
-    if beside.orders and way_of(train, held=rig.kind == "motor") is not None:
+    if beside.orders and way_of(train, zoh=rig.kind == "motor") is not None:
         return orders_alone(NotIdentifiable(ONE_WAY_ALONE), beside, *recorded_as, rig, rng)
     try:
-        told = _traced(train, test, rig, library, rng, report, halt)
+        traced = _traced(train, test, rig, library, rng, report, halt)
     except NotIdentifiable as refused:
         if not beside.orders:
             raise
         return orders_alone(refused, beside, *recorded_as, rig, rng)
-    by_command = rig.kind != "motor" and told.plant.actuator is not None
-    nothing_found = not (told.effects or told.complete or _is_followed(told))
-    if (told.verdict == "unknown" or nothing_found) and by_command and not halt.reached():
-        told = _by_force(told, train, test, rig, library, rng, report, halt)
+    by_command = rig.kind != "motor" and traced.plant.actuator is not None
+    nothing_found = not (traced.effects or traced.complete or _is_followed(traced))
+    if (traced.verdict == "unknown" or nothing_found) and by_command and not halt.reached():
+        traced = _by_force(traced, train, test, rig, library, rng, report, halt)
     if still:
-        told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
+        traced = replace(traced, verdict="unknown", complete=False, next_experiment=MOVE_IT)
     if not beside.none:
-        told = with_surroundings(told, beside, *recorded_as, rig)
+        traced = with_surroundings(traced, beside, *recorded_as, rig)
     if beside.sampled:  # a measured current, which no period holds
-        told = replace(told, command_period=0.0)
-    elastic = told.verdict == "unknown" and not told.effects and not halt.reached()
+        traced = replace(traced, command_period=0.0)
+    elastic = traced.verdict == "unknown" and not traced.effects and not halt.reached()
     if not (elastic and acts_directly(train, rig)):
-        return told
+        return traced
     resonance = two_masses(train, rig)
     if resonance is None:
-        return told
+        return traced
     around = replace(beside, resonance=resonance)
-    return replace(told, surroundings=around, missing_force=None)  # which is of one body
+    return replace(traced, surroundings=around, missing_force=None)  # which is of one body
 
 
-def _is_followed(told: Trace) -> bool:
+def _is_followed(traced: Trace) -> bool:
     """Whether nothing is named and the run leaves hardly more of the position of the test logs than
     noise: then the command says more of the parameters than the measured force, whatever the
     equation leaves."""
-    error = told.after["test"].position_rms
-    followed = error is not None and error**2 <= ADEQUATE * told.noise_y**2
-    return told.verdict == "none" and followed
+    error = traced.after["test"].position_rms
+    followed = error is not None and error**2 <= ADEQUATE * traced.noise_y**2
+    return traced.verdict == "none" and followed
 
 
 def _by_force(
-    told: Trace, train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
+    traced: Trace, train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
     rng: np.random.Generator, report: Progress, halt: Halt,
 ) -> Trace:  # fmt: skip
     """The trace by the measured force, where it knows what that by the command does not: an
@@ -131,11 +131,11 @@ def _by_force(
     try:
         again = _traced(alone[0], alone[1], rig, library, rng, report, halt)
     except NotIdentifiable:
-        return told
+        return traced
     if again.verdict not in ("none", "effect"):
-        return told
+        return traced
     known = {one.effect.key for one in again.effects}
-    like = (one.effect.key for one in told.effects if one.effect.key not in known)
+    like = (one.effect.key for one in traced.effects if one.effect.key not in known)
     return replace(again, actuator_like=tuple(like))
 
 
@@ -149,33 +149,33 @@ def _traced(
 ) -> Trace:  # fmt: skip
     """The trace of logs on which nothing acts but the applied force and what the library has;
     halves: where the test logs alone lack something, by those of them."""
-    begin, settle, choose, other = rng.spawn(4)
+    begin, last, choose, other = rng.spawn(4)
     setting, choice = _chosen(train, rig, library, (begin, choose), report, halt)
     plain = setting.plain
     report("refitting", 0.0)
     choice, model = refinement(choice, setting, report)
     doubt = ""
     with halt.closing():
-        held = HeldOut(plain, choice, model, tuple(map(plain.rows.recorded.given, test)))
-        if choice.steps and (against := held.against):
+        held_out = HeldOut(plain, choice, model, tuple(map(plain.rows.recorded.given, test)))
+        if choice.steps and (against := held_out.against):
             names = " and ".join(step.candidate.effect.key for step in choice.steps)
             doubt = f"the equations call for {names}, but with it {against}: not named"
             choice = only(choice, ())
-    report("settling", 0.0)
+    report("converging", 0.0)
     if not choice.steps:
-        plain = settled_plain(plain, settle, report)
-        held = HeldOut(plain, choice, plain.model, held.seen)
+        plain = finished_plain(plain, last, report)
+        held_out = HeldOut(plain, choice, plain.model, held_out.seen)
     with halt.closing():
-        alone = halves and held.shows_more_than_training
+        alone = halves and held_out.shows_more_than_training
     if alone and not halt.reached():
         found = _by_halves(train, test, rig, library, other, report, halt)
         if found is not None:
             return found
-    report("telling", 0.0)
+    report("reporting", 0.0)
     with halt.closing():
-        told = judgement(held)
-        told = _for_now(told, held, halt.not_tried) if halt.not_tried else told
-    return replace(told, remarks=(doubt, *told.remarks)) if doubt else told
+        traced = judgement(held_out)
+        traced = _for_now(traced, held_out, halt.not_tried) if halt.not_tried else traced
+    return replace(traced, remarks=(doubt, *traced.remarks)) if doubt else traced
 
 
 def _by_halves(
@@ -193,15 +193,15 @@ def _by_halves(
         return None
     first, second = zip(*halves, strict=True)
     try:
-        told = _traced((*train, *first), second, rig, library, rng, report, halt, halves=False)
+        traced = _traced((*train, *first), second, rig, library, rng, report, halt, halves=False)
     except NotIdentifiable:
         return None
-    return replace(told, remarks=(BY_HALVES, *told.remarks)) if told.effects else None
+    return replace(traced, remarks=(BY_HALVES, *traced.remarks)) if traced.effects else None
 
 
 def _slides(log: Log, rig: Rig) -> bool:
     """Whether the body slides in a log, for long enough to judge."""
-    one = motion_log(log, held=rig.kind == "motor", by_command=False)
+    one = motion_log(log, zoh=rig.kind == "motor", by_command=False)
     return len(one.sliding.start) >= FEWEST_ROWS
 
 
@@ -222,22 +222,22 @@ def _chosen(
     return selection(plain, choose, report)
 
 
-def _for_now(told: Trace, held: HeldOut, not_tried: tuple[str, ...]) -> Trace:
+def _for_now(traced: Trace, held_out: HeldOut, not_tried: tuple[str, ...]) -> Trace:
     """A trace that was halted: what was not looked for may be missing; a null is one for now."""
-    before, after = held.plain.model, held.model
-    unsure = told.verdict in ("none", "drift") and after.misfit > COMPLETE
-    rest_first = told.verdict in ("none", "unknown")
+    before, after = held_out.plain.model, held_out.model
+    unsure = traced.verdict in ("none", "drift") and after.misfit > COMPLETE
+    rest_first = traced.verdict in ("none", "unknown")
     # The verdict's sentence says it too.
     early = MinorRemark(f"the trace ended early; not tried: {'; '.join(not_tried)}")
     return replace(
-        told,
-        verdict="unknown" if unsure else told.verdict,
+        traced,
+        verdict="unknown" if unsure else traced.verdict,
         complete=False,
-        next_experiment=REST_FIRST if rest_first else told.next_experiment,
+        next_experiment=REST_FIRST if rest_first else traced.next_experiment,
         not_tried=not_tried,
-        parameters_before=_null_for_now(told.parameters_before, before),
-        parameters_after=_null_for_now(told.parameters_after, after),
-        remarks=(*told.remarks, early),
+        parameters_before=_null_for_now(traced.parameters_before, before),
+        parameters_after=_null_for_now(traced.parameters_after, after),
+        remarks=(*traced.remarks, early),
     )
 
 

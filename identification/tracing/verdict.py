@@ -1,18 +1,18 @@
-"""What is told of a choice: verdict, effects and sizes, rivals, the run that would tell more."""
+"""What is reported of a choice: verdict, effects and sizes, rivals, the more informative run."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from identification.estimation.converged_fit import structure_estimates
 from identification.estimation.estimates import beside_in, of_effect
-from identification.estimation.imposed_motion import imposed_estimates
+from identification.estimation.prescribed_motion import prescribed_estimates
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
 from identification.estimation.run_or_equation import by_equation_if_surer
-from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.model.estimates import Estimate
 from identification.thresholds import HALF
@@ -120,7 +120,7 @@ def _test_rms(step: Step, rival: EffectCandidate, seen: EffectRows | None) -> fl
 
 
 def next_experiment(verdict: TraceVerdict, choice: Choice, left: Dependence) -> str:
-    """The run that would tell rivals apart, or on what the rest depends."""
+    """The run that would distinguish rivals, or on what the rest depends."""
     if verdict == "inseparable":
         step = next(s for s in choice.steps if equal_rivals(s))
         mine = step.candidate.effect
@@ -147,17 +147,17 @@ def listed(signals: Sequence[str]) -> str:
 def parameters_before(plain: FittedStructure, recorded: RecordedLogs) -> dict[str, Estimate]:
     """`parameters_of` the plain model beside effects: where its run leaves clearly more of the
     equation of motion than this does by itself, those of the equation, as a fit would give them."""
-    told, fit = parameters_of(plain, recorded), None
-    if plain.fit is None and not plain.imposed:
+    reported, fit = parameters_of(plain, recorded), None
+    if plain.fit is None and not plain.prescribed:
         fit = by_equation_if_surer(plain.plant.friction, recorded)
     surer = {} if fit is None else {k: e for k, e in fit.estimates.items() if e.value is not None}
-    return {**told, **surer}
+    return {**reported, **surer}
 
 
 def parameters_of(model: FittedStructure, recorded: RecordedLogs) -> dict[str, Estimate]:
-    """The nine and the actuator of a model, those that the logs tell with their intervals."""
+    """The nine and the actuator of a model, those that the logs identify with their intervals."""
     if model.fit is not None:
         return {k: e for k, e in model.fit.estimates.items() if "." not in k}
-    if model.imposed:
-        return imposed_estimates(model.plant, model.stage.theta, model.sd, recorded)
+    if model.prescribed:
+        return prescribed_estimates(model.plant, model.stage.theta, model.sd, recorded)
     return structure_estimates(model.plant, model.sd, recorded)

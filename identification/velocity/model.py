@@ -63,7 +63,7 @@ def flows(u: Array, valve: Valve, u_max: float, z: Array | None = None) -> tuple
 
 
 def lagged(w: Array, h: float, delay: float, lag: float) -> Motion:
-    """Position and velocity behind a delay and a lag [s], exact for w (n,) held over h [s].
+    """Position and velocity behind a delay and a lag [s], exact for w (n,) constant over h [s].
 
     Before the first sample w is what it is there, and the velocity follows it.
     """
@@ -94,7 +94,7 @@ def _through(w: Array, h: float, valve: Valve, lag: float) -> Motion:
 
 
 def moved(u: Array, h: float, valve: Valve, u_max: float, z: Array | None = None) -> Motion:
-    """The motion under u (n,) held over each period h [s]; u_max, z: as in `flows`."""
+    """The motion under u (n,) constant over each period h [s]; u_max, z: as in `flows`."""
     w_p, w_n = flows(u, valve, u_max, z)
     if valve.lag_other == 0.0:
         y, v = _through(w_p - w_n, h, valve, valve.lag)

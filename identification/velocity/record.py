@@ -22,7 +22,7 @@ FEWEST_AHEAD = 4  # of all logs, below which no error of them is given
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One log: position y and command u (n,), held over each period h [s]; z: place (n,) in the
+    """One log: position y and command u (n,), constant over each period h [s]; z: place (n,) in the
     travel from -0.5 to 0.5, None where no structure asks for it."""
 
     name: str

@@ -79,7 +79,7 @@ class Left:
 
     verdict: Verdict
     plain: ValveFit
-    held: HeldOut
+    unextended: HeldOut
     rivals: tuple[Rival, ...]
     named: str | None
     fitted: ValveFit
@@ -132,7 +132,7 @@ def left_by_valve(
     Raises NotIdentifiable where the position does not follow the command.
     """
     plain = fit(record, keep_going=keep_going)
-    held = held_out(record, plain.valve, plain.free, test)
+    unextended = held_out(record, plain.valve, plain.free, test)
     placed = record.placed(plain.valve, record.travel)
     test_placed = test.placed(plain.valve, record.travel) if test else None
     rivals, fits, not_tried = list[Rival](), dict[str, ValveFit](), list[str]()
@@ -143,22 +143,31 @@ def left_by_valve(
         free = (*plain.free, *(n for n in structure.adds if _applies(n, plain.free)))
         fits[key] = refined(placed, replace(plain.valve, **structure.start), free)
         left = held_out(placed, fits[key].valve, free, test_placed)
-        better, p = clearly_better(left.long, held.long, len(STRUCTURES))
-        rivals.append(Rival(key, left, p, better and left.rms[1] <= held.rms[1]))
+        better, p = clearly_better(left.long, unextended.long, len(STRUCTURES))
+        rivals.append(Rival(key, left, p, better and left.rms[1] <= unextended.rms[1]))
     rivals.sort(key=lambda one: one.left.rms[0])
     noise = (test or record).noise
     able = [one for one in rivals if one.better]
-    small = is_noise(float(np.mean(held.long)), noise)
+    small = is_noise(float(np.mean(unextended.long)), noise)
     if not able or small:
         verdict: Verdict = "none" if small else "unknown"
-        return Left(verdict, plain, held, tuple(rivals), None, plain, small, tuple(not_tried))
+        return Left(verdict, plain, unextended, tuple(rivals), None, plain, small, tuple(not_tried))
     best = able[0]
     alike = [one for one in able[1:] if not clearly_better(best.left.long, one.left.long)[0]]
     complete = is_noise(float(np.mean(best.left.long)), noise)
     if alike:
-        return Left("inseparable", plain, held, tuple(rivals), None, plain, False, tuple(not_tried))
+        return Left(
+            "inseparable", plain, unextended, tuple(rivals), None, plain, False, tuple(not_tried)
+        )
     return Left(
-        "effect", plain, held, tuple(rivals), best.key, fits[best.key], complete, tuple(not_tried)
+        "effect",
+        plain,
+        unextended,
+        tuple(rivals),
+        best.key,
+        fits[best.key],
+        complete,
+        tuple(not_tried),
     )
 
 

@@ -57,7 +57,7 @@ class Ours:
 
 
 def beyond(new: IdentifiedRig, seeds: Sequence[int], tuning_seed: int) -> Ours:
-    """The rig of table 3 under our design and the paper's, both of them told `new` only.
+    """The rig of table 3 under our design and the paper's, both designed for `new` only.
 
     Raises BadSpecification where no loop keeps the goals.
     """

@@ -29,7 +29,7 @@ ZONES = (3e-4, 1e-3, 3e-3, 1e-2)  # m
 DITHER_FREQUENCIES = (20.0, 50.0, 100.0)  # Hz
 EXCESS = (1.2, 2.0, 4.0)  # of the dither's force over the largest stick force, actuator alone
 BANDS = (10.0, 20.0, 40.0, 80.0)  # rad/s
-WALKS = (50.0, 200.0, 1000.0)  # N per root s
+RANDOM_WALKS = (50.0, 200.0, 1000.0)  # N per root s
 DRIVEN = 0.05  # m/s per root s: what drives the observer's velocity besides the forces
 
 
@@ -80,7 +80,7 @@ def rival_servos(set_up: SetUp, known: Karnopp) -> Iterable[tuple[str, list[tupl
     )
     yield (
         "PD, Kalman friction observer",
-        [(f"q_F = {q:g} N/s^0.5", set_up.servo(pd, _observer(known, q))) for q in WALKS],
+        [(f"q_F = {q:g} N/s^0.5", set_up.servo(pd, _observer(known, q))) for q in RANDOM_WALKS],
     )
     yield "PD, compensator (4)", [("paper's", set_up.servo(pd, compensation))]
     yield "PID", [("paper's", set_up.servo(pid))]
@@ -113,8 +113,8 @@ def _integral(zone: float) -> IntegralPID:
     return IntegralPID(1754.0, 0.072, 0.018, 0.2, 1e-3, "dead-zone", zone)
 
 
-def _observer(known: Karnopp, walk: float) -> FrictionObserver:
-    return FrictionObserver(known.m, known.F_vp, known.F_vn, DRIVEN, walk, NOISE_Y)
+def _observer(known: Karnopp, random_walk: float) -> FrictionObserver:
+    return FrictionObserver(known.m, known.F_vp, known.F_vn, DRIVEN, random_walk, NOISE_Y)
 
 
 def _viscous(p: Karnopp) -> float:

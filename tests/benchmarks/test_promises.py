@@ -1,4 +1,4 @@
-"""What doctor says is told, held against what identify tells."""
+"""What doctor says is identifiable, compared with what identify reports."""
 
 import os
 from typing import Any
@@ -14,7 +14,11 @@ from workbench.logs.sources import DATA_VARIABLE
 
 def answers(said: dict[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
     """Of one log."""
-    return {"case": "one", "said_alone": {"told": said, "refused": ""}, "alone": {"kept": kept}}
+    return {
+        "case": "one",
+        "said_alone": {"identifiable": said, "refused": ""},
+        "alone": {"kept": kept},
+    }
 
 
 def test_what_differs_is_counted_both_ways(capsys: pytest.CaptureFixture[str]) -> None:
@@ -25,7 +29,7 @@ def test_what_differs_is_counted_both_ways(capsys: pytest.CaptureFixture[str]) -
     }
     kept = {"m": {"value": 1.0}, "F_cn": {"value": 2.0}, "F_cp": {"value": None, "why": "d"}}
     found = answers(said, kept)
-    every = {one.name: (one.said, one.told, one.kept) for one in promises(found)}
+    every = {one.name: (one.said, one.identifiable, one.kept) for one in promises(found)}
     assert every["m"] == ("yes", True, True)
     assert every["F_cp"] == ("yes", False, False)
     assert every["F_cn"] == ("no", True, False)

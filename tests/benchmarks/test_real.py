@@ -49,12 +49,12 @@ def test_least_squares_find_parameters_and_lag(late: float) -> None:
     fit = fitted([machine(late)], Terms(counts=(COUNT,)))
     assert fit is not None
     assert fit.lag == pytest.approx(late, abs=0.3 * H)
-    # A constant and unequal Coulomb levels are one thing: their sums are what is told.
-    told = [fit.values["m"], fit.values["F_cp"] + fit.values["c"]]
-    told += [fit.values["F_cn"] - fit.values["c"], fit.values["F_vp"], fit.values["F_vn"]]
-    told += [fit.values["sin 30"]]
+    # A constant and unequal Coulomb levels are one thing: their sums are what is identifiable.
+    estimated = [fit.values["m"], fit.values["F_cp"] + fit.values["c"]]
+    estimated += [fit.values["F_cn"] - fit.values["c"], fit.values["F_vp"], fit.values["F_vn"]]
+    estimated += [fit.values["sin 30"]]
     true = [MASS, UP + OFFSET, DOWN - OFFSET, VISCOUS, VISCOUS, COG]
-    assert told == pytest.approx(true, rel=0.02)
+    assert estimated == pytest.approx(true, rel=0.02)
     share = own_share([machine(late, 1)], fit)
     assert share is not None and share < 0.03
     error = run_errors([machine(late, 1)], fit, 0.2)
@@ -146,6 +146,6 @@ def test_every_entry_of_the_table_is_read() -> None:
 def test_another_split_of_a_rig_has_its_card_and_files_of_its_own() -> None:
     named = {one.name: one for one in every_case()}
     split, rig = named["pk_one_log"], named["seals_PK_3bar"]
-    assert (split.group, split.card, split.imposed) == ("split", rig.card, rig.imposed)
+    assert (split.group, split.card, split.prescribed) == ("split", rig.card, rig.prescribed)
     assert split.train != rig.train
     assert (split.right.must, split.right.verdicts) == ((), rig.right.verdicts)

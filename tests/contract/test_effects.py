@@ -39,8 +39,8 @@ def test_declaration_is_complete(effect: Effect) -> None:
             assert p.low <= 0.0 <= p.high, "a regression must be able to leave it out"
     typical = {p.name: p.typical for p in effect.params}
     assert effect.acting(typical).values == typical
-    brief = {k: v for k, v in typical.items() if k != "asymmetry"}
-    assert effect.acting(brief).values == typical
+    short = {k: v for k, v in typical.items() if k != "asymmetry"}
+    assert effect.acting(short).values == typical
 
 
 def test_sliding_friction_can_be_unequal(effect: Effect) -> None:

@@ -19,7 +19,7 @@ from tests.identification.estimation.test_surroundings import TURNING, pendulum
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, table
 
 H, SECONDS = 2e-3, 8.0
-# Sizes, the first of which has to be told; what is not given is at its default.
+# Sizes, the first of which has to be identified; what is not given is at its default.
 SIZES: Mapping[str, Mapping[str, float]] = {
     "backlash": {"width": 1e-3},
     "cogging": {"a": 4.0, "period": 0.03},
@@ -46,7 +46,7 @@ TAKEN_UP: Mapping[str, Mapping[str, float]] = {
     "constant_force": {"F_0": 4.0},
     "load_dependent_friction": {"mu": 0.15},
 }
-LOOSE = {"rising_stiction": 0.2}  # of few rests; the others are told to 5 %
+TOLERANCES = {"rising_stiction": 0.2}  # of few rests; the others are known to 5 %
 SEEN_IN_PART = ("presliding",)  # a bristle leaves more than noise at this rate
 
 
@@ -80,7 +80,7 @@ def test_it_is_named_with_its_size(key: str) -> None:
     found = trace([train], [test], Rig("force"), library, np.random.default_rng(0))
     assert [one.effect.key for one in found.effects] == [key]
     name, true = next(iter(SIZES[key].items()))
-    assert found.effects[0].params[name].value == pytest.approx(true, rel=LOOSE.get(key, 0.05))
+    assert found.effects[0].params[name].value == pytest.approx(true, rel=TOLERANCES.get(key, 0.05))
     if key not in SEEN_IN_PART:
         assert found.verdict == "effect"
         before, after = found.before["test"], found.after["test"]
@@ -97,7 +97,7 @@ def test_what_the_plain_model_takes_up_is_no_discovery(key: str) -> None:
 
 
 @pytest.mark.slow
-def test_gravity_is_told_beside_friction_and_is_no_discovery() -> None:
+def test_gravity_is_reported_beside_friction_and_is_no_discovery() -> None:
     logs = [pendulum(1, 3.0, seconds=12.0)], [pendulum(2, 3.0, seconds=12.0)]
     found = trace(*logs, TURNING, built_in(), np.random.default_rng(0))
     assert found.effects == ()

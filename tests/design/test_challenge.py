@@ -91,7 +91,7 @@ def test_without_a_design_there_is_nothing_to_win() -> None:
     model = contender(NEW).model
     found = contest(contender(OLD), Contender(model, None))
     assert not found.won and found.reason.endswith("simulation: no design")
-    assert not found.model_won  # the design in force misses its limits on this machine
+    assert not found.model_won  # the active design misses its limits on this machine
     none = replace(contender(NEW).design or pytest.fail("no design"), recommended="none")
     found = contest(contender(OLD), Contender(model, none))
     assert found.reason.endswith("simulation: no controller keeps its goals")

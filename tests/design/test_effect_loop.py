@@ -138,8 +138,8 @@ def test_friction_sees_the_pressures_of_the_force() -> None:
     free = free_run(plant, log, (0.0, 0.0, 0.0), "command")
     # A body at rest takes a sample in one step there, in several here.
     assert np.max(np.abs(found.y - free.y)) < 1e-6
-    held = {name: signal(0.0 * steps()) for name, signal in chambers.items()}
-    other = simulate_effect_loop(plant, CASCADE, steps(), H, signals=held)
+    constant = {name: signal(0.0 * steps()) for name, signal in chambers.items()}
+    other = simulate_effect_loop(plant, CASCADE, steps(), H, signals=constant)
     assert np.max(np.abs(found.y - other.y)) > 1e-5
     with pytest.raises(BadModel, match="needs a signal p_p or p_n"):
         simulate_effect_loop(plant, CASCADE, steps(), H)

@@ -41,8 +41,8 @@ def test_force_is_that_of_the_reference_s_motion(v: float, a: float, force: floa
 
 
 def moved(r: Array) -> Array:
-    held = np.array([r[0], 0.0, 0.0, 0.0, r[0], 0.0, 0.0, 0.0])
-    return np.array([profiled(RATE * H, ACCELERATION * H * H, held, float(one)) for one in r])
+    past = np.array([r[0], 0.0, 0.0, 0.0, r[0], 0.0, 0.0, 0.0])
+    return np.array([profiled(RATE * H, ACCELERATION * H * H, past, float(one)) for one in r])
 
 
 def kept(x: Array) -> bool:

@@ -109,7 +109,7 @@ def test_the_test_vector_takes_every_branch_of_a_friction_compensator(
         assert {(id(one), True), (id(one), False)} <= run.visited
 
 
-def test_names_are_told_apart_in_small_letters() -> None:
+def test_names_are_distinguished_in_small_letters() -> None:
     servo = Servo(
         pid_to_rst(1754.0, 0.072, 0.018, 0.2, H), ForcePI(0.02, 0.05),
         Compensation(Compensator(table(1), 2.0, 0.003), filters_at(H)), control_limit=1.0, rate=1.0,

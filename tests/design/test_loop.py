@@ -129,7 +129,7 @@ def many(count: int, actuator: Actuator | Motor, seed: int = 0) -> list[Plant]:
 @pytest.mark.parametrize("motor", [False, True])
 def test_many_plants_are_each_alone(controller: RST, motor: bool) -> None:
     n, count = 1500, 18
-    loose = 1e4 if motor else 1.0  # each stop in a hunting loop magnifies the last digit
+    tolerance = 1e4 if motor else 1.0  # each stop in a hunting loop magnifies the last digit
     plants = many(count, Motor(35.15) if motor else ACTUATOR)
     pi = None if motor else PI
     if motor:
@@ -145,10 +145,10 @@ def test_many_plants_are_each_alone(controller: RST, motor: bool) -> None:
             one = simulate_loop(plants[i], cascade, steps(n), H, noise=one_noise, start=start)
             for name in ("y", "v", "y_measured"):
                 apart = np.abs(getattr(runs, name)[:, i] - getattr(one, name))
-                assert np.max(apart) < 1e-11 * loose
+                assert np.max(apart) < 1e-11 * tolerance
             for name in ("F", "F_measured", "u"):
                 apart = np.abs(getattr(runs, name)[:, i] - getattr(one, name))
-                assert np.max(apart) < 1e-7 * loose
+                assert np.max(apart) < 1e-7 * tolerance
             assert np.mean(runs.mode[:, i] != one.mode) < 1e-2
 
 

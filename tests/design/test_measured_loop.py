@@ -31,7 +31,7 @@ def test_margins_are_those_of_the_polynomials() -> None:
     assert found.modulus == pytest.approx(exact.modulus, rel=1e-3)
 
 
-def test_a_crossing_that_is_not_seen_is_not_told() -> None:
+def test_a_crossing_that_is_not_seen_is_not_reported() -> None:
     L = points()
     at = measured_margins(F, L, np.ones(len(F), dtype=bool)).crossover
     assert at is not None

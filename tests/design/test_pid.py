@@ -66,7 +66,7 @@ def test_plants_of_lower_order_keep_the_pid_form(order: int) -> None:
     assert found.rst.S.size <= 3
 
 
-def test_dominant_poles_that_do_not_dominate_are_told() -> None:
+def test_dominant_poles_that_do_not_dominate_are_reported() -> None:
     A, B, h = (RST_PLANT[name] for name in ("A", "B", "h"))
     found = design_pid(A, B, h, dominant=(100.0, 0.5))
     assert found.note is not None

@@ -167,11 +167,11 @@ def test_dither_shakes_the_command() -> None:
 def test_a_clipped_command_winds_less_up(time: float) -> None:
     """A valve of 0.1 V limits the speed to 0.19 m/s."""
     over = {}
-    for told in (None, time):
-        servo = Servo(PID, PI, control_limit=0.1, anti_windup=told)
+    for tracking_time in (None, time):
+        servo = Servo(PID, PI, control_limit=0.1, anti_windup=tracking_time)
         found = simulate_servo(PLANT, servo, step(0.3, 8000), H)
         assert np.max(np.abs(found.u)) <= 0.1
-        over[told] = float(np.max(found.y)) / 0.3 - 1.0
+        over[tracking_time] = float(np.max(found.y)) / 0.3 - 1.0
         assert abs(found.y[-1] - 0.3) < 0.02
     assert over[None] > over[time] + 0.05
 

@@ -109,14 +109,14 @@ def test_less_overshoot_allowed_costs_lag() -> None:
 def test_other_plants_count_and_unstable_ones_do_not() -> None:
     heavier = linear_plant(7.0, 240.0, H, ACTUATOR, force_gains(ACTUATOR, H / 10), 10)
     wild = (A, 40.0 * B)
-    alone, held, same = (
+    alone, of_both, same = (
         followed(plants, controller(), rst_candidates(A, B, controller(), POLES, 5), Demand())
         for plants in ([(A, B)], [(A, B), heavier], [(A, B), wild])
     )
     of_alone = followed([(A, B), heavier], controller(), [alone.T], Demand())
     assert of_alone.overshoot > alone.overshoot
     assert of_alone.lag == alone.lag
-    assert held.overshoot <= of_alone.overshoot
+    assert of_both.overshoot <= of_alone.overshoot
     assert same.lag == alone.lag
 
 

@@ -43,11 +43,11 @@ def test_corners_hold_too_and_slow_the_loop() -> None:
     A, B = plant(1.0, 250.0)
     corners = (plant(0.95, 200.0), plant(1.05, 300.0))
     alone = tune_rst(A, B, H, Asked(), Goals())
-    held = tune_rst(A, B, H, Asked(), Goals(), corners)
-    assert held.missed == ()
-    assert held.dominant[0] < alone.dominant[0]
-    assert held.worst is not None and held.worst >= 0.5
-    assert held.worst == worst_modulus(((A, B), *corners), held.rst)
+    robust = tune_rst(A, B, H, Asked(), Goals(), corners)
+    assert robust.missed == ()
+    assert robust.dominant[0] < alone.dominant[0]
+    assert robust.worst is not None and robust.worst >= 0.5
+    assert robust.worst == worst_modulus(((A, B), *corners), robust.rst)
 
 
 def test_asked_poles_are_the_loop_s() -> None:

@@ -55,11 +55,11 @@ def test_a_page_begins_where_the_one_that_it_names_ended(tmp_path: Path) -> None
         ("<!-- after: two -->\n```sh\ntrue\n```", "wait for each other"),
     ],
 )
-def test_a_block_that_fails_is_told_with_its_page(tmp_path: Path, page: str, said: str) -> None:
+def test_a_block_that_fails_is_reported_with_its_page(tmp_path: Path, page: str, said: str) -> None:
     two = "<!-- after: one -->" if "after: two" in page else ""
-    with pytest.raises(PageFault, match=said) as told:
+    with pytest.raises(PageFault, match=said) as raised:
         printed(tmp_path, one=page, two=two)
-    assert "one" in str(told.value)
+    assert "one" in str(raised.value)
 
 
 def test_output_stands_below_its_block_and_quiet_ones_show_none(tmp_path: Path) -> None:

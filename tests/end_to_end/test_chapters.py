@@ -56,7 +56,7 @@ def test_seals_friction_grows_with_pressure(
 @pytest.mark.parametrize(
     ("seal", "share", "signal"), [("O-ring", 1.1, "reversal"), ("X-ring257", 0.4, "p_n")]
 )
-def test_what_another_seal_leaves_after_pressure_is_told(
+def test_what_another_seal_leaves_after_pressure_is_reported(
     seal: str,
     share: float,
     signal: str,

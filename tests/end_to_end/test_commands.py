@@ -292,8 +292,11 @@ def test_export_writes_code(shop: Path, tmp_path: Path, capsys: pytest.CaptureFi
     wanted = {f"Achse_1.{kind}" for kind in ("h", "c", "st", "xml", "fmu", "json", "mat")}
     assert files(out) == set(found["files"]) == wanted
     assert found["name"] == "Achse_1"
-    told = json.loads(Path(design).read_text())["recommendation"]
-    assert (found["controller"], found["compensator"]) == (told["controller"], told["compensator"])
+    advised = json.loads(Path(design).read_text())["recommendation"]
+    assert (found["controller"], found["compensator"]) == (
+        advised["controller"],
+        advised["compensator"],
+    )
     assert [one["name"] for one in found["inputs"]] == ["r", "y", "F_e"]
     assert found["h"] == json.loads(Path(design).read_text())["force"]["h"]["value"]
     assert main([*command, "--to", "c", "--controller", "pid", "--no-compensator"]) == 0

@@ -43,7 +43,7 @@ def test_emps_from_the_log_to_a_validated_loop(
     assert "given by the card" in report
 
 
-def test_imposed_motion_gives_friction_but_no_design(
+def test_prescribed_motion_gives_friction_but_no_design(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert data.is_dir()
@@ -61,7 +61,7 @@ def test_imposed_motion_gives_friction_but_no_design(
 
 
 @pytest.mark.method
-def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) -> None:
+def test_a_friction_of_the_wrong_sign_is_not_reported(data: Path, tmp_path: Path) -> None:
     logs = [str(data / "pneumatic_seals" / f"PK_{bar}bar.csv") for bar in (1, 5, 7)]
     card, out = tmp_path / "card.toml", tmp_path / "id"
     text = card_path("pneumatic_seals").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from identification.estimation.surroundings import surrounding_estimates
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.tracing.trace import trace
-from tests.told import broken
+from tests.reported import broken
 from workbench.cards.card import load_card
 from workbench.logs.sources import card_path, read_sources
 from workbench.steps.simulate import record
@@ -52,10 +52,10 @@ def test_of_a_recipe_without_effects(name: str, signals: tuple[str, ...]) -> Non
     log = record(name, plain, SEED)
     log = log.part(0, round(SECONDS / log.h))
     seen = Log(name, {key: log[key] for key in signals})
-    told, traced = both([seen], Rig("force"), built_in())
-    assert told == traced
-    assert [said for one in told.values() if (said := broken(one))] == []
-    assert any(one.value is not None for one in told.values())
+    identified, traced = both([seen], Rig("force"), built_in())
+    assert identified == traced
+    assert [said for one in identified.values() if (said := broken(one))] == []
+    assert any(one.value is not None for one in identified.values())
 
 
 @pytest.mark.slow
@@ -73,6 +73,6 @@ def test_of_a_measured_set(
         rig = replace(rig, force_per_command=1.0)  # a force in units of the command
         logs = [log.with_signals(F=log["u"]) for log in logs]
     logs = [log.part(0, min(len(log), round(SECONDS / log.h))) for log in logs]
-    told, traced = both(logs, rig, {})
-    assert told == traced
-    assert [said for one in told.values() if (said := broken(one))] == []
+    identified, traced = both(logs, rig, {})
+    assert identified == traced
+    assert [said for one in identified.values() if (said := broken(one))] == []

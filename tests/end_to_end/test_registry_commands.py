@@ -52,7 +52,7 @@ def refused(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status
 
 
 def filled(capsys: pytest.CaptureFixture[str]) -> None:
-    """Two versions of one machine, the second in force."""
+    """Two versions of one machine, the second active."""
     for n in (1, 2):
         files = [f"model{n}.json", f"design{n}.json"]
         found = done(capsys, "registry", "add", "bench", *files, "--promote", *WHY)
@@ -183,7 +183,9 @@ def test_a_wrong_card_stops_its_machine_only(
     assert "excluded" in shown.out
 
 
-def test_alarms_that_are_not_taken_are_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_alarms_that_are_not_taken_are_reported(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name in ("Pr\u00fcfstand", "b"):
         logs = here / "machines" / name / "logs"
         logs.mkdir(parents=True)

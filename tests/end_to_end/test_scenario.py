@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.scenario import SPRING, Told, days, picture, story
+from benchmarks.scenario import SPRING, DayResult, days, picture, story
 from workbench.registry.store import Registry
 
 pytestmark = pytest.mark.method
@@ -23,42 +23,44 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def told(home: Path) -> list[Told]:
+def results(home: Path) -> list[DayResult]:
     """The story of the README's picture with a log a week, and other noise."""
     return story(home, 5, LOGGED)
 
 
-def test_every_log_has_one_verdict(told: list[Told]) -> None:
-    assert [one.day for one in told] == DAYS
-    verdicts = {one.day.number: one.outcome.verdict for one in told}
+def test_every_log_has_one_verdict(results: list[DayResult]) -> None:
+    assert [one.day for one in results] == DAYS
+    verdicts = {one.day.number: one.outcome.verdict for one in results}
     assert verdicts[0] == "promoted"
     assert [verdicts[number] for number in (1, 2, 4)] == ["none"] * 3
 
 
-def test_bad_logs_and_a_sensor_fault_are_set_aside_and_stop_nothing(told: list[Told]) -> None:
-    for one in told:
+def test_bad_logs_and_a_sensor_fault_are_excluded_and_stop_nothing(
+    results: list[DayResult],
+) -> None:
+    for one in results:
         assert (one.outcome.verdict == "set_aside") == bool(one.day.fault), one
-    stuck = [one for one in told if one.day.fault == "transducer sticks"]
+    stuck = [one for one in results if one.day.fault == "transducer sticks"]
     assert all("sensor sticks" in one.outcome.reason for one in stuck)
 
 
-def test_wear_is_followed(told: list[Told]) -> None:
+def test_wear_is_followed(results: list[DayResult]) -> None:
     """With less behind than wears off between two logs: 0.6 N of F_cp."""
-    for one in told:
+    for one in results:
         if not one.day.fault:
             assert one.in_force == pytest.approx(one.true, abs=0.35), one
-    moved = [one for one in told if one.outcome.reason.startswith("moved:")]
+    moved = [one for one in results if one.outcome.reason.startswith("moved:")]
     assert len(moved) >= 4
-    assert told[-1].in_force == pytest.approx(12.54, abs=0.1)
+    assert results[-1].in_force == pytest.approx(12.54, abs=0.1)
 
 
 def test_the_undeclared_spring_is_named_when_it_comes_and_stays(
-    told: list[Told], home: Path
+    results: list[DayResult], home: Path
 ) -> None:
-    first = next(one for one in told if one.day.spring)
+    first = next(one for one in results if one.day.spring)
     assert first.outcome.verdict == "promoted"
     assert "Missing: spring" in first.outcome.reason
-    assert not any("spring" in one.outcome.reason for one in told if not one.day.spring)
+    assert not any("spring" in one.outcome.reason for one in results if not one.day.spring)
     with Registry(str(home / "registry.db")) as registry:
         version = registry.active_version("rig")
         assert version is not None
@@ -67,15 +69,15 @@ def test_the_undeclared_spring_is_named_when_it_comes_and_stays(
     assert effects["spring"]["k"]["value"] == pytest.approx(SPRING, rel=0.05)
 
 
-def test_nothing_is_lost(told: list[Told], home: Path) -> None:
+def test_nothing_is_lost(results: list[DayResult], home: Path) -> None:
     with Registry(str(home / "registry.db")) as registry:
         state = registry.machine("rig")
-        set_aside = sum(bool(day.fault) for day in DAYS)
-        assert (state.logs, state.waiting, state.set_aside) == (len(DAYS), 0, set_aside)
+        excluded = sum(bool(day.fault) for day in DAYS)
+        assert (state.logs, state.waiting, state.set_aside) == (len(DAYS), 0, excluded)
         promoted = [one for one in registry.decisions("rig") if one.kind == "promoted"]
-    assert len(promoted) == sum(one.outcome.verdict == "promoted" for one in told)
+    assert len(promoted) == sum(one.outcome.verdict == "promoted" for one in results)
 
 
-def test_the_timeline_is_drawn(told: list[Told], tmp_path: Path) -> None:
-    picture(told, tmp_path / "timeline.png")
+def test_the_timeline_is_drawn(results: list[DayResult], tmp_path: Path) -> None:
+    picture(results, tmp_path / "timeline.png")
     assert (tmp_path / "timeline.png").stat().st_size > 10_000

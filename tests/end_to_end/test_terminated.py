@@ -1,4 +1,4 @@
-"""A command that is told to end clears up what it has begun, and says so in one line."""
+"""A command that is asked to end clears up what it has begun, and says so in one line."""
 
 import signal
 import subprocess

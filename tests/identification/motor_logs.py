@@ -52,4 +52,4 @@ def made(
 
 def seen(log: Log) -> MotionLog:
     """The log as the trace sees it."""
-    return motion_log(log, held=True, by_command=False)
+    return motion_log(log, zoh=True, by_command=False)

@@ -12,8 +12,9 @@ from tests.test_lengths import ROOT, tree
 
 DECIDING = ("tracing", "drift", "experiment")
 ESTIMATION = (
-    "estimates", "fit", "held_force", "imposed_motion", "late_position", "recorded_logs",
-    "regressed_plant", "run_or_equation", "settling", "structure_fit",
+    "converged_fit", "estimates", "fit", "force_hold", "late_position", "prescribed_motion",
+    "recorded_logs",
+    "regressed_plant", "run_or_equation", "structure_fit",
     "surroundings", "turn_orders", "two_masses",
 )  # fmt: skip
 # Names of equations, parameters, signals and remarks, and bounds of what a parameter can be.

@@ -46,9 +46,9 @@ def test_what_is_halted_gives_the_best_so_far() -> None:
 
 
 def test_a_report_may_ask_first() -> None:
-    told: list[tuple[str, float]] = []
-    Halt(without_end).asking(lambda stage, share: told.append((stage, share)))("searching", 0.5)
-    assert told == [("searching", 0.5)]
+    reported: list[tuple[str, float]] = []
+    Halt(without_end).asking(lambda stage, share: reported.append((stage, share)))("searching", 0.5)
+    assert reported == [("searching", 0.5)]
     with pytest.raises(Halted):
-        Halt(lambda: False).asking(lambda stage, share: told.append((stage, share)))("s", 1.0)
-    assert len(told) == 1
+        Halt(lambda: False).asking(lambda stage, share: reported.append((stage, share)))("s", 1.0)
+    assert len(reported) == 1

@@ -26,11 +26,12 @@ from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.errors import BadSpecification
 from identification.estimation.axis_equation import slides_enough
+from identification.estimation.converged_fit import is_adequate
 from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import leaves_much
 from identification.estimation.gauss_newton import Minimum
-from identification.estimation.imposed_motion import is_unexplained
 from identification.estimation.latent_force import rubs
+from identification.estimation.prescribed_motion import is_unexplained
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
@@ -41,11 +42,10 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
 )
 from identification.estimation.regression.force_terms import predicts_as_much
-from identification.estimation.regression.held_command import significant_share
+from identification.estimation.regression.intersample_command import significant_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
 from identification.estimation.run_or_equation import LeftOfEquation, is_no_run
-from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.surroundings import (
     apart,
@@ -92,9 +92,9 @@ from identification.tracing.levels_refitted import explains_the_change, follows_
 from identification.tracing.model_errors import OnTest, lacks, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.predictive_check import is_worse
-from identification.tracing.recorded_rows import told_by_speed
+from identification.tracing.recorded_rows import without_speed_effects
 from identification.tracing.regression.candidates import EffectCandidate, shaped
-from identification.tracing.regression.significance import by_luck, chance
+from identification.tracing.regression.significance import chance, is_chance
 from identification.tracing.regression.stepwise import (
     Choice,
     Step,
@@ -142,10 +142,10 @@ def leaving(square: float, *, robust: bool = False, criterion: float = 0.0) -> R
     return RowFit(rows_of(np.zeros((N, 1))), fit, criterion, 0.0, robust)
 
 
-def stage(*, imposed: bool = False, coulomb: float = 10.0) -> EffectRows:
+def stage(*, prescribed: bool = False, coulomb: float = 10.0) -> EffectRows:
     """A plant of this Coulomb level [N] in either direction."""
     theta = np.array([1.0, coulomb, coulomb, 0.0, 0.0])
-    return EffectRows((replace(log(), imposed=imposed),), theta, np.zeros(3), False)
+    return EffectRows((replace(log(), prescribed=prescribed),), theta, np.zeros(3), False)
 
 
 def candidate(key: str, gain: float = 0.0, **outcomes: RowFit) -> EffectCandidate:
@@ -161,9 +161,9 @@ def choice(*keys: str, first: float = 1.0, base: float = 1.0) -> Choice:
     return Choice(stage(), before, steps, stage(), after)
 
 
-def run(misfit: float, *, imposed: bool = False) -> FittedStructure:
+def run(misfit: float, *, prescribed: bool = False) -> FittedStructure:
     """A plant of which the free run leaves this."""
-    return FittedStructure(stage(imposed=imposed), {}, plant(), {}, imposed, misfit)
+    return FittedStructure(stage(prescribed=prescribed), {}, plant(), {}, prescribed, misfit)
 
 
 def setting(plain: float, *, first: float = 1.0) -> Setting:
@@ -202,7 +202,7 @@ def test_adequate() -> None:
     assert share_left(followed(1.2), followed(1.1), FLOOR) == 0.0
     assert share_left(followed(1.9), followed(1.45), FLOOR) == pytest.approx(0.5)
     # A prescribed motion lacks what its force says, a free one what its run says.
-    prescribed = run(np.inf, imposed=True)
+    prescribed = run(np.inf, prescribed=True)
     assert not lacks(prescribed, left_of(1.09).errors, FLOOR)
     assert lacks(prescribed, left_of(1.38).errors, FLOOR)
     assert not lacks(run(1.2), left_of(1.38).errors, FLOOR)
@@ -241,7 +241,7 @@ def test_hopeless() -> None:
 
 
 def test_twice_what_is_left() -> None:
-    """Inertia shows beside what is left, or it does not and the motion counts as imposed."""
+    """Inertia shows beside what is left, or it does not and the motion counts as prescribed."""
 
     def of(inertia: float) -> RowFit:
         fit = Fitted(np.array([inertia]), signs(), 0.0)
@@ -265,7 +265,7 @@ def test_penalty() -> None:
     free = [Param("delta", "1", 0.5, 4.0, 2.0, "exponent", default=2.0)]
 
     def found(gain: float) -> float:
-        """The exponent that is settled on, where 1 gains so much over 2."""
+        """The exponent that is chosen, where 1 gains so much over 2."""
         best = shaped(free, [(0.5, 4.0)], {"delta": 2.0}, lambda x: gain * (x["delta"] - 1.0) ** 2)
         return best["delta"]
 
@@ -288,9 +288,10 @@ def test_beyond_chance() -> None:
 
 
 def test_chance_level() -> None:
-    """A gain of so small a chance is no luck, of an effect and of a parameter that has drifted."""
-    assert not by_luck(0.008)
-    assert by_luck(0.0125)
+    """A gain of so small a chance is no chance, of an effect and of a parameter that has
+    drifted."""
+    assert not is_chance(0.008)
+    assert is_chance(0.0125)
     # The second of two: chances of 0.4 % and 0.7 %, half of the level for each of them.
     both = Change((0, 1), np.array([9.0, 2.9]), np.eye(2), np.zeros(2))
     assert both.moved() == (0, 1)
@@ -298,7 +299,7 @@ def test_chance_level() -> None:
 
 
 def test_twice_the_gain_of_columns() -> None:
-    """By luck a search over shapes finds more than columns at one place, which gain 4 here."""
+    """By chance a search over shapes finds more than columns at one place, which gain 4 here."""
     at_one_row = np.zeros((40, 1))
     at_one_row[0] = 1.0
     after = RowFit(rows_of(at_one_row), Fitted(np.zeros(1), 2.0 * signs(40), 0.0), 0.0, 0.0)
@@ -421,7 +422,7 @@ def drifted(change: float, n: int, level: float = 10.0) -> bool:
     return bool(changes(before, after, np.ones(n, dtype=np.bool_), FIVE[:1], np.zeros(1)))
 
 
-def told(name: str, relative: float, events: int) -> bool:
+def identifiable(name: str, relative: float, events: int) -> bool:
     """Whether a value is given of this deviation and so many breakaways and crossings."""
     happened = Events((events, 9), (events, 9), (900, 900), (1.0, 1.0))
     found = estimates({name: 10.0}, {name: 10.0 * relative}, happened, Rig("force"), "log")
@@ -456,12 +457,12 @@ def test_nearly_all() -> None:
 @pytest.mark.parametrize("name", ["F_sp", "dv_p"])
 def test_events_needed(name: str) -> None:
     """Fewer breakaways tell no stick limit, and fewer crossings no band."""
-    assert not told(name, 0.01, 2)
-    assert told(name, 0.01, 3)
+    assert not identifiable(name, 0.01, 2)
+    assert identifiable(name, 0.01, 3)
 
 
 def test_events_needed_over_frequency() -> None:
-    """Full coherence of fewer averages is luck, and fewer stretches are none; a response of fewer
+    """Full coherence of fewer averages is chance, and fewer stretches are none; a response of fewer
     points that count by themselves is no ground to say that there are no modes."""
     assert response_of(0.999, 3.8).seen[0] and not response_of(0.999, 2.4).seen[0]
     assert bands([5.0, 5.0], [1e-3, 1e-3], 3.0)
@@ -477,8 +478,8 @@ def test_events_needed_over_frequency() -> None:
 
 def test_half_of_a_value() -> None:
     """A value with an interval wider than itself is not given."""
-    assert told("F_sp", 0.204, 9)
-    assert not told("F_sp", 0.319, 9)
+    assert identifiable("F_sp", 0.204, 9)
+    assert not identifiable("F_sp", 0.319, 9)
 
 
 def test_fourfold() -> None:
@@ -487,15 +488,15 @@ def test_fourfold() -> None:
 
     def tried(ratio: float) -> bool:
         speed = np.repeat([1.0, ratio], 40)
-        rig = replace(log(), speed=speed, up=signs(80) > 0, imposed=True)
-        return bool(told_by_speed(library, [rig])[0])
+        rig = replace(log(), speed=speed, up=signs(80) > 0, prescribed=True)
+        return bool(without_speed_effects(library, [rig])[0])
 
     assert not tried(3.2)
     assert tried(5.0)
 
 
 def test_material_to_an_actuator() -> None:
-    """One that leaves a trifle of the force is one, however little noise there is."""
+    """One that leaves a negligible part of the force is one, however little noise there is."""
     assert not leaves_much(0.008, 100.0)
     assert leaves_much(0.0125, 100.0)
 
@@ -547,9 +548,9 @@ def test_gate_margin(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def can(relative: float) -> bool:
         names, unit = ("m", "F_cp"), np.array([2.0, 10.0])
-        told = Information(names, unit, np.diag(1.0 / np.array([relative, 1e-6]) ** 2))
+        identifiable = Information(names, unit, np.diag(1.0 / np.array([relative, 1e-6]) ** 2))
         monkeypatch.setattr(identifiability, "judge", lambda *_a: None)
-        monkeypatch.setattr(identifiability, "information", lambda *_a, **_k: told)
+        monkeypatch.setattr(identifiability, "information", lambda *_a, **_k: identifiable)
         recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
         found = identifiability.identifiability(recorded)
         assert found["F_cp"].within == pytest.approx(0.03)
@@ -596,12 +597,12 @@ def lost_windows(windows: int, lost: int) -> tuple[Array, IntArray]:
 
 
 def test_as_good_as_none() -> None:
-    """A Coulomb level that is next to none of the force is not told, however narrow."""
+    """A Coulomb level that is next to none of the force is not reported, however narrow."""
     happened = Events((9, 9), (9, 9), (900, 900), (1.0, 1.0), force=10.0)
-    for level, told in ((1.5e-2, True), (0.7e-2, False)):
+    for level, identifiable in ((1.5e-2, True), (0.7e-2, False)):
         values, sd = {"F_cp": level}, {"F_cp": 0.01 * level}
         found = estimates(values, sd, happened, Rig("force"), "log")
-        assert (found["F_cp"].value is not None) is told
+        assert (found["F_cp"].value is not None) is identifiable
     # What is left of the force is a share of friction only where something rubs.
     assert rubs(1.5e-3, 1.0) and not rubs(0.7e-3, 1.0)
 

@@ -11,7 +11,7 @@ STEP = 5e-4  # s, of the body and of a loop that is faster than its log
 NOISE = 1e-5  # rad
 
 
-def servo_log(between: Array, *, held: bool, seed: int = 0) -> Log:
+def servo_log(between: Array, *, zoh: bool, seed: int = 0) -> Log:
     """The servo's rows, so many seconds between them (n,); held: whether its loop gives a force at
     each row, to the next, or all the time."""
     rng, clock = np.random.default_rng(seed), np.concatenate([[0.0], np.cumsum(between)[:-1]])
@@ -24,7 +24,7 @@ def servo_log(between: Array, *, held: bool, seed: int = 0) -> Log:
         steps = max(1, round(float(length) / STEP))
         for k in range(steps):
             at = start + k * length / steps
-            y, v = _moved(y, v, force if held else _asked(at, y, v), length / steps)
+            y, v = _moved(y, v, force if zoh else _asked(at, y, v), length / steps)
     F = np.asarray(forces)
     noise = NOISE * rng.standard_normal(len(F))
     return Log("servo", {"t": clock, "y": np.asarray(places) + noise, "u": F, "F": F.copy()})

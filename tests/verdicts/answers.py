@@ -13,7 +13,7 @@ from tests.verdicts.logs import sources
 from workbench.cards.own_effects import library
 from workbench.steps.trace import trace_sources
 
-NOT_NAMED, IN_VAIN, NOT_TOLD = "not named", "named in vain", "not told"
+NOT_NAMED, FALSE_POSITIVE, NOT_IDENTIFIABLE = "not named", "false positive", "not identifiable"
 DIGITS = 4
 Found = str | float | bool
 Sizes = Mapping[str, float | None]
@@ -21,8 +21,9 @@ Sizes = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer in the table's words; looks: how often the trace asked whether it is to go on, a
-    measure of its work that is the same everywhere; seconds: of the processor, by its clock."""
+    """An answer in the table's words; evaluations: how often the trace asked whether it is to go
+    on, a measure of its work that is the same everywhere; seconds: of the processor, by its
+    clock."""
 
     verdict: str
     effects: Mapping[str, Sizes]
@@ -30,13 +31,13 @@ class Answer:
     depends_on: tuple[str, ...]
     complete: bool
     halted: bool
-    looks: int
+    evaluations: int
     seconds: float
     refusal: str = ""
 
 
-class Looks:
-    """Whether a trace is to go on: up to so many looks."""
+class EvaluationLimit:
+    """Whether a trace is to go on: up to so many evaluations."""
 
     def __init__(self, most: int) -> None:
         self.most, self.count = most, 0
@@ -51,17 +52,17 @@ def answer(entry: Entry, data: Path | None, folder: Path) -> Answer:
 
     Raises Absent where its data are not there.
     """
-    looks, begun = Looks(entry.looks), time.process_time()
+    evaluations, begun = EvaluationLimit(entry.evaluations), time.process_time()
     try:
         train, test = sources(entry, data, folder)
-        traced = trace_sources(train, test, library(), keep_going=looks)
+        traced = trace_sources(train, test, library(), keep_going=evaluations)
     except UserError as error:
         seconds = time.process_time() - begun
-        return Answer("refused", {}, {}, (), False, False, looks.count, seconds, str(error))
-    return _said(traced, looks.count, time.process_time() - begun)
+        return Answer("refused", {}, {}, (), False, False, evaluations.count, seconds, str(error))
+    return _said(traced, evaluations.count, time.process_time() - begun)
 
 
-def _said(traced: Traced, looks: int, seconds: float) -> Answer:
+def _said(traced: Traced, evaluations: int, seconds: float) -> Answer:
     """The answer; among its effects gravity and a constant force, which the plain model has."""
     found = traced.trace
     return Answer(
@@ -77,7 +78,7 @@ def _said(traced: Traced, looks: int, seconds: float) -> Answer:
         depends_on=tuple(dict.fromkeys((*found.unknown.depends_on, *found.left.depends_on))),
         complete=found.complete,
         halted=bool(found.not_tried),
-        looks=looks,
+        evaluations=evaluations,
         seconds=seconds,
     )
 
@@ -95,7 +96,7 @@ def shortfalls(said: Answer, right: Right) -> dict[str, Found]:
     for key in said.effects:
         once = re.sub(r"_\d+$", "", key)  # an order of a turn more
         if once not in right.effects and once not in right.may:
-            out[f"effect {key}"] = IN_VAIN
+            out[f"effect {key}"] = FALSE_POSITIVE
     if right.complete is not None and said.complete is not right.complete:
         out["complete"] = said.complete
     if right.depends_on and not set(right.depends_on) & set(said.depends_on):
@@ -107,7 +108,7 @@ def shortfalls(said: Answer, right: Right) -> dict[str, Found]:
 
 def _off(prefix: str, said: Sizes, right: Mapping[str, Within]) -> dict[str, Found]:
     return {
-        f"{prefix}{name}": NOT_TOLD if said.get(name) is None else rounded(said[name])
+        f"{prefix}{name}": NOT_IDENTIFIABLE if said.get(name) is None else rounded(said[name])
         for name, one in right.items()
         if not one.holds(said.get(name))
     }

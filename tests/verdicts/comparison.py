@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.verdicts.answers import NOT_NAMED, NOT_TOLD, Answer, Found, shortfalls
+from tests.verdicts.answers import NOT_IDENTIFIABLE, NOT_NAMED, Answer, Found, shortfalls
 from tests.verdicts.entries import Entry, Right, Within
 
 TODAY = Path(__file__).parents[1] / "reference" / "verdicts_today.toml"
 HEAD = "# Written by `python tools/verdicts.py --write`; what is right stands in verdicts.toml.\n"
 FURTHER = 0.1  # of how far a wrong number was off, by which it may be further off
-DEARER = 1.3  # times the looks from which a trace is said to cost more
+DEARER = 1.3  # times the evaluations from which a trace is said to cost more
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Committed:
     effects: tuple[str, ...]
     complete: bool
     halted: bool
-    looks: int
+    evaluations: int
     short: Mapping[str, Found]
 
 
@@ -41,7 +41,7 @@ def committed_of(said: Answer, right: Right) -> Committed:
     """An answer as the table keeps it."""
     short = shortfalls(said, right)
     return Committed(
-        said.verdict, tuple(said.effects), said.complete, said.halted, said.looks, short
+        said.verdict, tuple(said.effects), said.complete, said.halted, said.evaluations, short
     )
 
 
@@ -63,8 +63,11 @@ def change(entry: Entry, now: Committed, before: Committed) -> Change:
     cost = ""
     if now.halted != before.halted:
         cost = "is halted now" if now.halted else "comes to its own end now"
-    elif now.looks > DEARER * before.looks or DEARER * now.looks < before.looks:
-        cost = f"{before.looks} -> {now.looks} looks"
+    elif (
+        now.evaluations > DEARER * before.evaluations
+        or DEARER * now.evaluations < before.evaluations
+    ):
+        cost = f"{before.evaluations} -> {now.evaluations} evaluations"
     return Change(tuple(worse), tuple(better), cost)
 
 
@@ -72,7 +75,7 @@ def _moved(was: Found, found: Found, right: Within | None) -> str:
     """Whether a wrong answer is "worse" or "better" now, "" where it is much the same."""
     if was == found:
         return ""
-    if isinstance(was, float) and found == NOT_TOLD:
+    if isinstance(was, float) and found == NOT_IDENTIFIABLE:
         return "better"
     if not (isinstance(was, float) and isinstance(found, float) and right):
         return "worse"
@@ -114,7 +117,7 @@ def committed(path: Path = TODAY) -> dict[str, Committed]:
 def from_plain(one: Mapping[str, Any]) -> Committed:
     """An answer from what a file, or another process, has of it."""
     return Committed(
-        one["verdict"], tuple(one["effects"]), one["complete"], one["halted"], one["looks"],
+        one["verdict"], tuple(one["effects"]), one["complete"], one["halted"], one["evaluations"],
         dict(one.get("short", {})),
     )  # fmt: skip
 
@@ -126,7 +129,7 @@ def to_plain(one: Committed) -> dict[str, Any]:
         "effects": list(one.effects),
         "complete": one.complete,
         "halted": one.halted,
-        "looks": one.looks,
+        "evaluations": one.evaluations,
         "short": dict(one.short),
     }
 

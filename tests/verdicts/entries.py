@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 TABLE = Path(__file__).parents[1] / "reference" / "verdicts.toml"
-LOOKS = 24_000  # at which a trace is halted, unless its entry says otherwise
+EVALUATIONS = 24_000  # at which a trace is halted, unless its entry says otherwise
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _WITHIN = re.compile(
     rf"(?:(?P<value>{_NUMBER}) \+- )?(?P<share>{_NUMBER}) %"
     rf"|(?P<low>{_NUMBER}) to (?P<high>{_NUMBER})"
 )
-_OR_NONE = " or not told"
+_OR_NONE = " or not identifiable"
 Tables = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Within:
-    """What a number may be: from low to high, or, where `open`, not told."""
+    """What a number may be: from low to high, or, where `open`, not identifiable."""
 
     low: float
     high: float
@@ -60,12 +60,12 @@ class Entry:
     right: Right
 
     @property
-    def looks(self) -> int:
+    def evaluations(self) -> int:
         """How often the trace may ask whether it is to go on, which it does before every run.
 
         A budget of seconds would answer otherwise on another computer.
         """
-        return int(self.tables.get("looks", LOOKS))
+        return int(self.tables.get("evaluations", EVALUATIONS))
 
     @property
     def long(self) -> bool:
@@ -127,17 +127,17 @@ def _all_within(where: str, raw: Mapping[str, str], known: Tables) -> dict[str, 
 
 def within(where: str, text: str, known: float | None) -> Within:
     """ "0.86 +- 5 %", "2.5 to 4.3", or "3 %" of what is known of it, as of a recipe."""
-    told = text.removesuffix(_OR_NONE)
-    found = _WITHIN.fullmatch(told)
+    interval = text.removesuffix(_OR_NONE)
+    found = _WITHIN.fullmatch(interval)
     if found is None:
         raise ValueError(f'{where} = {text!r}: "3 %", "0.86 +- 5 %" or "2.5 to 4.3" needed')
     if found["low"]:
-        return Within(float(found["low"]), float(found["high"]), told != text)
+        return Within(float(found["low"]), float(found["high"]), interval != text)
     middle = float(found["value"]) if found["value"] else known
     if middle is None:
         raise ValueError(f"{where} = {text!r}: of what? the recipe does not name it")
     half = abs(middle) * float(found["share"]) / 100.0
-    return Within(middle - half, middle + half, told != text)
+    return Within(middle - half, middle + half, interval != text)
 
 
 def with_amplitudes(sizes: Mapping[str, float | None]) -> dict[str, float | None]:

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-PROPERTY = "verdict"  # of a test's report: what `told` holds
+PROPERTY = "verdict"  # of a test's report: what the outcome holds
 WRITE, ALL = "--verdicts-write", "--verdicts-all"
 
 
 @dataclass(frozen=True)
-class Told:
+class Outcome:
     """One entry's outcome, as it goes from a worker to the terminal."""
 
     name: str
@@ -24,7 +24,7 @@ class Told:
     better: list[str]
     cost: str
     seconds: float
-    looks: str
+    evaluations: str
     refusal: str = ""
 
     @property
@@ -65,7 +65,7 @@ def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
     """The table of what changed; called in the process that has the terminal."""
-    found = {one.name: one for one in _told(terminalreporter.stats)}
+    found = {one.name: one for one in _outcomes(terminalreporter.stats)}
     if not found:
         return
     terminalreporter.section("verdicts against tests/reference/verdicts_today.toml")
@@ -75,15 +75,15 @@ def pytest_terminal_summary(
         terminalreporter.write_line(f"written: {_write(found)}")
 
 
-def _told(stats: Mapping[str, list[Any]]) -> Iterator[Told]:
+def _outcomes(stats: Mapping[str, list[Any]]) -> Iterator[Outcome]:
     for reports in stats.values():
         for report in reports:
             for name, value in getattr(report, "user_properties", ()):
                 if name == PROPERTY:
-                    yield Told(**value)
+                    yield Outcome(**value)
 
 
-def lines(found: Mapping[str, Told], *, everything: bool = False) -> Iterator[str]:
+def lines(found: Mapping[str, Outcome], *, everything: bool = False) -> Iterator[str]:
     """What changed, an entry a paragraph, and the count of all."""
     for name in sorted(found):
         one = found[name]
@@ -92,7 +92,7 @@ def lines(found: Mapping[str, Told], *, everything: bool = False) -> Iterator[st
             effects = ", ".join(answer["effects"]) or "-"
             whole = "complete" if answer["complete"] else "incomplete"
             yield (
-                f"{name:34} {one.seconds:5.1f} s {one.looks:>12} {one.state:18}"
+                f"{name:34} {one.seconds:5.1f} s {one.evaluations:>12} {one.state:18}"
                 f" {answer['verdict']}: {effects}; {whole}"
             )
             yield from (f"    {key} = {value}" for key, value in answer["short"].items())
@@ -112,7 +112,7 @@ def lines(found: Mapping[str, Told], *, everything: bool = False) -> Iterator[st
     )  # fmt: skip
 
 
-def _write(found: Mapping[str, Told]) -> str:
+def _write(found: Mapping[str, Outcome]) -> str:
     """The committed answers with those of this run in their places; returns the file's name."""
     from tests.verdicts.comparison import TODAY, committed, from_plain, written
     from tests.verdicts.entries import entries

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.verdicts.answers import Answer, Looks, shortfalls
+from tests.verdicts.answers import Answer, EvaluationLimit, shortfalls
 from tests.verdicts.comparison import change, committed, committed_of, to_plain, written
 from tests.verdicts.entries import (
     Entry,
@@ -19,7 +19,7 @@ from tests.verdicts.entries import (
     within,
 )
 from tests.verdicts.logs import Absent, sources
-from tests.verdicts.plugin import Told, lines
+from tests.verdicts.plugin import Outcome, lines
 from tests.verdicts.rough_machine import Rough, columns
 
 RIGHT = Right(
@@ -46,7 +46,7 @@ def judged(said: Answer, before: Answer = SAID) -> tuple[int, int]:
 def test_a_tolerance_is_of_the_recipe_or_written_out() -> None:
     assert within("m", "5 %", 2.0) == Within(1.9, 2.1)
     assert within("F_sn", "5 %", -2.0) == Within(-2.1, -1.9)
-    assert within("m", "0.5 +- 10 % or not told", None) == Within(0.45, 0.55, True)
+    assert within("m", "0.5 +- 10 % or not identifiable", None) == Within(0.45, 0.55, True)
     assert within("m", "-2.5 to 4e1", 7.0) == Within(-2.5, 40.0)
     for text, known in (("about 3", 1.0), ("5 %", None)):
         with pytest.raises(ValueError, match="m = "):
@@ -66,10 +66,10 @@ def test_what_is_wrong_is_named_one_by_one() -> None:
     assert shortfalls(wrong, RIGHT) == {
         "verdict": "unknown",
         "spring.k": 110.0,
-        "effect cogging": "named in vain",
+        "effect cogging": "false positive",
         "complete": False,
         "depends_on": "t",
-        "m": "not told",
+        "m": "not identifiable",
         "F_cp": 7.0,
     }
     assert shortfalls(replace(SAID, effects={}), RIGHT) == {"effect spring": "not named"}
@@ -104,10 +104,10 @@ def test_an_effect_newly_named_is_better_whatever_its_size() -> None:
     assert judged(missing, off) == (1, 0)
 
 
-def test_a_dearer_trace_is_told_and_is_not_worse() -> None:
-    dear = committed_of(replace(SAID, looks=900), RIGHT)
+def test_a_dearer_trace_is_reported_and_is_not_worse() -> None:
+    dear = committed_of(replace(SAID, evaluations=900), RIGHT)
     found = change(ENTRY, dear, committed_of(SAID, RIGHT))
-    assert (found.worse, found.cost) == ((), "500 -> 900 looks")
+    assert (found.worse, found.cost) == ((), "500 -> 900 evaluations")
     halted = change(ENTRY, replace(dear, halted=True), dear)
     assert halted.cost == "is halted now"
 
@@ -146,17 +146,17 @@ def test_a_word_that_no_right_answer_has_is_refused() -> None:
 
 def test_the_summary_counts_and_shows_only_what_changed() -> None:
     now = committed_of(SAID, RIGHT)
-    same = Told("same", to_plain(now), [], [], "", 2.0, "500 looks")
+    same = Outcome("same", to_plain(now), [], [], "", 2.0, "500 evaluations")
     worse = replace(same, name="worse", worse=["m: right -> 2"])
     found = list(lines({one.name: one for one in (same, worse)}))
     assert found[:2] == ["worse: newly wrong", "    worse   m: right -> 2"]
     assert found[2].startswith("2 logs: 1 right as committed, 0 newly right, 0 less wrong, 1 newly")
     assert any("same" in line for line in lines({"same": same}, everything=True))
-    assert Told(**asdict(same)) == same
+    assert Outcome(**asdict(same)) == same
 
 
 def test_looks_end_a_trace_at_their_number() -> None:
-    going = Looks(2)
+    going = EvaluationLimit(2)
     assert [going(), going(), going()] == [True, True, False]
 
 
@@ -168,7 +168,7 @@ def test_data_that_are_not_there_are_said_to_be_absent(tmp_path: Path) -> None:
             sources(entry, data, tmp_path)
 
 
-def test_a_rough_machine_moves_as_it_is_told() -> None:
+def test_a_rough_machine_moves_as_it_is_commanded() -> None:
     plain = columns(ROUGH, 1)
     assert len(plain["t"]) == 2000
     assert np.max(np.abs(plain["y"] - plain["r"])) < 0.02

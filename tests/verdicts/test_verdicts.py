@@ -15,7 +15,7 @@ from tests.verdicts.answers import answer
 from tests.verdicts.comparison import change, committed, committed_of, to_plain
 from tests.verdicts.entries import Entry, entries
 from tests.verdicts.logs import Absent
-from tests.verdicts.plugin import PROPERTY, WRITE, Told
+from tests.verdicts.plugin import PROPERTY, WRITE, Outcome
 
 ENTRIES = entries()
 COMMITTED = committed()
@@ -52,16 +52,18 @@ def test_verdict(
     before = COMMITTED.get(name, now if writing else None)
     assert before is not None, f"{name} has no committed answer: python tools/verdicts.py --write"
     changed = change(entry, now, before)
-    told = Told(
+    outcome = Outcome(
         name=name,
         answer=to_plain(now),
         worse=list(changed.worse),
         better=list(changed.better),
         cost=changed.cost,
         seconds=said.seconds,
-        looks=f"{said.looks} looks{'!' if said.halted else ''}",
+        evaluations=f"{said.evaluations} evaluations{'!' if said.halted else ''}",
         refusal=said.refusal,
     )
-    record_property(PROPERTY, asdict(told))
+    record_property(PROPERTY, asdict(outcome))
     if not writing:
-        assert not changed.worse, "\n".join(["worse than committed:", *told.worse, told.refusal])
+        assert not changed.worse, "\n".join(
+            ["worse than committed:", *outcome.worse, outcome.refusal]
+        )

@@ -35,7 +35,7 @@ def test_the_bar_moves_by_the_clock_between_stages_and_never_back() -> None:
             clock.now += 1.0
             before = one.shown
             one.beat()
-            assert one.shown > before  # in every second, whatever is told
+            assert one.shown > before  # in every second, whatever is reported
             shown.append(one.shown)
         assert sum(steps) == pytest.approx(one.shown)
     assert shown == sorted(shown) and shown[-1] <= ALL_BUT

@@ -1,4 +1,4 @@
-"""Links that lead nowhere, or in a circle, are told as such wherever a file is named."""
+"""Links that lead nowhere, or in a circle, are reported as such wherever a file is named."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,7 +37,7 @@ READERS: list[Callable[[Path], object]] = [
 
 @pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize(("target", "said"), [("gone", MISSING), ("link.py", CIRCLE)])
-def test_a_link_is_told_as_such(
+def test_a_link_is_reported_as_such(
     tmp_path: Path, read: Callable[[Path], object], target: str, said: str
 ) -> None:
     link = tmp_path / "in" / "link.py"

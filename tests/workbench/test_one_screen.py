@@ -79,10 +79,10 @@ def lost(e: Estimate, why: str) -> Estimate:
     return Estimate(None, e.unit, reason=why, assumed=e.value)
 
 
-def many_logs(model: Model, told: int = 9) -> Model:
-    """The model of forty logs, of whose nine parameters only the first are told."""
+def many_logs(model: Model, identifiable: int = 9) -> Model:
+    """The model of forty logs, of whose nine parameters only the first are identifiable."""
     friction = {
-        name: e if n < told else lost(e, f"{name}: {WHY}")
+        name: e if n < identifiable else lost(e, f"{name}: {WHY}")
         for n, (name, e) in enumerate(model.friction.items())
     }
     entries = tuple(replace(model.log[0], file=log, position_rms=1e-5 * n) for n, log in
@@ -91,9 +91,9 @@ def many_logs(model: Model, told: int = 9) -> Model:
 
 
 def identify() -> Iterator[Screen]:
-    for told in (9, 2):
+    for identifiable in (9, 2):
         for adequate in (True, False):
-            model = many_logs(identified().model, told)
+            model = many_logs(identified().model, identifiable)
             model = replace(model, fit=replace(model.fit, adequate=adequate))
             yield identified_view(replace(identified(), model=model, remarks=REMARKS)).screen(OUT)
 
@@ -175,10 +175,10 @@ def demo() -> Iterator[Screen]:
 def drift() -> Iterator[Screen]:
     source = traced(trace_of()).train[0]
     shift = {n: Shift(n, "N", 12.0, 0.1, 14.4, 0.1, 0.2, 0.01, 0.18, 0.22) for n in NAMES[:4]}
-    told, none = dict.fromkeys(NAMES[4:], WHY), Statistic(3.0, 12.0, 0.5, 9)
+    reasons, none = dict.fromkeys(NAMES[4:], WHY), Statistic(3.0, 12.0, 0.5, 9)
     state: Any = None
     for verdict in ("none", "drift", "structure", "not_judged"):
-        test = DriftTest("a", verdict, tuple(shift.values()), shift, told, none, none, "mean",
+        test = DriftTest("a", verdict, tuple(shift.values()), shift, reasons, none, none, "mean",
                          1.0, 2.0, f"{WHY} {WHY}", state, none, NAMES[4:])  # fmt: skip
         tests = tuple(
             OneTested(replace(source, file=log, log=replace(source.log, name=log)),
@@ -275,12 +275,12 @@ BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # r
 NO_SCREEN = ("serve", "work", "watch")  # events as JSON lines, until they are stopped
 
 
-def test_every_command_is_held() -> None:
+def test_every_command_fits_one_screen() -> None:
     views = {view.__name__.replace("_", "-") for view in BY_VIEW}
-    held = views | {*BY_COMMAND, *NO_SCREEN}
-    assert held == set(cli.COMMANDS)
-    tests = inspect.getsource(inspect.getmodule(held_by_command))  # type: ignore[arg-type]
-    assert all(f'held_by_command("{name}"' in tests for name in BY_COMMAND)
+    contained = views | {*BY_COMMAND, *NO_SCREEN}
+    assert contained == set(cli.COMMANDS)
+    tests = inspect.getsource(inspect.getmodule(one_screen_of))  # type: ignore[arg-type]
+    assert all(f'one_screen_of("{name}"' in tests for name in BY_COMMAND)
 
 
 @pytest.mark.parametrize("view", BY_VIEW)
@@ -294,7 +294,7 @@ def test_the_fullest_result_is_one_screen(view: Callable[[], Iterator[Screen]]) 
         assert ("written: " in text) == ("written: " in whole)
 
 
-def test_remarks_on_many_logs_are_told_once() -> None:
+def test_remarks_on_many_logs_are_reported_once() -> None:
     shown = next(identify())
     text, whole = (words_of(shown.text(verbose=one)) for one in (False, True))
     assert "note: 40 logs: uneven clock, resampled every 5 to 7 ms" in text
@@ -304,7 +304,7 @@ def test_remarks_on_many_logs_are_told_once() -> None:
     assert whole.count("uneven clock") == len(LOGS)
 
 
-def test_parameters_not_told_for_one_reason_are_told_together() -> None:
+def test_parameters_not_told_for_one_reason_are_reported_together() -> None:
     model = many_logs(identified().model)
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
@@ -329,7 +329,7 @@ def test_effects_and_their_parameters_have_names_on_one_screen() -> None:
         assert all(f"{words(key)}" in text for key in keys)
 
 
-def held_by_command(*arguments: str, status: int = 0) -> str:
+def one_screen_of(*arguments: str, status: int = 0) -> str:
     """What a command prints by default, which is one screen; with --verbose no less."""
     done = CliRunner().invoke(cli.cli, arguments, standalone_mode=False)
     assert done.return_value in (status, None) and done.exception is None, done.output
@@ -337,9 +337,9 @@ def held_by_command(*arguments: str, status: int = 0) -> str:
 
 
 def test_the_list_of_effects() -> None:
-    text = held_by_command("effects", "list")
+    text = one_screen_of("effects", "list")
     assert "stribeck: friction falls with speed" in text and "source:" not in text
-    assert "source:" in held_by_command("effects", "list", "stribeck")
+    assert "source:" in one_screen_of("effects", "list", "stribeck")
     whole = CliRunner().invoke(cli.cli, ["effects", "list", "--verbose"]).output
     assert whole.count("source:") == text.count(": ") - 1
 
@@ -352,7 +352,7 @@ def test_a_card_for_a_log_of_a_hundred_columns(
     columns = np.column_stack([log["t"], log["y"], log["F"]])[:800]
     np.savetxt("run.csv", columns, delimiter=",", header="time [s],position [m],force [N]",
                comments="", fmt="%.6g")  # fmt: skip
-    assert "written: card.toml" in held_by_command("init", "run.csv")
+    assert "written: card.toml" in one_screen_of("init", "run.csv")
     found = proposed(Path("run.csv"), None)
     unused = {f"channel {n}": "no signal that a card needs" for n in range(100)}
     text = one_screen(proposal_view(replace(found, unused=unused, refused=WHY), OUT / "card.toml"))
@@ -371,15 +371,15 @@ def test_a_registry_of_many_machines_and_versions(
             found.add("a", Candidate({"friction": friction, "m": n}), **who)
             found.add(f"machine-{n}", Candidate({"m": n}), **who)
         found.promote("a", 45, **who)
-    assert "more: --verbose" in held_by_command("registry", "list")
-    shown = held_by_command("registry", "show", "a")
+    assert "more: --verbose" in one_screen_of("registry", "list")
+    shown = one_screen_of("registry", "show", "a")
     assert "promoted" in shown and "earlier: --verbose" in shown
-    held_by_command("registry", "diff", "a", "1", "2")
-    held_by_command("registry", "promote", "a", "3", "--reason", "why " * 50)
-    held_by_command("registry", "rollback", "a", "--reason", "why " * 50)
-    held_by_command("registry", "retry", "a", "--reason", "why")
-    held_by_command("token", "add", "anna")
-    held_by_command("token", "list")
+    one_screen_of("registry", "diff", "a", "1", "2")
+    one_screen_of("registry", "promote", "a", "3", "--reason", "why " * 50)
+    one_screen_of("registry", "rollback", "a", "--reason", "why " * 50)
+    one_screen_of("registry", "retry", "a", "--reason", "why")
+    one_screen_of("token", "add", "anna")
+    one_screen_of("token", "list")
 
 
 def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,13 +389,13 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.chdir(tmp_path)
     Path("card.toml").write_text(CARD, "utf-8")
-    held_by_command("simulate", "card.toml", "--out", "made")
+    one_screen_of("simulate", "card.toml", "--out", "made")
     Path("design.json").write_text(
         dumps(design_document(designed(identified().model, SLOW))), "utf-8"
     )
     chosen = ["--controller", "rst", "--compensator"]
     chosen += [word for name in ("c", "st", "plcopen", "json") for word in ("--to", name)]
-    assert "written: " in held_by_command("export", "design.json", *chosen, "--out", "code")
+    assert "written: " in one_screen_of("export", "design.json", *chosen, "--out", "code")
 
 
 def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,5 +411,5 @@ def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     every = ("friction-table", "cogging-table", "backlash", "csv", "c", "st")
     asked = ["--rated", "2 N m", "--per-turn", "48 mm", "--encoder", "motor", "--speed", "0.5 m/s"]
     asked += [word for one in every for word in ("--to", one)]
-    text = held_by_command("export", "model.json", *asked, "--out", "tables")
+    text = one_screen_of("export", "model.json", *asked, "--out", "tables")
     assert "asymmetry" in text and "written: tables" in text

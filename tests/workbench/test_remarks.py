@@ -1,4 +1,5 @@
-"""Remarks on several logs are told once: none is lost in the count, one alone stays as it is."""
+"""Remarks on several logs are reported once: none is lost in the count, one alone stays as it
+is."""
 
 import re
 

@@ -55,7 +55,7 @@ def tables_view(what: Compensation, found: Tables, folder: Path) -> Screen:
     return screen(
         _sentence(what, found),
         tabled(FILES_HEAD, rows, right=(2, 3)),
-        listed(_not_held(what, found)),
+        listed(_left_out(what, found)),
         listed(f"note: {line}" for line in (*what.missing, *remarks)),
         listed((f"left out: {line}" for line in found.left_out), most=6),
         instead((), [f"{one.name}: {one.where}" for one in found.files]),
@@ -83,7 +83,7 @@ def _sentence(what: Compensation, found: Tables) -> str:
     )
 
 
-def _not_held(what: Compensation, found: Tables) -> Iterator[str]:
+def _left_out(what: Compensation, found: Tables) -> Iterator[str]:
     """Costs with the files that have them, the largest first, those without a size last."""
     files = dict[Cost, list[str]]()
     for one in found.files:

@@ -87,7 +87,7 @@ class InRegistry:
         return any(one.sha256 == log.sha256 for one, _ in waiting)
 
 
-FLEET_POLL = 1.0  # s between looks at the cluster
+FLEET_POLL = 1.0  # s between checks of the cluster
 CARDS_CHECKED = 20  # logs whose card is searched before a run begins
 
 
@@ -215,10 +215,10 @@ class FleetRun:
         return self.cluster.submit(self.work, item)
 
     def _refuse_cardless(self, logs: Sequence[LogFile]) -> None:
-        looked = logs[:CARDS_CHECKED]
-        if looked and not any(card_text(self.url, log) for log in looked):
+        checked = logs[:CARDS_CHECKED]
+        if checked and not any(card_text(self.url, log) for log in checked):
             raise BadLogs(
-                f"{shown(self.url)}: no card.toml beside or above {looked[0].name!r} and the logs"
+                f"{shown(self.url)}: no card.toml beside or above {checked[0].name!r} and the logs"
                 " after it; put one there, or give --card for all"
             )
 

@@ -17,13 +17,13 @@ from identification.log import Log
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.signals.one_clock import on_one_clock
-from identification.signals.renewal import held_drives, renewed
+from identification.signals.renewal import renewed, zoh_remarks
 from identification.signals.stamps import (
     at_rows,
     even_stamps,
     sound_rows,
+    starts_in_words,
     stretches,
-    told_of_starts,
 )
 from identification.signals.summed import summed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
@@ -63,7 +63,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     if len(parts) == 1:
         made = prepared(log, first_row, path, card)
         return replace(made, remarks=tuple(dict.fromkeys((*remarks, *made.remarks))))
-    said = [*remarks, f"{log.name}: its {told_of_starts(log['t'], parts)}"]
+    said = [*remarks, f"{log.name}: its {starts_in_words(log['t'], parts)}"]
     runs, bad = list[Log](), list[BadSamples]()
     for number, rows in enumerate(parts, 1):
         part = Log(f"{log.name} (run {number})", at_rows(log.signals, rows))
@@ -75,7 +75,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
 def prepared(log: Log, first_row: int, path: Path, card: Card) -> Prepared:
     """The runs on an even clock of one log as it stands in a file from this row on."""
     fresh = renewed(log)
-    period, read = log.h if fresh.remarks else None, (*held_drives(log), *fresh.remarks)
+    period, read = log.h if fresh.remarks else None, (*zoh_remarks(log), *fresh.remarks)
     repaired = _repaired(fresh.log, first_row, path, card)
     del log, fresh  # of a long log a gigabyte
     rig = card.rig(path.name)
@@ -149,8 +149,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
         whole["t"], late = even_stamps(whole["t"])
         said = (*said, late) if late else said
         whole, of_speeds = _with_sums(whole, card.signals)
-        told = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))
-        return Log(called, whole), table.first_row, told
+        remarked = tuple(f"{called}: {one}" for one in (*remarks, *said, *of_speeds))
+        return Log(called, whole), table.first_row, remarked
 
     def clock(group: str) -> Array:
         number = table.clocks.get(group)
@@ -161,8 +161,8 @@ def _signals_of(table: Table, path: Path, card: Card) -> tuple[Log, int, tuple[s
 
     found = on_one_clock(signals, groups, clock, called)
     whole, of_speeds = _with_sums(_same_length(found.signals, path), card.signals)
-    told = tuple(f"{called}: {one}" for one in (*remarks, *of_speeds))
-    return Log(called, whole), table.first_row + found.first, (*told, *found.remarks)
+    remarked = tuple(f"{called}: {one}" for one in (*remarks, *of_speeds))
+    return Log(called, whole), table.first_row + found.first, (*remarked, *found.remarks)
 
 
 def _signal(

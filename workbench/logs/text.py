@@ -121,8 +121,8 @@ def _head_of(path: Path, text: str, spec: FileSpec) -> _Head:
     lines = text[:_EXAMINED].splitlines()
     lines = (lines if len(text) <= _EXAMINED else lines[:-1])[spec.skip_rows :]
     skipped = [_skipped(line, spec.comment) for line in lines]
-    looked = [line for line, out in zip(lines, skipped, strict=True) if not out]
-    marks = _marks(looked[1:][-_COMPARED:], spec)
+    considered = [line for line, out in zip(lines, skipped, strict=True) if not out]
+    marks = _marks(considered[1:][-_COMPARED:], spec)
     fields = [[] if out else _split(line, marks) for line, out in zip(lines, skipped, strict=True)]
     if spec.decimal is None and marks.delimiter == ",":
         _refuse_comma_as_both(path, fields)

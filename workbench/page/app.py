@@ -46,7 +46,7 @@ def served() -> Guard:
 def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard:
     """The application on its registry; raises BadRegistry and RegistryAway.
 
-    helpers: processes for heavy looks, by default of its own.
+    helpers: processes for heavy evaluations, by default of its own.
     """
     registry = Registry(settings.where)
     helpers = helpers or Helpers()

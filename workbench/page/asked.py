@@ -136,7 +136,7 @@ class Visitor:
 
 @dataclass(frozen=True)
 class Server:
-    """What every answer is made with; helpers: processes for heavy looks at logs."""
+    """What every answer is made with; helpers: processes for heavy evaluations of logs."""
 
     settings: PageSettings
     registry: Registry

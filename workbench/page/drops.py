@@ -19,7 +19,7 @@ from identification.errors import BadCard, UserError
 from workbench.cards.card_text import Line, card_text
 from workbench.jobs.options import clock
 from workbench.output import write_whole
-from workbench.page import looks
+from workbench.page import inspection
 from workbench.page.asked import Asked, download
 from workbench.page.dropped import ENDINGS, file_name
 from workbench.page.visitors import changing, reading
@@ -256,7 +256,7 @@ def drop(asked: Asked) -> Response:
     files = asked.drop_of(secrets.token_hex(8))
     size, digest = files.store(file_name(given.filename), given.file)
     try:
-        asked.server.helpers(looks.refuse_no_log, files.log)
+        asked.server.helpers(inspection.refuse_no_log, files.log)
     except UserError:
         shutil.rmtree(files.folder, ignore_errors=True)
         raise
@@ -277,7 +277,7 @@ def columns(asked: Asked) -> Response:
     """Every column over time, before anything is known of it; the card is looked for after it."""
     upload, path = _upload(asked), asked.drop.log
     try:
-        html, rows = asked.server.helpers(looks.columns_chart, path, upload.file)
+        html, rows = asked.server.helpers(inspection.columns_chart, path, upload.file)
         response = asked.show("chart", html=html, said=f"{rows} rows")
     except UserError as error:
         response = _said(asked, str(error))
@@ -319,7 +319,7 @@ def picture(asked: Asked) -> Response:
     if not place.exists():
         return _said(asked, "Nothing to show until a card reads the log.", bad=False)
     try:
-        html = asked.server.helpers(looks.doctor_chart, path, place)
+        html = asked.server.helpers(inspection.doctor_chart, path, place)
     except UserError as error:
         return _said(asked, str(error))
     return asked.show("chart", html=html, said="")
@@ -331,7 +331,7 @@ def words(asked: Asked) -> Response:
     if not place.exists():
         return _said(asked, "", bad=False)
     try:
-        found = asked.server.helpers.slowly(looks.doctor_words, path, place)
+        found = asked.server.helpers.slowly(inspection.doctor_words, path, place)
     except UserError as error:
         return _said(asked, str(error))
     return asked.show("words", found=found)
@@ -359,9 +359,9 @@ def _proposed(asked: Asked) -> tuple[CardForm, str]:
     """The proposal as a form and why there is none, as far as that is known."""
     path, upload, helpers = asked.drop.log, _upload(asked), asked.server.helpers
     try:
-        return form_of(helpers.slowly(looks.proposal, path), upload.file), ""
+        return form_of(helpers.slowly(inspection.proposal, path), upload.file), ""
     except UserError as error:
-        return empty_form(helpers(looks.headers, path), path.stem), str(error)
+        return empty_form(helpers(inspection.headers, path), path.stem), str(error)
 
 
 def _store_card(asked: Asked, form: CardForm) -> str:
@@ -370,7 +370,7 @@ def _store_card(asked: Asked, form: CardForm) -> str:
     part = place.with_name(f"new-{place.name}")
     try:
         part.write_text(form.text(path.name), encoding="utf-8")
-        refused = asked.server.helpers(looks.card_refused, part, path)
+        refused = asked.server.helpers(inspection.card_refused, part, path)
         if refused:
             return refused.replace(part.name, "the card")
         part.replace(place)

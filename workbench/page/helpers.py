@@ -8,7 +8,7 @@ import anyio
 from anyio import to_process
 
 from identification.errors import UserError
-from workbench.page.looks import warm
+from workbench.page.inspection import warm
 
 Result = TypeVar("Result")
 QUICK_CALLS, SLOW_CALLS = 2, 1  # at once; a slow one never keeps a first picture waiting

@@ -18,9 +18,9 @@ from design.machine.readable import shown_unit
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.jobs.options import clock
-from workbench.page import looks
+from workbench.page import inspection
 from workbench.page.asked import STATE_WORDS, Asked, download, part
-from workbench.page.looks import EXPORTS
+from workbench.page.inspection import EXPORTS
 from workbench.page.visitors import briefly, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
@@ -70,7 +70,7 @@ def compare(asked: Asked) -> Response:
         if found["design"] is not None
     ]
     try:
-        loops = asked.server.helpers(looks.loops, designs[: len(set(numbers))])
+        loops = asked.server.helpers(inspection.loops, designs[: len(set(numbers))])
     except UserError as error:
         return asked.show("said", said=str(error), bad=True)
     names = (f"version {numbers[0]}", f"version {numbers[1]}")
@@ -80,7 +80,7 @@ def compare(asked: Asked) -> Response:
 
 def report(asked: Asked) -> Response:
     design = json.dumps(asked.registry.document(_version(asked), "design"))
-    return report_response(asked.server.helpers(looks.design_page, design))
+    return report_response(asked.server.helpers(inspection.design_page, design))
 
 
 def stored_page(asked: Asked) -> Response:
@@ -106,7 +106,7 @@ def export(asked: Asked) -> Response:
     if target not in EXPORTS:
         raise HTTPException(404, f"The target is one of {', '.join(EXPORTS)}.")
     design = json.dumps(asked.registry.document(_version(asked), "design"))
-    files = asked.server.helpers(looks.export_files, design, target)
+    files = asked.server.helpers(inspection.export_files, design, target)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

@@ -54,7 +54,7 @@ def ask(asked: Asked) -> Response:
 
 
 def cancel(asked: Asked) -> Response:
-    """Cancel a task; its worker stops at its next look."""
+    """Cancel a task; its worker stops at its next check."""
     found = asked.bench.cancel(asked["task"], by=asked.visitor.name, now=clock())
     if asked.by_htmx:
         return asked.show("task", one=_shown(asked, found))

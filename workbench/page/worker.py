@@ -146,7 +146,7 @@ def _with_design(model: Model, folder: OutputFolder, course: Course) -> str:
 
 
 TASK_LEASE = timedelta(seconds=30)
-QUEUE_POLL = 0.5  # s between two looks at the queue, and at whether the task is still ours
+QUEUE_POLL = 0.5  # s between two checks of the queue, and at whether the task is still ours
 STUBBORN = 10.0  # s after which a computation that does not end is ended with its process
 STUBBORN_STATUS = 75
 

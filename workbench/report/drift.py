@@ -172,7 +172,7 @@ def detectable_sentence(test: DriftTest, limit: float) -> str:
         return ""
     seen = [f"{n} {_percent(x)}" for n, x in sizes.items() if x <= limit]
     coarse = [f"{n} ({_percent(x)})" for n, x in sizes.items() if x > limit]
-    coarse += [f"{n} (not identifiable)" for n in test.not_judged]
+    coarse += [f"{n} (not identifiable)" for n in test.inconclusive]
     said = f"minimum detectable change: {', '.join(seen) or 'none'}"
     return said + (f"; inconclusive: {', '.join(coarse)}" if coarse else "")
 
@@ -251,7 +251,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
         unit, factor = shown_unit(shift.unit)
         both = ("-" if value is None else number(factor * value, 5) for value in values)
         rows.append((shift.name, *both, unit, change, f"{low} to {high}"))
-    rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
+    rows += [(name, "-", "-", "", "-", why) for name, why in one.test.inconclusive.items()]
     return tabled(head, reasons_once(rows, logs, (4, 3, 5)), right=(1, 2), whole=rows)
 
 

@@ -107,7 +107,7 @@ def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | 
 def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
     """Force by the model: simulated where an actuator gives it, else what the motion needs."""
     if model.fit.drive == "force" or model.rig.kind == "motor" or run is None:
-        how = Smoothing(held=model.holds_force)
+        how = Smoothing(zoh=model.holds_force)
         return force_by_model(model, source.log, how)
     return run.F
 

@@ -8,8 +8,8 @@ from design.machine.model import Model, used
 from design.machine.readable import as_shown, in_digits, length, number, shown, times
 from design.machine.velocity import VelocityModel
 from identification.effects._base import Param
+from identification.estimation.converged_fit import STOP_TURNS_ON_LESS
 from identification.estimation.latent_force import LatentForces
-from identification.estimation.settling import STOP_TURNS_ON_LESS
 from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.remarks import printed_once
@@ -33,7 +33,7 @@ def parameter_rows(model: Model) -> list[Row]:
         rows += [
             (f"{key.replace('_', ' ')} {name}", *estimate_cells(value), params[name].meaning)
             for name, value in own.items()
-            if not (params[name].held(used(value)) or is_left_out(params[name], value))
+            if not (params[name].at_default(used(value)) or is_left_out(params[name], value))
         ]
     if model.lag is not None:
         rows.append(

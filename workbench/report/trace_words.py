@@ -12,7 +12,7 @@ from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
 from identification.tracing.verdict import listed
 
-LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
+FORCE_ERROR_LEFT = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
 CERTAIN = 0.99  # probability above which digits say nothing
 FOLLOWS_NOT = 10.0  # times the position's noise, from which a free run follows no log
@@ -228,7 +228,7 @@ def reported_error(traced: Traced) -> ReportedError | None:
         if was is not None and now is not None and math.isfinite(was) and was > 0
     }
     of_force = known.get("force_rms")
-    if of_force is not None and of_force.after <= LEFT_IN_FORCE * of_force.before:
+    if of_force is not None and of_force.after <= FORCE_ERROR_LEFT * of_force.before:
         return of_force
     return min(known.values(), key=lambda error: error.after / error.before, default=None)
 

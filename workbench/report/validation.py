@@ -207,8 +207,8 @@ def _step_chart(
     # Until the slowest loop has long settled.
     times = [one[place].settling for one in found.figures.values() if place in one]
     most, h = begins[1] - begins[0], float(some.t[1] - some.t[0])
-    settled = SETTLING_TIMES_SHOWN * float(np.median(times)) / h
-    span = int(np.clip(settled, min(50, most), most))
+    samples = SETTLING_TIMES_SHOWN * float(np.median(times)) / h
+    span = int(np.clip(samples, min(50, most), most))
     command = first.command_unit if first.command_peak is not None else units_of(rotary).force.name
     limit = first.command_limit
     panels = []

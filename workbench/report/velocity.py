@@ -109,7 +109,7 @@ def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder:
 
 def _verdict(found: VelocityTraced) -> str:
     left, rotary = found.left, found.model.rotary
-    over = f"{length(left.held.rms[0], rotary)} rms of held-out position over 2 s"
+    over = f"{length(left.unextended.rms[0], rotary)} rms of held-out position over 2 s"
     match left.verdict:
         case "none":
             return f"Nothing is missing: the valve leaves {over}, no more than the sensor's noise"

@@ -50,8 +50,8 @@ TRACE_STAGES = {
     "tracing": (0.35, 0.55),
     "refitting": (0.55, 0.75),
     "judging": (0.75, 0.9),
-    "settling": (0.45, 0.5),
+    "converging": (0.45, 0.5),
     "searching": (0.5, 0.7),
     "weighing": (0.6, 0.95),
-    "telling": (0.95, 1.0),
+    "reporting": (0.95, 1.0),
 }

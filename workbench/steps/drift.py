@@ -69,7 +69,7 @@ def _of_run(one: Tested) -> dict[str, Any]:
         "moved": [_number(shift) for shift in test.moved],
         "unsure": list(test.unsure),
         "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
-        "not_judged": dict(test.not_judged),
+        "not_judged": dict(test.inconclusive),
         "could_have_seen": detectable_sizes(test),
         "single": plain(test.single),
         "alone": plain(test.alone),

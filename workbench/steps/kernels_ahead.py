@@ -35,7 +35,7 @@ def compile_fits() -> None:
     seen = {"y": run.y + 1e-6 * noise[0], "F": run.F + 0.1 * noise[1]}
     log = Log("made", {"t": driven["t"], "u": driven["u"], **seen})
     fit = fit_plant([log], np.random.default_rng(0), rig=Rig("force"))
-    moved = motion_log(log, held=False, by_command=False)
+    moved = motion_log(log, zoh=False, by_command=False)
     latent_forces(Plant(fit.friction), [moved], 0.0)
     fit_arx([(driven["u"], run.y)], 2, 1, 1, SAMPLE)
     run_with(HYDRAULIC, driven, typical(built_in()["stribeck"]))

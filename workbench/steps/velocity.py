@@ -15,7 +15,7 @@ from identification.velocity.rivals import STRUCTURES, HeldOut
 def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
     """trace.json of such a rig: verdicts as in the contract, errors of the position [m]."""
     left = found.left
-    after = next((one.left for one in left.rivals if one.key == left.named), left.held)
+    after = next((one.left for one in left.rivals if one.key == left.named), left.unextended)
     return {
         "schema": "velocity-trace/1",
         "kind": "velocity",
@@ -24,7 +24,7 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
         "test_log": fingerprints(found.test),
         "verdict": left.verdict,
         "complete": left.complete,
-        "before": _errors(left.held),
+        "before": _errors(left.unextended),
         "after": _errors(after),
         "noise_floor": {"position_rms": found.noise},
         "effects": [

@@ -104,7 +104,7 @@ def _costs(
     (k,) each."""
     name = "F_sp" if way > 0 else "F_sn"
     nine = [replace(friction, **{name: way * float(limit)}) for limit in limits]
-    y = released(nine, part["F"], one.log.h, hold=one.held, level=level)
+    y = released(nine, part["F"], one.log.h, hold=one.zoh, level=level)
     r = (y - part["y"]) / max(one.noise.y, EXACT_POSITION)
     return np.asarray(np.mean(np.minimum(np.nan_to_num(r**2, nan=LOST), LOST), axis=1))
 

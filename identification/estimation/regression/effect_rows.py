@@ -119,9 +119,9 @@ class EffectRows:
         return self.logs[0].by_motor
 
     @property
-    def imposed(self) -> bool:
+    def prescribed(self) -> bool:
         """Whether the motion is prescribed: a body that a rig moves is not stuck at any speed."""
-        return self.logs[0].imposed
+        return self.logs[0].prescribed
 
     def scale(self, equation: str) -> float:
         """What squares of rows are divided by, 1 where nothing but noise is left."""
@@ -158,9 +158,11 @@ def plain_rows(
     one = stage.logs[i]
     if equation == MECHANICAL:
         rows = mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
-        if stage.imposed:  # no inertia shows: a mass would be what an effect that is missing left
+        if (
+            stage.prescribed
+        ):  # no inertia shows: a mass would be what an effect that is missing left
             rows = replace(rows, X=rows.X * (np.arange(rows.X.shape[1]) > 0))
-        return rows if u is None else replace(rows, b=one.sliding.held @ driven(one, u))
+        return rows if u is None else replace(rows, b=one.sliding.zoh @ driven(one, u))
     if equation == ACTUATOR:
         return actuator(one, stage.theta_a, y, u)
     if equation == REST:
@@ -192,7 +194,7 @@ def with_effect(
         behind = _beside(
             plain_rows(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
         )
-        if one.held and equation == MECHANICAL and not effect.place.delays:
+        if one.zoh and equation == MECHANICAL and not effect.place.delays:
             return _flattened(effect, shape, one, stage, behind)
         return behind
     if split(effect):
@@ -232,9 +234,9 @@ def _flattened(
     given = contribution(effect, shape, s, h, stage.friction)
     slope = np.abs(more - given) / step
     least = float(np.median(rows.sd)) * np.sqrt(2 * np.pi) / max(float(np.ptp(s["F"])), 1e-300)
-    if np.mean(one.sliding.held @ (slope < least)) > FLAT:  # a body driven by nothing
-        return replace(rows, b=UNEXPLAINED * (one.sliding.held @ one.log["F"]))
-    lost = -2.0 * np.sum(one.sliding.held @ np.log(np.maximum(slope, min(least, 1.0))))
+    if np.mean(one.sliding.zoh @ (slope < least)) > FLAT:  # a body driven by nothing
+        return replace(rows, b=UNEXPLAINED * (one.sliding.zoh @ one.log["F"]))
+    lost = -2.0 * np.sum(one.sliding.zoh @ np.log(np.maximum(slope, min(least, 1.0))))
     return replace(rows, lost=float(lost))
 
 

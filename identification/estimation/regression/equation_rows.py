@@ -40,9 +40,9 @@ class LogNoise:
 
     y [m]: of the position at rest; jitter [s]: of the instants of its samples; v [m/s]: of the
     smoothed velocity; F [N]: of the force; between [N]: the part of F that no log shows, of a loop
-    faster than the log, None of a force that is known to be exact; walk [N]: by which a sample more
-    may take the force away from what the command makes of it (0: the command is exact, or there is
-    none).
+    faster than the log, None of a force that is known to be exact; random_walk [N]: by which a
+    sample more may take the force away from what the command makes of it (0: the command is exact,
+    or there is none).
     """
 
     y: float
@@ -50,13 +50,13 @@ class LogNoise:
     v: float
     F: float
     between: float | None = 0.0
-    walk: float = 0.0
+    random_walk: float = 0.0
 
     @property
     def corrected(self) -> float:
         """Share of its distance to the measured force, by which the force of a run driven by the
         command is corrected: Kalman's steady gain of a local level (Harvey 1989)."""
-        return corrected_share(self.walk, self.F)
+        return corrected_share(self.random_walk, self.F)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +65,8 @@ class MotionLog:
 
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run drifts at most under the noise of the measured force; a
-    plant that drifts more must not gain by it. rotary: y is an angle [rad]. imposed: the motion is
-    prescribed by a rig. halt: asked before every run along the log.
+    plant that drifts more must not gain by it. rotary: y is an angle [rad]. prescribed: the motion
+    is prescribed by a rig. halt: asked before every run along the log.
     """
 
     log: Log
@@ -76,25 +76,25 @@ class MotionLog:
     speed: Array
     whole: WeakWindows | None
     noise: LogNoise
-    held: bool
+    zoh: bool
     kinks: Array
     rotary: bool = False
-    imposed: bool = False
+    prescribed: bool = False
     reference: Karnopp | None = None
     halt: Halt = field(default_factory=Halt)
 
     def is_forced(self, drive: Drive) -> bool:
         """Whether a force drives its runs: the measured one, or a motor's, that of its command."""
-        return drive == "force" or self.held
+        return drive == "force" or self.zoh
 
-    def walks(self, drive: Drive) -> bool:
+    def has_random_walk(self, drive: Drive) -> bool:
         """Whether a run drifts off with the noise of the force that drives or corrects it."""
-        return (self.is_forced(drive) or self.noise.walk > 0.0) and self.noise.F > 0.0
+        return (self.is_forced(drive) or self.noise.random_walk > 0.0) and self.noise.F > 0.0
 
     @property
     def by_motor(self) -> bool:
         """Whether its force is that of a motor's command, not one that is measured."""
-        return self.held and not self.log.held
+        return self.zoh and not self.log.zoh
 
     @cached_property
     def position_sd(self) -> Array:
@@ -115,7 +115,7 @@ class MotionLog:
         that is no hold, which changes between its samples, at rest alone."""
         F = np.asarray(self.log["F"])
         if not self.by_motor:
-            smooth = self.held or self.signals["d"] == 0.0
+            smooth = self.zoh or self.signals["d"] == 0.0
             F = np.where(smooth, smooth_stretches(F, self.noise.F), F)
         return self.log.with_signals(F=F + self.kinks)
 
@@ -132,7 +132,7 @@ def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float =
     y = one.log["y"] if y is None else y
     speed = w.first @ y
     X = np.column_stack([w.second @ y, 1.0 * up, -1.0 * ~up, speed * up, speed * ~up])
-    b = (w.held if one.held else w.mean) @ one.log["F"]
+    b = (w.zoh if one.zoh else w.mean) @ one.log["F"]
     if k1 != 0.0:
         impulse = k1 * integral(one.log["u"], one.log.h)
         b = b + w.kinked @ impulse - w.mean @ impulse
@@ -165,8 +165,8 @@ def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | No
     X = np.column_stack([w.first @ reached, -(w.first @ y), np.ones(len(w.start))])
     _, first, *_ = weights(w.length, one.log.h)
     white = one.noise.F**2 + (theta[1] * one.position_sd[w.middle]) ** 2
-    walked = one.noise.walk**2 * noise_gain(np.cumsum(first))
-    sd = np.sqrt(white * noise_gain(first) + walked)
+    random_walk_variance = one.noise.random_walk**2 * noise_gain(np.cumsum(first))
+    sd = np.sqrt(white * noise_gain(first) + random_walk_variance)
     # A force that stands at its sensor's end shows no noise, and no row is without.
     sd = np.where(sd > 0.0, sd, OF_FORCE * float(np.std(one.log["F"])))
     r = len(w.start)

@@ -78,13 +78,13 @@ class LaggedRows:
 
 
 def lagged_rows(
-    moved: Sequence[MotionLog], lags: Array, turns: bool, held: bool,
+    moved: Sequence[MotionLog], lags: Array, turns: bool, zoh: bool,
     known: Surroundings = NO_SURROUNDINGS,
 ) -> LaggedRows | None:  # fmt: skip
     """The equation's rows at every lag, by blocks of time; None where there are too few. Source:
     weak form, Messenger, Bortz, J. Comput. Phys. 443 (2021) 110525.
 
-    lags: in samples, ascending; held: the force's column is a zero-order hold.
+    lags: in samples, ascending; zoh: the force's column is a zero-order hold.
     """
     if not any(len(one.speed) for one in moved):
         return None
@@ -92,7 +92,7 @@ def lagged_rows(
     slow = slow_of_each_way(moved)
     for one in moved:
         w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
-        mean = w.held if held else w.mean
+        mean = w.zoh if zoh else w.mean
         at, F, y = np.arange(len(one.log)), np.asarray(one.log["F"]), np.asarray(one.log["y"])
         X = plain.X
         if turns:

@@ -39,7 +39,7 @@ LEAST_PART = 200  # samples in a part of a log
 BEFORE_MOTION = 0.5  # s before the body moves, with which a part of a log begins
 SURE_OF_DIRECTION = 5.0  # times the velocity's noise from which its sign is significant
 # Hz; a slow motion needs smoothing to stand out of its noise
-IMPOSED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)
+PRESCRIBED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)
 MOSTLY_KNOWN = 0.9  # of the samples of prescribed motion, whose direction is to be significant
 STILL_UNKNOWN = 0.8  # of the others, at most, that more smoothing may leave: a body may rest
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
@@ -52,20 +52,20 @@ OFF_ITS_ROW = 8  # samples, to either side, by which a motor's force may act off
 
 
 def motion_log(
-    log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False,
+    log: Log, *, zoh: bool, by_command: bool, rotary: bool = False, prescribed: bool = False,
     between: float | None = 0.0,
 ) -> MotionLog:  # fmt: skip
     """A log with its motion and windows.
 
-    held: the force is a zero-order hold, as the log itself may say; imposed: by a rig; the motion
+    zoh: the force is a zero-order hold, as the log itself may say; prescribed: by a rig; the motion
     is then smoothed until most of it has a significant direction. between [N]: noise of the force
-    beside what the log shows of it, None of a held force that has none. Source of the windows: weak
-    form, Messenger, Bortz (2021).
+    beside what the log shows of it, None of a zero-order hold that has none. Source of the windows:
+    weak form, Messenger, Bortz (2021).
     """
-    h, held = log.h, held or log.held
+    h, zoh = log.h, zoh or log.zoh
     motion = differentiate(log["y"], h)
     d = _direction(motion)
-    for cutoff in IMPOSED_CUTOFFS if imposed else ():
+    for cutoff in PRESCRIBED_CUTOFFS if prescribed else ():
         if np.mean(d != 0) >= MOSTLY_KNOWN:
             break
         smooth = differentiate(log["y"], h, min(cutoff, motion.cutoff))
@@ -89,10 +89,10 @@ def motion_log(
     }  # fmt: skip
     up, slowest = d[sliding.middle] > 0, np.min(view[sliding.start], axis=1)
     whole = all_windows(len(log), length, h) if by_command else None
-    noise = _of_sensors(log, motion, held, between)
-    beyond = np.zeros(len(log)) if held else kinks(np.asarray(log["F"]), noise.F)
+    noise = _of_sensors(log, motion, zoh, between)
+    beyond = np.zeros(len(log)) if zoh else kinks(np.asarray(log["F"]), noise.F)
     one = MotionLog(
-        log, signals, sliding, up, slowest, whole, noise, held, beyond, rotary, imposed
+        log, signals, sliding, up, slowest, whole, noise, zoh, beyond, rotary, prescribed
     )  # fmt: skip
     return replace(one, noise=_beside_the_equations(one, motion))
 
@@ -100,8 +100,8 @@ def motion_log(
 def again(one: MotionLog, log: Log) -> MotionLog:
     """The same of another log of this machine."""
     other = motion_log(
-        log, held=one.held, by_command=one.whole is not None, rotary=one.rotary,
-        imposed=one.imposed, between=one.noise.between,
+        log, zoh=one.zoh, by_command=one.whole is not None, rotary=one.rotary,
+        prescribed=one.prescribed, between=one.noise.between,
     )  # fmt: skip
     return replace(other, halt=one.halt)
 
@@ -118,7 +118,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
     return replace(part, noise=own, reference=one.reference)
 
 
-def _of_sensors(log: Log, motion: Motion, held: bool, between: float | None) -> LogNoise:
+def _of_sensors(log: Log, motion: Motion, zoh: bool, between: float | None) -> LogNoise:
     """The noise of a log as its signals by themselves show it."""
     quiet = local_noise(log["y"])
     # A position that stands for a fifth of its log to the last digit hides its noise there.
@@ -126,9 +126,9 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float | None) -> 
     unsteady = position_noise(log["y"], motion.v)
     y = y if unsteady is None else unsteady.at_rest
     y = max(y, EXACT_SHARE * float(np.ptp(log["y"])))
-    if held and between is None:
+    if zoh and between is None:
         F = 0.0
-    elif held:
+    elif zoh:
         unlogged = 0.0 if log.lost is None else noise_of_lost_rows(log["F"], log.lost)
         F = float(np.linalg.norm([_beside_control(log), between or 0.0, unlogged]))
     else:
@@ -139,17 +139,17 @@ def _of_sensors(log: Log, motion: Motion, held: bool, between: float | None) -> 
 def _beside_the_equations(one: MotionLog, motion: Motion) -> LogNoise:
     """The noise of a log, that of its force no more than the equations leave of it."""
     noise, log = one.noise, one.log
-    if one.held:
+    if one.zoh:
         return replace(noise, F=min(noise.F, _left_of_force(one)))
     F = min(noise.F, max(_left_of_force(one), rounding_of_force(log)))
     if one.whole is None:
         return replace(noise, F=F)
     F = min(F, _unexplained(one))
     of_command = integral(one.signals["u"], log.h)
-    walk = force_random_walk(log["F"], motion.y, of_command, log.h, 1.0 / motion.cutoff)
+    random_walk = force_random_walk(log["F"], motion.y, of_command, log.h, 1.0 / motion.cutoff)
     # A random walk's steps are in the third differences by which the sensor's noise was seen.
-    F = float(np.sqrt(max(F**2 - OF_DRIFT * walk**2, LEAST_PART_OF_NOISE * F**2)))
-    return replace(noise, F=F, walk=walk)
+    F = float(np.sqrt(max(F**2 - OF_DRIFT * random_walk**2, LEAST_PART_OF_NOISE * F**2)))
+    return replace(noise, F=F, random_walk=random_walk)
 
 
 def _direction(motion: Motion) -> Array:
@@ -201,7 +201,7 @@ def _left_of_force(one: MotionLog) -> float:
     where the equation surely holds. Of a chi-square; ours.
     """
     X = mechanical(one, NOTHING_KNOWN).X
-    slowest = 0.0 if one.held or not len(X) else float(np.quantile(one.speed, SLOWEST_PART))
+    slowest = 0.0 if one.zoh or not len(X) else float(np.quantile(one.speed, SLOWEST_PART))
     fast = one.speed >= slowest
     X = X[fast]
     free = int((X.shape[0] - X.shape[1]) / OVERLAP)
@@ -209,7 +209,7 @@ def _left_of_force(one: MotionLog) -> float:
         return np.inf
     F, at = np.asarray(one.log["F"]), np.arange(len(one.log))
     lags = range(-OFF_ITS_ROW, OFF_ITS_ROW + 1)
-    mean_of = one.sliding.held if one.held else one.sliding.mean
+    mean_of = one.sliding.zoh if one.zoh else one.sliding.mean
     rows = [(mean_of @ np.interp(at - lag, at, F))[fast] for lag in lags]
     square = min(float(np.sum((b - X @ least_squares(X, b)) ** 2)) for b in rows) / OVERLAP
     mean = weights(one.sliding.length, one.log.h)[0]

@@ -88,7 +88,7 @@ def rows_and_windows(
     return next(one.made for one in fits if one.share <= enough)
 
 
-def settled_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[MotionRows]:
+def converged_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[MotionRows]:
     """The same, their noise that of the mass and damping that they show themselves.
 
     Source: iterated weighted least squares (Aitken 1936).
@@ -151,7 +151,7 @@ def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = Fa
     if gravity:
         X = np.column_stack([X, w.mean @ np.sin(y), w.mean @ np.cos(y)])
         names = (*FIVE, "a", "b")
-    b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
+    b = (w.zoh if one.zoh else w.mean) @ np.asarray(one.log["F"])
     sd = sliding_sd(one, w, over > 0.0, theta)
     return MotionRows(Rows(b, X, sd, blocks_of(w, n), np.abs(over), names), w, v)
 

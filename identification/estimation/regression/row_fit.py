@@ -69,7 +69,7 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     if not np.any(np.isfinite(rows.speed)):
         fit = solve_rows(rows)
         return RowFit(rows, fit, fit.cost / scale + rows.lost, 0.0)
-    edges = np.quantile(rows.speed, TRIMS[:1] if stage.imposed else TRIMS)
+    edges = np.quantile(rows.speed, TRIMS[:1] if stage.prescribed else TRIMS)
     if stage.band > 0.0:  # above it the body slides, whatever would be left out better
         edges = np.unique([edges[0], *edges[edges < stage.band], max(stage.band, edges[0])])
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
@@ -88,7 +88,7 @@ def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     total, theta = totals[best], thetas[best] * size[-1] / size[:-1]
     residual = A[:, -1] - A[:, :-1] @ theta
     fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
-    return RowFit(rows, fit, float(total), 0.0 if stage.imposed else float(edges[best]))
+    return RowFit(rows, fit, float(total), 0.0 if stage.prescribed else float(edges[best]))
 
 
 def _robust(r: Array, scale: float) -> float:
@@ -138,7 +138,7 @@ def base_fits(stage: EffectRows, equations: Sequence[str] = EQUATIONS) -> dict[s
     }
 
 
-def settled_fits(
+def converged_fits(
     stage: EffectRows, equations: Sequence[str] = EQUATIONS
 ) -> tuple[EffectRows, dict[str, RowFit]]:
     """The stage with its parameters fitted (rows' noise depends on them), and the outcomes of these
@@ -159,7 +159,7 @@ def first_stage(
 ) -> tuple[EffectRows, dict[str, RowFit]]:
     """The model without effects, and the outcomes of these equations."""
     first = NOTHING_KNOWN, np.array([0.0, 0.0, 0.0])
-    return settled_fits(EffectRows(tuple(logs), *first, by_command), equations)
+    return converged_fits(EffectRows(tuple(logs), *first, by_command), equations)
 
 
 def mean_square(o: RowFit) -> float:

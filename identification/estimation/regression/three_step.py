@@ -68,7 +68,7 @@ def first_estimate(one: MotionLog) -> FirstEstimate:
     )
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
     # A motor's force has no ramps that would show a narrow band: do not search one.
-    narrow = fastest / (500 if one.held else 3000)
+    narrow = fastest / (500 if one.zoh else 3000)
     low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
     steepest = 2 * max(viscous_p, viscous_n, 0.1 * scale / fastest)
     high = np.array(

@@ -21,7 +21,7 @@ from identification.simulation.karnopp_lanes import (
     WIDTH,
     march,
     march_corrected,
-    march_held,
+    march_forced,
     place,
     prepare_lanes,
     work_space,
@@ -36,8 +36,8 @@ START_STATES = 3  # of a window: y, v, F
 class LikelyLog:
     """A log in windows as the kernel takes it: what drives plants along it, and what compares them.
 
-    h [s]; u [V], force [N] and its slope [N/s] (n,); held: the force drives, else the command; then
-    the run's force is corrected by `gain` of its distance to the measured one. at (k,), begun
+    h [s]; u [V], force [N] and its slope [N/s] (n,); forced: the force drives, else the command;
+    then the run's force is corrected by `gain` of its distance to the measured one. at (k,), begun
     (3, k): where windows begin. seen (2, n): position [m], force [N]; weight (2, n): of a distance
     to these, 0 where it does not count. B (3, 2, n), inverse (k, 3, 3): as in `windows.Freed`;
     errors and B are in parts of `far`, from which an error counts less.
@@ -47,7 +47,7 @@ class LikelyLog:
     u: Array
     force: Array
     slope: Array
-    held: bool
+    forced: bool
     gain: float
     at: IntArray
     begun: Array
@@ -62,13 +62,13 @@ class LikelyLog:
         cls, plant: Plant, one: MotionLog, drive: Drive, own: Freed, far: float = ROBUST_FROM
     ) -> "LikelyLog":
         """Of plants with this one's drive, in the windows of `own`."""
-        log, held = driven_by(one, drive), one.is_forced(drive)
+        log, forced = driven_by(one, drive), one.is_forced(drive)
         u = np.array(log["u"]) if "u" in log else np.zeros(len(log))
         force = np.array(log["F"])
         if isinstance(plant.actuator, Motor):
             force = plant.actuator.k_a * u
         states = np.array([own.begun.y, own.begun.v, own.begun.F])
-        if held:
+        if forced:
             states[2] = force[own.begun.at]
         signals, share, sd = compared(one, drive)
         rows, seen = len(signals), np.zeros((2, len(log)))
@@ -76,8 +76,8 @@ class LikelyLog:
         seen[:rows], B[:, :rows] = signals, own.B / far
         weight[:rows] = own.weight * (share / sd / far)[:, np.newaxis]
         return cls(
-            log.h, u, force, force_slope(force, log.h, hold=one.held or not held), held,
-            0.0 if held else one.noise.corrected, own.begun.at, states, seen, weight, B,
+            log.h, u, force, force_slope(force, log.h, hold=one.zoh or not forced), forced,
+            0.0 if forced else one.noise.corrected, own.begun.at, states, seen, weight, B,
             own.inverse, far,
         )  # fmt: skip
 
@@ -95,7 +95,7 @@ class LikelyLog:
     def _squares(self, p: Array, out: Array) -> Array:
         square = np.zeros(WIDTH)
         square_kernel(
-            p, self.h, self.u, self.force, self.slope, self.held, self.gain, self.at, self.begun,
+            p, self.h, self.u, self.force, self.slope, self.forced, self.gain, self.at, self.begun,
             self.seen, self.weight, self.B, self.inverse, self.far, out, square,
         )  # fmt: skip
         return np.where(np.isfinite(square), square, np.inf)
@@ -103,7 +103,7 @@ class LikelyLog:
 
 @compiled
 def square_kernel(
-    p: Array, h: float, u: Array, force: Array, slope: Array, held: bool, gain: float,
+    p: Array, h: float, u: Array, force: Array, slope: Array, forced: bool, gain: float,
     at: IntArray, begun: Array, seen: Array, weight: Array, B: Array, inverse: Array, far: float,
     out: Array, square: Array,
 ) -> None:  # fmt: skip
@@ -128,8 +128,8 @@ def square_kernel(
         for low in range(first, end, SAMPLES_TOGETHER):
             high = min(low + SAMPLES_TOGETHER, end)
             part, driving = out[low - begins : high - begins], force[low:high]
-            if len(p) > 0 and held:  # nothing draws it to the log: k2 is 0
-                march_held(
+            if len(p) > 0 and forced:  # nothing draws it to the log: k2 is 0
+                march_forced(
                     p, tables, s, modes, seen[0, low:high], driving, slope[low:high],
                     slope[low:high], h, part,
                 )  # fmt: skip

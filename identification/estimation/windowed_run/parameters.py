@@ -95,7 +95,7 @@ def even(plant: Plant) -> dict[str, float]:
         f"{a.key}.{p.name}": 0.0
         for a in plant.effects
         for p, value in zip(a.effect.params, a.p, strict=True)
-        if p.held(value)
+        if p.at_default(value)
     }
 
 
@@ -109,6 +109,6 @@ def on_bristle(plant: Plant) -> bool:
     return any(acting.effect.place.elastic for acting in plant.effects)
 
 
-def loose(plant: Plant, drive: Drive) -> bool:
+def is_unanchored(plant: Plant, drive: Drive) -> bool:
     """Whether a force drives it and nothing brings its position back to the log's."""
     return drive == "force" or plant_is_motor(plant)

@@ -242,7 +242,7 @@ def refit(
         inside, size = unknowns.off_bounds(at)
         # Where what is left is no noise, a window counts as one sample.
         factor = RUN_WINDOW / logs[0].log.h if found > ADEQUATE else 1.0
-        drifts, noise = any(one.walks(drive) for one in logs), None
+        drifts, noise = any(one.has_random_walk(drive) for one in logs), None
         if drifts and found <= COMPLETE:
             noise = _noise(unknowns.plant_at(at.x), logs, drive)
         cluster = _windows(logs, drive) if drifts else None
@@ -317,15 +317,15 @@ def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, floa
 def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     """The plant refined from far off, through windows that grow, with directions that may be
     unequal. Ours: `README.md`, (7)."""
-    held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
+    fixed = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     part = [shortened(one, PIECE) for one in logs]
-    unknowns = _Unknowns.of(plant, part, drive, held, REFIT_STEPS, PASSING)
+    unknowns = _Unknowns.of(plant, part, drive, fixed, REFIT_STEPS, PASSING)
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:
             for _ in range(GONE_THROUGH):
                 x = unknowns.descended(x, max(seconds, shortest))
-        return refit(unknowns.plant_at(x), logs, drive, prior=held, effort="near")
+        return refit(unknowns.plant_at(x), logs, drive, prior=fixed, effort="near")
     except Halted:
         raise HaltedRefit(unknowns.plant_at(x)) from None
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.windowed_run.parameters import loose
+from identification.estimation.windowed_run.parameters import is_unanchored
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     WHOLE,
@@ -61,7 +61,7 @@ def _lost(plant: Plant, one: MotionLog, drive: Drive, own: Freed | None) -> Bool
     """Samples (n,) of the windows that the plant loses by chance, as far as `misfit` excludes
     them."""
     out = np.zeros(len(one.log), dtype=np.bool_)
-    r = window_residual(plant, one, drive, own) if loose(plant, drive) and own else None
+    r = window_residual(plant, one, drive, own) if is_unanchored(plant, drive) and own else None
     if own is None or r is None or not np.all(np.isfinite(r)):
         return out
     window = window_of(own.begun, len(one.log))
@@ -98,10 +98,10 @@ def misfit(
     (4).
     """
     worst = 0.0
-    free = loose(plant, drive) and not every
+    free = is_unanchored(plant, drive) and not every
     for one in logs:
         least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
-        whole = drive == "command" and not one.walks(drive)
+        whole = drive == "command" and not one.has_random_walk(drive)
         for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
             r = left_in_windows(plant, one, drive, seconds, weighed_by=weighed_by)
             if r is not None:

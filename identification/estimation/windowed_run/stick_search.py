@@ -103,8 +103,8 @@ def nearest_limits(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Pla
 def stick_ranges(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, independent: int
 ) -> dict[str, tuple[float, float]]:
-    """95 % ranges [N] of F_sp and F_sn under a held force, by the cost of runs in windows of so
-    many seconds, at the best of a few bands; independent: how many errors are.
+    """95 % ranges [N] of F_sp and F_sn under a zero-order-hold force, by the cost of runs in
+    windows of so many seconds, at the best of a few bands; independent: how many errors are.
 
     Between two steps of such a force a limit changes nothing, so that no derivative of the run
     says how well it is known. Source: profile likelihood, Venzon, Moolgavkar, Appl. Stat. 37 (1988)

@@ -241,7 +241,7 @@ def _weights(
     what a jittering clock shows of it is uncertain in fast motion.
     """
     square = np.zeros(r.shape)
-    if one.walks(drive):
+    if one.has_random_walk(drive):
         square[0] = _least_drift(plant, one, drive, begun, base)
     square[0] += (one.noise.jitter * one.signals["v"] / one.noise.y) ** 2
     return np.asarray(1.0 / np.sqrt(1.0 + square))
@@ -280,7 +280,7 @@ def _noisier(plant: Plant, one: MotionLog, drive: Drive, rng: np.random.Generato
     if isinstance(plant.actuator, Motor):
         more["u"] = own["u"] + noise / plant.actuator.k_a
     elif drive == "command" and isinstance(plant.actuator, Actuator):
-        step = one.noise.walk / (plant.actuator.k1 * one.log.h)
+        step = one.noise.random_walk / (plant.actuator.k1 * one.log.h)
         more["u"] = own["u"] + step * rng.standard_normal(len(one.log))
     return own.with_signals(**more)
 
@@ -307,7 +307,7 @@ def noise_errors(
 def longest_window(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float:
     """Windows [s] in which a run of the plant may be followed in the end: as long as the log where
     an exact command drives it, a motor's shorter; RUN_WINDOW where it drifts, or errs by itself."""
-    if drive == "force" or on_bristle(plant) or any(one.walks(drive) for one in logs):
+    if drive == "force" or on_bristle(plant) or any(one.has_random_walk(drive) for one in logs):
         return RUN_WINDOW
     return MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
 

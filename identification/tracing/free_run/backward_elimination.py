@@ -73,11 +73,11 @@ def fitted(choice: Choice, setting: Setting) -> FittedStructure:
 
 def _model(choice: Choice, setting: Setting) -> FittedStructure:
     plain = setting.plain.model
-    near = None if plain.imposed else plain.plant.friction
+    near = None if plain.prescribed else plain.plant.friction
     model = fitted_structure(
         choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
     )  # fmt: skip
-    if setting.halt.reached() and not model.imposed:
+    if setting.halt.reached() and not model.prescribed:
         keys = ", ".join(step.candidate.effect.key for step in choice.steps)
         setting.halt.left_out(f"the refinement of {keys} on the free run, to its end")
     return model
@@ -87,7 +87,7 @@ def with_band(choice: Choice, setting: Setting) -> Choice:
     """The choice beside the band of its run, above which its equations are to hold, where these do
     beside any and the run is followed."""
     model = _of_explained(choice, setting)
-    if model is None or model.imposed or model.misfit > ASTRAY:
+    if model is None or model.prescribed or model.misfit > ASTRAY:
         return choice
     end = replace(choice.end, band=band(model))
     return replace(choice, end=end, base=base_fits(end))
@@ -98,7 +98,7 @@ def suffices(choice: Choice, setting: Setting) -> bool:
     model = _of_explained(choice, setting)
     if model is None:
         return False
-    return model.imposed or model.misfit <= followed_up_to(choice, setting, False)
+    return model.prescribed or model.misfit <= followed_up_to(choice, setting, False)
 
 
 def _of_explained(choice: Choice, setting: Setting) -> FittedStructure | None:
@@ -119,7 +119,7 @@ def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:
         if not whole and not equations_explained(choice.steps[n].base):
             continue
         model = fitted(part, setting)
-        if model.imposed or model.misfit <= followed_up_to(part, setting, whole):
+        if model.prescribed or model.misfit <= followed_up_to(part, setting, whole):
             return part, model
         if model.misfit < earned(least):
             best, least = (part, model), model.misfit

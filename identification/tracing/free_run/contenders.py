@@ -8,7 +8,7 @@ import numpy as np
 from identification.effects._base import MAX_SIGNALS, Acting, Effect
 from identification.errors import UserError
 from identification.estimation.regression.effect_columns import LEAST_LEFT_BY_LOAD
-from identification.estimation.windowed_run.parameters import even, loose, on_bristle
+from identification.estimation.windowed_run.parameters import even, is_unanchored, on_bristle
 from identification.estimation.windowed_run.refinement import Refit, descended, refit
 from identification.estimation.windowed_run.run_errors import judge, loss
 from identification.estimation.windowed_run.stick_search import start_band, stick_search
@@ -40,7 +40,7 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
     """The effect from the best of its starts, refined a little on the short logs; None where no
     plant can have it there."""
     plants = []
-    if trial.effect.place.elastic and loose(trial.base, setting.drive):
+    if trial.effect.place.elastic and is_unanchored(trial.base, setting.drive):
         trial = replace(trial, base=_that_sticks(trial.base))
     for values in trial.values:
         try:
@@ -70,7 +70,7 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:
-    """Share of the applied force that friction by load leaves to the motion."""
+    """Share of the applied force that load-dependent friction leaves to the motion."""
     none = np.zeros(MAX_SIGNALS)
     level = friction.F_cp
     taken = acting.effect.value(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, level, level, none, acting.array)
@@ -78,7 +78,8 @@ def load_share(friction: Karnopp, acting: Acting) -> float:
 
 
 def less_load(base: Plant, acting: Acting) -> Plant:
-    """The plant with what friction by load takes of the force taken off its own parameters."""
+    """The plant with what load-dependent friction takes of the force taken off its own
+    parameters."""
     nine = base.friction.array.copy()
     nine[SCALED] *= load_share(base.friction, acting)
     return replace(base, friction=Karnopp.from_array(nine))
@@ -92,7 +93,7 @@ def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
 
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
-    if loose(plant, setting.drive):
+    if is_unanchored(plant, setting.drive):
         if on_bristle(plant):
             return _stops_searched(plant, setting)
         return descended(plant, setting.short, setting.drive).plant
@@ -120,7 +121,7 @@ def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     logs, drive = setting.logs, setting.drive
     found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
-    if found.misfit > COMPLETE and on_bristle(found.plant) and loose(found.plant, drive):
+    if found.misfit > COMPLETE and on_bristle(found.plant) and is_unanchored(found.plant, drive):
         # Of the right stiffness it follows most, and may have lost a limit on its way there.
         searched = _stops_searched(found.plant, setting)
         again = refit(searched, logs, drive, prior=even(searched), effort="near")

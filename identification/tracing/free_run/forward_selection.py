@@ -1,8 +1,8 @@
 """Effects judged in the forward run, where the equations do not show them or take one for another.
 
-Play, delay, elastic micro-motion, stiction that grows, friction by load: they change where and when
-the body starts and stops more than any mean over a window of sliding. Each is tried in the free
-run, beside what was found and in its place; it is taken only if the run then leaves next to
+Play, delay, elastic micro-motion, stiction that grows, load-dependent friction: they change where
+and when the body starts and stops more than any mean over a window of sliding. Each is tried in the
+free run, beside what was found and in its place; it is taken only if the run then leaves next to
 nothing but noise, so a term that merely helps is never taken here.
 """
 
@@ -16,7 +16,7 @@ from identification.estimation.regression.effect_columns import equations_of
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.parameters import loose, on_bristle
+from identification.estimation.windowed_run.parameters import is_unanchored, on_bristle
 from identification.estimation.windowed_run.refinement import Refit
 from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
@@ -46,7 +46,7 @@ def judged_forward(
 ) -> tuple[Choice, FittedStructure]:
     """The choice and its model, with what the free run adds or exchanges."""
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
-    if model.imposed or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
+    if model.prescribed or (on_bristle(model.plant) and is_unanchored(model.plant, setting.drive)):
         return choice, model
     if model.misfit <= enough(setting, choice.steps):
         return choice, model
@@ -127,11 +127,11 @@ def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> Mot
 def _from_equations(winner: RunContender, done: Refit, setting: Setting) -> Refit | FittedStructure:
     """The winner as refined, or from what the equations make of the body beside its effect, if that
     is followed better: the plain plant's numbers are bent to do without it."""
-    if done.misfit <= COMPLETE or not loose(winner.plant, setting.drive):
+    if done.misfit <= COMPLETE or not is_unanchored(winner.plant, setting.drive):
         return done
     choice, _ = _taken(winner, done, (), setting, setting.plain.model.misfit)
     again = fitted(choice, setting)
-    return again if not again.imposed and again.misfit < done.misfit else done
+    return again if not again.prescribed and again.misfit < done.misfit else done
 
 
 def _taken(
@@ -146,21 +146,25 @@ def _taken(
     def candidate(one: RunContender) -> EffectCandidate:
         """A contender as the equations see it; what a run leaves counts as one sample a second."""
         values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
-        told = [e for e in equations_of(one.effect, stage.by_command, stage.by_motor) if e in base]
+        equations = [
+            e for e in equations_of(one.effect, stage.by_command, stage.by_motor) if e in base
+        ]
         gain = seconds * (before - one.misfit)
-        return EffectCandidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
+        return EffectCandidate(
+            one.effect, values, trial(stage, one.effect, values, equations)[1], gain
+        )
 
     mine = candidate(replace(winner, plant=done.plant, misfit=done.misfit))
     others = sorted(map(candidate, rivals), key=lambda c: -c.gain)
     explained = 1.0 - max(done.misfit - 1.0, 0.0) / max(before - 1.0, 1e-300)
-    p_value = luck(mine, len(plain.library))
+    p_value = corrected_p_value(mine, len(plain.library))
     step = Step(mine, p_value, tuple(others), stage, base, explained)
     end, last = with_candidate(stage, mine)
     choice = Choice(plain.start, plain.first, (*winner.steps, step), end, last)
     return choice, FittedStructure(end, last, done.plant, done.sd, False, done.misfit)
 
 
-def luck(candidate: EffectCandidate, tried: int) -> float:
+def corrected_p_value(candidate: EffectCandidate, tried: int) -> float:
     """Chance that any of so many effects gains as much."""
     free = len(candidate.effect.params)
     return float(min(1.0, tried * chi2.sf(max(candidate.gain, 0.0), free)))

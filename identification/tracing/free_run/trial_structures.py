@@ -13,7 +13,7 @@ from identification.estimation.regression.effect_columns import slow_motion
 from identification.estimation.regression.equation_rows import REST, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.parameters import loose
+from identification.estimation.windowed_run.parameters import is_unanchored
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without
 from identification.tracing.regression.candidates import EffectCandidate
@@ -59,7 +59,7 @@ def _beside(
     regressed = {one.effect.key: one for one in tried}
     ranked = sorted(tried, key=lambda one: -one.gain)
     shown = {one.effect.key for one in ranked[: RIVALS_TRIED if instead else 0]}
-    free = loose(base, setting.drive)
+    free = is_unanchored(base, setting.drive)
     for key, effect in setting.plain.library.items():
         if key in keys or key in ABSORBED:
             continue

@@ -78,7 +78,8 @@ class FirstShape:
 
     @property
     def by_rounds(self) -> bool:
-        """Whether what it does depends on the friction itself, so that this tells little yet."""
+        """Whether what it does depends on the friction itself, so that this is hardly informative
+        yet."""
         return needs_rounds(self.effect)
 
     def score(self, shape: Values) -> float:

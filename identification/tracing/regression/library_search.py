@@ -36,8 +36,8 @@ def at_own_scale(
         return found
     slow = {key: effect for key, effect in library.items() if slow_motion(effect)}
     again = all_candidates(scaled, base_fits(scaled), slow, lambda part: report(0.5 + 0.5 * part))
-    told = {one.effect.key for one in again}
-    return [*again, *(one for one in found if one.effect.key not in told)]
+    known = {one.effect.key for one in again}
+    return [*again, *(one for one in found if one.effect.key not in known)]
 
 
 def all_candidates(

@@ -59,7 +59,7 @@ def chance(
     return float((1 + np.sum(TWICE * largest >= best.gain)) / (DRAWS + 1))
 
 
-def by_luck(p_value: float) -> bool:
+def is_chance(p_value: float) -> bool:
     """Whether a gain of this probability where no effect is missing may be chance."""
     return p_value > CHANCE_LEVEL
 

@@ -22,8 +22,8 @@ from identification.estimation.regression.motion_log import again
 from identification.estimation.regression.row_fit import (
     RowFit,
     base_fits,
+    converged_fits,
     row_fit,
-    settled_fits,
 )
 from identification.estimation.regression.signals_behind_effects import (
     command_of,
@@ -37,7 +37,7 @@ from identification.tracing.regression.candidates import (
     EffectCandidate,
 )
 from identification.tracing.regression.library_search import at_own_scale, of_sliding, scales_of
-from identification.tracing.regression.significance import by_luck, chance
+from identification.tracing.regression.significance import chance, is_chance
 
 MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
@@ -136,7 +136,7 @@ def next_step(
     best = worth[0]
     ranked = [best, *(c for c in ranked if c is not best)]
     p_value = chance(best, ranked, scaled, base, rng)
-    if by_luck(p_value) or merit(best) <= 0:
+    if is_chance(p_value) or merit(best) <= 0:
         return None
     return Step(best, p_value, tuple(ranked[1:]), scaled, base)
 
@@ -151,7 +151,7 @@ def merit(candidate: EffectCandidate) -> float:
 
 
 def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
-    """Rivals that explain as much as the effect taken, but for luck."""
+    """Rivals that explain as much as the effect taken, but for chance."""
     mine = merit(step.candidate)
     return tuple(
         c for c in step.rivals if mine - merit(c) < PENALTY and share(c, step.base) >= 1.0 - EARNS
@@ -242,7 +242,7 @@ def with_candidate(
 ) -> tuple[EffectRows, dict[str, RowFit]]:
     """The stage with the effect in it, fitted, and what it leaves; sliding at the stage's scale, or
     the rows in which the effect is might be left out again."""
-    return settled_fits(of_sliding(absorb(stage, candidate), stage.scale(MECHANICAL)))
+    return converged_fits(of_sliding(absorb(stage, candidate), stage.scale(MECHANICAL)))
 
 
 def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
@@ -257,7 +257,7 @@ def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
             log = one.log.with_signals(y=shown_to_true(effect, values, one, stage.friction))
         else:
             whole = reached(effect, values, one, stage.friction)
-            more = {"F": driven(one, whole)} if one.held else {}
+            more = {"F": driven(one, whole)} if one.zoh else {}
             log = one.log.with_signals(u=command_of(one, whole), **more)
         logs.append(again(one, log))
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key))

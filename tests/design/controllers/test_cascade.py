@@ -61,8 +61,8 @@ def test_a_notch_is_proposed_on_two_masses_and_holds_on_all_of_them() -> None:
     assert one.series is not None and one.missed == ()
     assert one.margins.modulus >= 0.5 and (one.margins.worst_modulus or 0.0) >= 0.499
     assert len(found.plant.A) > 4  # the margins are those of two masses
-    told = " ".join(found.remarks)
-    assert "two masses with a resonance at 60 Hz" in told and one.series.kind in told
+    remark_text = " ".join(found.remarks)
+    assert "two masses with a resonance at 60 Hz" in remark_text and one.series.kind in remark_text
     assert any("Kv = " in line and "m/min/mm" in line for line in cascade_lines(found))
     assert "V s/m" in cascade_lines(found)[0]
     before, after = bode_chart(found).panels[0].lines
@@ -125,10 +125,10 @@ def test_the_plant_of_a_resonance_is_that_of_two_masses() -> None:
 
 
 def test_a_lag_that_no_log_would_have_shown_is_held_off() -> None:
-    told = plain()
-    motor, force = replace(told, effects={}), replace(told, effects={}, actuator=None)
+    remark_text = plain()
+    motor, force = replace(remark_text, effects={}), replace(remark_text, effects={}, actuator=None)
     force = replace(force, rig=replace(force.rig, kind="force"))
-    assert unseen_lag(told) == 0.0
+    assert unseen_lag(remark_text) == 0.0
     assert unseen_lag(motor) == pytest.approx(0.4 * motor.period)
     assert unseen_lag(force) == pytest.approx(0.4 * force.period + 1e-3)
     slow = replace(motor, log=(replace(motor.log[0], h=8e-3),))

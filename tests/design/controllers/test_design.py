@@ -159,7 +159,7 @@ def test_validation_judges_overshoot() -> None:
     assert one.settling > 0.2
 
 
-def test_inertia_is_told_beside_the_motors() -> None:
+def test_inertia_is_reported_beside_the_motors() -> None:
     model = model_of(TABLES["paper_table1"], k_a=20.0)
     with_motor = replace(model, rig=replace(model.rig, motor_inertia=0.25))
     said = [line for line in designed(with_motor, SLOW).remarks if line.startswith("inertia")]

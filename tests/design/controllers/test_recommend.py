@@ -134,16 +134,16 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     assert result.why.startswith(found.recommended.upper())
 
 
-def test_a_design_that_recommends_nothing_is_told_as_such() -> None:
+def test_a_design_that_recommends_nothing_is_reported_as_such() -> None:
     model, found = motor()
     none = with_choice(model, found, Recommendation("none", False, "staircase of 3 mm"))
-    told, _ = validate(model, none, np.random.default_rng(0))
-    assert told.remarks[0] == (
+    validated, _ = validate(model, none, np.random.default_rng(0))
+    assert validated.remarks[0] == (
         "the design recommends no controller (staircase of 3 mm); its RST is shown"
     )
 
 
-def test_a_present_controller_that_cannot_be_simulated_is_told() -> None:
+def test_a_present_controller_that_cannot_be_simulated_is_reported() -> None:
     model, found = motor()
     unknown = replace(model, actuator=None, rig=replace(model.rig, kind="force"))
     result, _ = validate(unknown, found, np.random.default_rng(0))
@@ -164,7 +164,7 @@ def test_its_margins_are_those_of_its_own_period() -> None:
     assert margin.delay_s / margin.delay_samples == pytest.approx(model.period)
 
 
-def test_a_command_at_its_limit_is_told_with_force_and_time() -> None:
+def test_a_command_at_its_limit_is_reported_with_force_and_time() -> None:
     model, found = motor()
     tight = replace(model, rig=replace(model.rig, control_limit=3.0))
     result, _ = validate(tight, found, np.random.default_rng(0))

@@ -30,7 +30,7 @@ H = 1e-3
 T: Array = H * np.arange(10_000, dtype=np.float64)
 
 
-def held(y: Array) -> LoopRun:
+def around_target(y: Array) -> LoopRun:
     """A step to 0.1 m at the second sample, and the motion y around it."""
     r = np.full(len(y), 0.1)
     r[0] = 0.0
@@ -40,7 +40,7 @@ def held(y: Array) -> LoopRun:
 
 @pytest.mark.parametrize(("size", "period"), [(1e-3, 0.5), (2e-4, 1.3)])
 def test_a_motion_that_goes_on_is_a_limit_cycle(size: float, period: float) -> None:
-    found = limit_cycle(held(0.5 * size * np.sin(2 * np.pi * T / period)), 1e-5)
+    found = limit_cycle(around_target(0.5 * size * np.sin(2 * np.pi * T / period)), 1e-5)
     assert found is not None
     assert found.amplitude == pytest.approx(size, rel=1e-3)
     assert found.period == pytest.approx(period, rel=0.15)
@@ -48,24 +48,24 @@ def test_a_motion_that_goes_on_is_a_limit_cycle(size: float, period: float) -> N
 
 def test_stick_slip_is_a_limit_cycle() -> None:
     jumps = 1e-3 * (np.floor(T / 0.7) % 2)
-    found = limit_cycle(held(jumps), 1e-5)
+    found = limit_cycle(around_target(jumps), 1e-5)
     assert found is not None
     assert found.period == pytest.approx(1.4, rel=0.05)
 
 
 def test_a_motion_that_dies_is_none() -> None:
-    assert limit_cycle(held(1e-2 * np.exp(-T) * np.sin(20 * T)), 1e-5) is None
+    assert limit_cycle(around_target(1e-2 * np.exp(-T) * np.sin(20 * T)), 1e-5) is None
 
 
 def test_a_drift_and_a_rest_are_none() -> None:
-    assert limit_cycle(held(1e-3 * T), 1e-5) is None
-    assert limit_cycle(held(np.zeros(len(T))), 1e-5) is None
+    assert limit_cycle(around_target(1e-3 * T), 1e-5) is None
+    assert limit_cycle(around_target(np.zeros(len(T))), 1e-5) is None
 
 
 def test_motion_within_the_noise_is_none() -> None:
     wave = 2e-5 * np.sin(20 * T)
-    assert limit_cycle(held(wave), 1e-5) is None
-    assert limit_cycle(held(wave), 1e-6) is not None
+    assert limit_cycle(around_target(wave), 1e-5) is None
+    assert limit_cycle(around_target(wave), 1e-6) is not None
 
 
 def test_the_worst_rest_is_the_last_half_after_the_step_that_leaves_most() -> None:
@@ -141,10 +141,8 @@ def test_what_design_says_of_a_loop_validate_says_too() -> None:
 def test_the_smooth_reference_does_not_depend_on_the_design() -> None:
     model, _ = seen()
     fast, slow = designed(model, period=5e-3), designed(model, Asked((8.0, 0.9)), period=5e-3)
-    (steps, smooth, _), (held_longer, same, _) = (
-        references(model, one, 5e-3) for one in (fast, slow)
-    )
-    assert np.array_equal(smooth, same) and len(held_longer) >= len(steps)
+    (steps, smooth, _), (longer, same, _) = (references(model, one, 5e-3) for one in (fast, slow))
+    assert np.array_equal(smooth, same) and len(longer) >= len(steps)
     quick = replace(model, log=(replace(model.log[0], speed=0.4),))
     moved = np.max(np.abs(np.diff(references(quick, fast, 5e-3)[1]))) / 5e-3
     assert moved == pytest.approx(0.1, rel=0.05)
@@ -172,7 +170,7 @@ def test_what_a_model_lacks_comes_first(changes: dict[str, Any], words: str) -> 
     assert json.loads(dumps(design_document(found)))["lacks"] == said[0]
 
 
-def test_a_model_that_no_free_run_follows_is_told_as_such() -> None:
+def test_a_model_that_no_free_run_follows_is_reported_as_such() -> None:
     model, _ = seen()
     log = replace(model.log[0], position_rms=None)
     alone = replace(model, fit=replace(model.fit, adequate=False, chi_square=1.0), log=(log,))

@@ -18,14 +18,14 @@ class Pair:
     others: tuple[int, ...]
 
 
-def test_two_parameters_each_told_by_a_segment_share_the_time() -> None:
+def test_two_parameters_each_identified_by_a_segment_share_the_time() -> None:
     matrices = np.array([np.diag([3.0, 1e-6]), np.diag([1e-6, 50.0])])
     found = d_optimal([matrices], ALL, np.array([1.0, 2.0]), 4.0)
     assert found.times @ [1.0, 2.0] == pytest.approx(4.0, rel=1e-4)
     assert found.times == pytest.approx([2.0, 1.0], rel=1e-3)  # half of the time each
 
 
-def test_where_one_is_asked_the_other_gets_what_it_needs_to_be_told_apart() -> None:
+def test_where_one_is_asked_the_other_gets_what_it_needs_to_be_distinguished() -> None:
     alone = np.array([np.diag([3.0, 1e-6]), np.diag([1e-6, 50.0])])
     found = d_optimal([alone], np.array([0]), np.array([1.0, 1.0]), 4.0)
     assert found.times[0] > 3.9
@@ -45,7 +45,7 @@ def test_no_whole_number_does_better() -> None:
     assert best >= max(whole) - 1e-4
 
 
-def test_rivals_are_told_apart_by_the_segment_in_which_they_differ() -> None:
+def test_rivals_are_distinguished_by_the_segment_in_which_they_differ() -> None:
     # Effects 1 and 2 beside parameter 0: alike in the first segment, apart in the second.
     same = np.array([[1.0, 2.0, 2.0], [1.0, 0.0, 0.0]])
     other = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]])

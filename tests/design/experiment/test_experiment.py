@@ -46,9 +46,9 @@ def controlled(spread: float = 5e-3) -> Model:
     return replace(model, controller=own, log=(entry,), fit=replace(model.fit, noise_F=0.0))
 
 
-def after(looks: int) -> KeepGoing:
+def after(evaluations: int) -> KeepGoing:
     """A search that is ended after it has asked so often."""
-    left = [looks]
+    left = [evaluations]
 
     def keep_going() -> bool:
         left[0] -= 1
@@ -124,7 +124,7 @@ def test_without_room_or_controller_it_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_a_controller_that_hardly_moves_the_machine_is_told() -> None:
+def test_a_controller_that_hardly_moves_the_machine_is_reported() -> None:
     model = controlled()
     assert model.controller is not None
     law = model.controller.law
@@ -161,7 +161,7 @@ def test_limits_that_are_not_given_are_those_of_the_logs() -> None:
 
 @pytest.mark.method
 @pytest.mark.slow
-def test_rivals_are_told_apart() -> None:
+def test_rivals_are_distinguished() -> None:
     wanted = replace(WANTED, rivals=("stribeck", "spring"))
     found = experiment(controlled(), wanted, None, quiet, after(40))
     assert found.criterion == "T"
@@ -210,14 +210,14 @@ def test_a_motor_whose_force_is_noisy_logs_another_command_than_it_got() -> None
     assert np.array_equal(bench.log(run)["u"], run.u)
 
 
-def test_what_is_promised_of_an_assumed_band_is_told() -> None:
+def test_what_is_promised_of_an_assumed_band_is_reported() -> None:
     fast = replace(controlled().log[0], speed=1e3)  # of which any band is next to none
     bare = replace(controlled(), log=(fast,))
     assert any("the logs show no band" in one for one in _remarks(bare, 1.0))
     assert not any("the logs show no band" in one for one in _remarks(controlled(), 1.0))
 
 
-def test_a_band_next_to_none_is_taken_for_one_that_no_log_told() -> None:
+def test_a_band_next_to_none_is_taken_for_one_that_no_log_identified() -> None:
     model = controlled()
     narrow = replace(model.friction["dv_p"], value=1e-8, low=0.9e-8, high=1.1e-8, sd=1e-9)
     lost = replace(model, friction={**model.friction, "dv_p": narrow})

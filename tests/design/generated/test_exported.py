@@ -36,10 +36,10 @@ def test_the_recommended_controller_is_taken() -> None:
 
 def test_the_compensator_goes_along_as_recommended() -> None:
     found = case("limited").design
-    told = found.recommendation
-    assert told is not None
+    advised = found.recommendation
+    assert advised is not None
     for beside in (True, False):
-        one = replace(found, recommendation=replace(told, compensator=beside))
+        one = replace(found, recommendation=replace(advised, compensator=beside))
         assert (exported(one).loop.compensation is not None) == beside
         assert not any("the compensator" in line for line in exported(one).remarks)
         against = exported(one, compensated=not beside).remarks
@@ -73,15 +73,15 @@ def test_what_to_know_of_it_stands_in_every_file() -> None:
     found = case("paper_table1").design
     values = found.compensator
     blank = replace(values.friction["F_sn"], value=None, reason="no breakaway", assumed=-23.0)
-    told = replace(
+    advised = replace(
         found,
         compensator=CompensatorValues(
             values.N_c, values.e_T, {**values.friction, "F_sn": blank}, values.filters
         ),
     )
-    lead = "\n".join(lead_of(exported(told, compensated=True)))
+    lead = "\n".join(lead_of(exported(advised, compensated=True)))
     assert "F_sn" in lead and "not clipped" in lead
-    assert "F_sn" not in "\n".join(lead_of(exported(told, compensated=False)))
+    assert "F_sn" not in "\n".join(lead_of(exported(advised, compensated=False)))
 
 
 def test_a_motor_needs_no_force_and_a_force_loop_does() -> None:

@@ -59,7 +59,7 @@ def test_of_a_sound_log_nothing_is_said(seed: int) -> None:
     assert said(FORCE, T, found["y"], found["F"]) == ""
 
 
-def test_nearly_one_way_is_told_by_its_share() -> None:
+def test_nearly_one_way_is_reported_by_its_share() -> None:
     y = np.concatenate([-0.02 * T[:200], -0.02 * T[200] + 0.3 * (T[200:] - T[200])])
     assert "nearly one way (9" in said(FORCE, T, y + 1e-3 * np.sin(T), np.gradient(y) + noise(1e-6))
 

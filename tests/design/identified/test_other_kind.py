@@ -29,8 +29,8 @@ def test_a_motor_is_none() -> None:
     assert looks_like_velocity([log], MOTOR) == ()
     record = recorded([log])
     found = fit(record)
-    held = held_out(record, found.valve, found.free, None)
-    (said,) = looks_like_friction(record, found.valve, held, Rig("velocity"))
+    errors = held_out(record, found.valve, found.free, None)
+    (said,) = looks_like_friction(record, found.valve, errors, Rig("velocity"))
     assert said.startswith('the log looks like kind = "motor"')
 
 

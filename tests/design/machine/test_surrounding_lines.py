@@ -42,6 +42,8 @@ def test_a_force_of_a_command_without_a_scale_is_in_units_of_it() -> None:
 
 
 @pytest.mark.parametrize(("lag", "until"), [(Size(0.0, 0.0), "from"), (Size(-1e-3, 1e-5), "until")])
-def test_a_held_force_is_said_to_be_one_and_no_late_position(lag: Size, until: str) -> None:
-    (line,) = surrounding_lines(Surroundings(lag=lag, held=True), Rig("force"))
+def test_a_zero_order_hold_force_is_said_to_be_one_and_no_late_position(
+    lag: Size, until: str
+) -> None:
+    (line,) = surrounding_lines(Surroundings(lag=lag, zoh=True), Rig("force"))
     assert line == f"the force acts as it stands {until} its row, constant between rows"

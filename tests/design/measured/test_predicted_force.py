@@ -34,8 +34,8 @@ def swing() -> Log:
     return Log("swing", {"t": t, "y": y, "F": np.zeros(len(t))})
 
 
-def not_told(model: Model, **values: float) -> Model:
-    """The model with these parameters assumed, as no log told them."""
+def not_identifiable(model: Model, **values: float) -> Model:
+    """The model with these parameters assumed, as no log identified them."""
     friction = {
         name: replace(one, value=None, sd=None, low=None, high=None, reason="no", assumed=x)
         if (x := values.get(name)) is not None
@@ -45,17 +45,17 @@ def not_told(model: Model, **values: float) -> Model:
     return replace(model, friction=friction)
 
 
-def test_a_band_that_no_log_told_holds_no_body_that_is_seen_to_slide() -> None:
+def test_a_band_that_no_log_identified_holds_no_body_that_is_seen_to_slide() -> None:
     log, how = swing(), Smoothing()
-    told = model_of(WIDE)
-    assumed = not_told(told, dv_p=0.5, dv_n=-0.5)
+    identified = model_of(WIDE)
+    assumed = not_identifiable(identified, dv_p=0.5, dv_n=-0.5)
     quick = np.abs(0.3 * np.cos(3.0 * log["t"])) > 0.1
-    assert np.all(np.abs(force_by_model(told, log, how)[quick]) < 1.0)  # held by no force
+    assert np.all(np.abs(force_by_model(identified, log, how)[quick]) < 1.0)  # held by no force
     needed = np.abs(force_by_model(assumed, log, how)[quick])
     assert np.all((needed > 12.0) & (needed < 25.0))
     assert seen_moving(assumed, log).friction.dv_p < 1e-2
-    assert seen_moving(told, log) == told.simulated
-    assert seen_moving(not_told(told, dv_p=1e-6), log).friction.dv_p == 1e-6
+    assert seen_moving(identified, log) == identified.simulated
+    assert seen_moving(not_identifiable(identified, dv_p=1e-6), log).friction.dv_p == 1e-6
 
 
 def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
@@ -100,28 +100,28 @@ def late_model(command_period: float | None = None, drive: Drive = "force") -> M
 def test_a_log_is_taken_at_the_lag_of_the_model_and_held_as_its_logs_were() -> None:
     log = swing().with_signals(F=np.arange(4000.0))
     late = of_one_instant(log, late_model())
-    assert late["F"][100] == pytest.approx(97.0) and not late.held
-    assert of_one_instant(log, late_model(command_period=1e-3)).held
+    assert late["F"][100] == pytest.approx(97.0) and not late.zoh
+    assert of_one_instant(log, late_model(command_period=1e-3)).zoh
     assert of_one_instant(log, replace(late_model(), lag=None)) is log
     # Of an actuator it is the period of its command, whose integral is the force.
-    assert not of_one_instant(log, late_model(command_period=1e-3, drive="command")).held
+    assert not of_one_instant(log, late_model(command_period=1e-3, drive="command")).zoh
 
 
-@pytest.mark.parametrize(("period", "held"), [(1e-3, True), (None, False)])
-def test_a_force_that_is_held_is_so_in_its_prediction(
-    period: float | None, held: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("period", "zoh"), [(1e-3, True), (None, False)])
+def test_a_zero_order_hold_force_is_so_in_its_prediction(
+    period: float | None, zoh: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A line through its samples is half of one ahead: 3 % of a chattering force was left."""
     seen: list[bool] = []
 
     def force(model: Model, log: Log, how: Smoothing) -> Array:
-        seen.append(how.held)
+        seen.append(how.zoh)
         return np.zeros(len(log))
 
     monkeypatch.setattr(predict_step, "force_by_model", force)
     model = late_model(command_period=period)
     predict_step.predict(model, swing().with_signals(F=np.sin(np.arange(4000.0))))
-    assert seen == [held] and model.holds_force is held
+    assert seen == [zoh] and model.holds_force is zoh
 
 
 def test_the_friction_of_a_log_is_that_of_the_instants_at_which_its_force_acts() -> None:

@@ -110,7 +110,7 @@ def test_the_load_that_swings_behind_a_motor_at_rest_is_seen() -> None:
     assert responded(ONE).peaks == ()
 
 
-def test_peaks_in_a_gap_are_told_apart_from_those_that_are_seen() -> None:
+def test_peaks_in_a_gap_are_distinguished_from_those_that_are_seen() -> None:
     found = responded(TWO)
     assert found.modes is not None and TWO.anti_resonance and TWO.resonance
     body = found.found.body
@@ -145,9 +145,9 @@ def test_the_hidden_load_is_found_where_friction_hides_the_force() -> None:
         assert load is not None
         assert load.anti_resonance == pytest.approx(TWO.anti_resonance, rel=0.04)
         assert load.share == pytest.approx(TWO.m_2 / TWO.mass, abs=0.08)
-        told = free.without_friction(of_load(known, load))
-        assert np.any(told.linear != runs[0].linear)
-        np.testing.assert_array_equal(told.linear[free.slides], runs[0].linear[free.slides])
+        load_alone = free.without_friction(of_load(known, load))
+        assert np.any(load_alone.linear != runs[0].linear)
+        np.testing.assert_array_equal(load_alone.linear[free.slides], runs[0].linear[free.slides])
 
 
 def test_a_body_that_hardly_rests_hides_no_load() -> None:
@@ -164,8 +164,8 @@ def test_a_spring_stays_in_the_plant_but_for_its_cube() -> None:
     without, found = freed(log, plain), freed(log, sprung)
     cube = 2e4 * differentiate(log["y"], log.h).y ** 3
     apart = (without.left - found.left)[found.slides]
-    held = 0.5 * (cube + np.append(cube[1:], cube[-1]))
-    np.testing.assert_allclose(apart, held[found.slides], rtol=1e-6, atol=1e-12)
+    zoh = 0.5 * (cube + np.append(cube[1:], cube[-1]))
+    np.testing.assert_allclose(apart, zoh[found.slides], rtol=1e-6, atol=1e-12)
     v = np.sin(np.arange(1000) * 1e-2)
     force = of_model(sprung)(v, np.zeros(1000), 1e-3) - of_model(plain)(v, np.zeros(1000), 1e-3)
     np.testing.assert_allclose(force, 500.0 * 1e-3 * np.cumsum(v))
@@ -177,8 +177,8 @@ def test_a_spring_stays_in_the_plant_but_for_its_cube() -> None:
 def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch) -> None:
     log = log_of(ONE, 6.0)
     monkeypatch.setattr("workbench.report.response.SAMPLES_IN_A_REPORT", len(log) + 1)
-    brief = log.part(0, len(log) // 2)
-    runs = [Source(one, "a.csv", "0" * 64, len(one)) for one in (brief, log, log, brief)]
+    short = log.part(0, len(log) // 2)
+    runs = [Source(one, "a.csv", "0" * 64, len(one)) for one in (short, log, log, short)]
     (section,) = over_frequency(model(ONE), runs)
     (of_longest,) = over_frequency(model(ONE), runs[1:3])
     assert section.html == of_longest.html
@@ -281,14 +281,14 @@ def test_what_shows_nothing_is_refused() -> None:
     rotary = replace(model(ONE), rig=replace(model(ONE).rig, motion="rotary"))
     with pytest.raises(BadModel, match="the model is of a rotary machine"):
         of_logs(log, model=rotary)
-    led = replace(
+    prescribed = replace(
         model(ONE), rig=Rig("force"), actuator=None,
         log=tuple(replace(one, position_rms=None) for one in model(ONE).log),
     )  # fmt: skip
-    assert led.prescribed_motion
-    no_mass = {**led.friction, "m": Estimate(None, "kg", reason="none shows", assumed=1.0)}
+    assert prescribed.prescribed_motion
+    no_mass = {**prescribed.friction, "m": Estimate(None, "kg", reason="none shows", assumed=1.0)}
     with pytest.raises(NotIdentifiable, match="axis is prescribed by a rig"):
-        of_logs(log, model=replace(led, friction=no_mass))
+        of_logs(log, model=replace(prescribed, friction=no_mass))
 
 
 @pytest.mark.slow

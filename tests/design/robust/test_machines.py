@@ -14,7 +14,7 @@ from tests.chain import TABLES, model_of
 MODEL = model_of(TABLES["paper_table2"], k_a=35.0, spread=0.02)
 
 
-def in_force(*values: float, sd: float = 0.0) -> list[dict[str, Estimate]]:
+def estimated(*values: float, sd: float = 0.0) -> list[dict[str, Estimate]]:
     return [{"F_cp": Estimate(value, "N", sd, None, None)} for value in values]
 
 
@@ -40,24 +40,24 @@ def test_the_same_seed_draws_the_same_machines() -> None:
 
 def test_drift_is_the_mean_square_of_the_steps() -> None:
     steps = np.log([11.0 / 10.0, 12.5 / 11.0])
-    found = drift_found(in_force(10.0, 11.0, 12.5))
+    found = drift_found(estimated(10.0, 11.0, 12.5))
     assert found == {"F_cp": pytest.approx(float(np.sqrt(np.mean(steps**2))))}
 
 
 def test_what_the_models_are_unsure_of_is_no_drift() -> None:
-    assert drift_found(in_force(10.0, 10.2, 10.0, sd=0.3)) == {}
-    told = drift_found(in_force(10.0, 12.0, sd=0.3))["F_cp"]
-    assert 0.0 < told < drift_found(in_force(10.0, 12.0))["F_cp"]
+    assert drift_found(estimated(10.0, 10.2, 10.0, sd=0.3)) == {}
+    drift = drift_found(estimated(10.0, 12.0, sd=0.3))["F_cp"]
+    assert 0.0 < drift < drift_found(estimated(10.0, 12.0))["F_cp"]
 
 
 @pytest.mark.parametrize(
     "models",
     [
         [],
-        in_force(10.0),
-        [{"F_cp": Estimate(None, "N", None, None, None, "one way only")}, *in_force(10.0)],
-        [*in_force(10.0), {"F_cp": Estimate(12.0, "N m", 0.0, None, None)}],
-        in_force(10.0, -10.0),
+        estimated(10.0),
+        [{"F_cp": Estimate(None, "N", None, None, None, "one way only")}, *estimated(10.0)],
+        [*estimated(10.0), {"F_cp": Estimate(12.0, "N m", 0.0, None, None)}],
+        estimated(10.0, -10.0),
     ],
 )
 def test_models_that_cannot_be_compared_tell_no_drift(models: list[dict[str, Estimate]]) -> None:
@@ -66,9 +66,9 @@ def test_models_that_cannot_be_compared_tell_no_drift(models: list[dict[str, Est
 
 @given(st.lists(st.floats(0.5, 50.0), min_size=2, max_size=6))
 def test_drift_does_not_depend_on_the_unit(values: list[float]) -> None:
-    found = drift_found(in_force(*values))
+    found = drift_found(estimated(*values))
     scaled = [
         {"F_cp": replace(one["F_cp"], value=1e3 * (one["F_cp"].value or 0.0), unit="mN")}
-        for one in in_force(*values)
+        for one in estimated(*values)
     ]
     assert drift_found(scaled) == pytest.approx(found)

@@ -161,7 +161,7 @@ def test_the_report_shows_the_shares_and_the_design() -> None:
 
 
 @pytest.mark.method
-def test_drift_so_far_is_told() -> None:
+def test_drift_so_far_is_reported() -> None:
     one = robust_design(uncertain(0.005), replace(WANTED, drift={"F_cp": 0.1}), POLES)
     assert any("F_cp 10 %" in line for line in robust_lines(one))
     assert any("widened by the drift" in line for line in one.remarks)
@@ -176,9 +176,9 @@ def test_without_a_mass_there_is_nothing_to_draw_around() -> None:
 
 @pytest.mark.method
 @pytest.mark.slow
-def test_what_no_log_told_is_named() -> None:
-    untold = Estimate(None, "N", reason="no breakaway", assumed=18.0)
+def test_what_no_log_identified_is_named() -> None:
+    not_identifiable = Estimate(None, "N", reason="no breakaway", assumed=18.0)
     model = uncertain()
-    model = replace(model, friction={**model.friction, "F_sp": untold})
+    model = replace(model, friction={**model.friction, "F_sp": not_identifiable})
     one = robust_design(model, replace(WANTED, draws=4), POLES)
     assert any(line.startswith("F_sp: not identifiable; ") for line in one.remarks)

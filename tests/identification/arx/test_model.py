@@ -435,8 +435,8 @@ def test_the_papers_order_and_delay_are_found(noise: float, seed: int) -> None:
     choice = select_arx(log, None, H)
     assert (choice.model.na, choice.model.nb, choice.model.nk) == (3, 2, 3)
     assert choice.model.rows < 0.6 * 4000
-    held = [part[2400:] for part in log]
-    errors = one_step_errors(choice.model, *held)[-choice.samples :]
+    held_out = [part[2400:] for part in log]
+    errors = one_step_errors(choice.model, *held_out)[-choice.samples :]
     assert choice.one_step_rms == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Drift test of a log: none, drift with its parameters, another structure, not judged."""
+"""Drift test of a log: none, drift with its parameters, another structure, inconclusive."""
 
 from dataclasses import replace
 from functools import cache
@@ -123,11 +123,11 @@ def test_a_run_that_gives_way_to_the_equation_is_no_other_structure() -> None:
     rig = Rig("motor", force_per_command=motor_logs.K_A)
     known = active(fit_plant([shaken(1)], np.random.default_rng(1), rig=rig), rig, "first", 0.3)
     found = drift_test(known, shaken(3), np.random.default_rng(2))
-    assert fit_plant([shaken(3)], np.random.default_rng(2), rig=rig, prior=known.plant).imposed
+    assert fit_plant([shaken(3)], np.random.default_rng(2), rig=rig, prior=known.plant).prescribed
     assert found.verdict != "structure"
 
 
-def test_a_log_that_stands_still_is_not_judged() -> None:
+def test_a_log_that_stands_still_is_inconclusive() -> None:
     rng = np.random.default_rng(1)
     log = made_log(NINE, seed=2, seconds=4.0)
     still = log.with_signals(y=NOISE_Y * rng.standard_normal(len(log)))
@@ -137,12 +137,12 @@ def test_a_log_that_stands_still_is_not_judged() -> None:
 
 
 @pytest.mark.slow
-def test_what_a_log_does_not_show_is_not_judged() -> None:
+def test_what_a_log_does_not_show_is_inconclusive() -> None:
     t: Array = 1e-3 * np.arange(12000, dtype=np.float64)
     one_way = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0.0) + 0.003
     found = verdict_on(made_log(NINE, seed=8, u=np.asarray(one_way)))
-    assert {"F_cn", "F_vn", "dv_n", "F_sn"} <= set(found.not_judged)
-    assert "negative direction" in found.not_judged["F_sn"]
+    assert {"F_cn", "F_vn", "dv_n", "F_sn"} <= set(found.inconclusive)
+    assert "negative direction" in found.inconclusive["F_sn"]
     assert "F_vp" in found.shifts
 
 
@@ -192,7 +192,7 @@ def coulomb(sd: float, changed: float, *names: str) -> tuple[ReferenceModel, Log
     return known, LogEstimate(names, (1.0 + changed) * values, covariance, {}, 1.0, 2.0)
 
 
-def test_ten_logs_that_could_not_have_seen_a_drift_of_ten_percent_do_not_judge() -> None:
+def test_ten_logs_that_could_not_detect_a_drift_of_ten_percent_do_not_judge() -> None:
     state = fresh_state("one", ("m", "F_cp", "F_cn"))
     for k in range(10):
         known, log = coulomb(0.1, 0.005 * (k + 1), "m", "F_cp", "F_cn")
@@ -238,7 +238,7 @@ def test_what_is_seen_is_found() -> None:
     assert alarms >= 85
 
 
-def test_of_parameters_that_cannot_be_told_apart_none_is_named() -> None:
+def test_of_parameters_that_cannot_be_distinguished_none_is_named() -> None:
     known, log = coulomb(0.05, 0.0, "F_cp", "F_vp")
     together = np.array([[1.0, -0.999], [-0.999, 1.0]]) * np.outer(
         0.05 * known.values, 0.05 * known.values

@@ -21,9 +21,9 @@ OUTERMOST = 1e-3  # rank of a truth beyond every draw
 def mean_square(seeds: Sequence[int]) -> float:
     """Of the normal deviates of the nine's ranks, over the machines of the seeds."""
     ranks = [drawn("none", seed, SECONDS, True).posterior for seed in seeds]
-    assert all(set(one) == set(NAMES) for one in ranks), "a walk has not converged"
-    told = np.array([list(one.values()) for one in ranks])
-    return float(np.mean(norm.ppf(np.clip(told, OUTERMOST, 1.0 - OUTERMOST)) ** 2))
+    assert all(set(one) == set(NAMES) for one in ranks), "a sampling has not converged"
+    of_law = np.array([list(one.values()) for one in ranks])
+    return float(np.mean(norm.ppf(np.clip(of_law, OUTERMOST, 1.0 - OUTERMOST)) ** 2))
 
 
 @pytest.mark.method

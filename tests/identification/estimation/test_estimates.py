@@ -90,7 +90,7 @@ def test_a_wide_interval_silences_a_parameter() -> None:
     assert found["dv_p"].assumed == table(1).dv_p
 
 
-def test_of_a_viscous_term_that_is_surely_small_its_largest_size_is_told() -> None:
+def test_of_a_viscous_term_that_is_surely_small_its_largest_size_is_reported() -> None:
     values, sd = VALUES | {"F_vp": 0.1}, spread(0.001) | {"F_vp": 0.1}
     found = estimates(values, sd, PLENTY, Rig("force"), "log")
     small = found["F_vp"]

@@ -13,7 +13,7 @@ from identification.errors import BadLog, NotIdentifiable
 from identification.estimation import fit as fitting
 from identification.estimation import run_or_equation
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.run_or_equation import LeftOfEquation, left_by
@@ -61,7 +61,7 @@ def test_recovers_the_papers_plants(number: int) -> None:
 def test_noise_of_the_logged_command_is_the_logs_and_not_the_plants(
     noise: float, off: float
 ) -> None:
-    """The valve did not see it: its integral walks, and the measured force tells how far."""
+    """The valve did not see it: its integral drifts, and the measured force tells how far."""
     truth = table(2)
     log = made_log(truth, seed=2)
     heard = log.with_signals(
@@ -180,7 +180,7 @@ def test_a_fit_by_force_keeps_the_actuator_that_a_regression_gives() -> None:
     assert fit.actuator.k1 == pytest.approx(ACTUATOR.k1, rel=0.01)
 
 
-def test_the_plant_in_force_is_kept_where_a_new_start_ends_farther_off(
+def test_the_active_plant_is_kept_where_a_new_start_ends_farther_off(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log = made_log(table(2), seed=9, seconds=4.0)
@@ -265,7 +265,7 @@ def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch)
     """What answers for a motor whose run is lost with so many of the five known, in a band that
     takes the sliding; its equation of motion leaves far more than noise too."""
     recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
-    equation = replace(fit_imposed(recorded, "lost"), chi_square=1e3)
+    equation = replace(fit_prescribed(recorded, "lost"), chi_square=1e3)
     none = Estimate(None, "N", reason="found 1, but the interval is wider")
     run = replace(
         equation, friction=replace(NINE, dv_p=10.0, dv_n=-10.0),

@@ -37,7 +37,7 @@ def motor_log(seed: int = 0, seconds: float = 10.0) -> Log:
 
 
 @pytest.mark.parametrize(("motion", "unit"), [("linear", "m/s"), ("rotary", "rad/s")])
-def test_a_motor_that_stands_still_is_told_in_its_units(
+def test_a_motor_that_stands_still_is_reported_in_its_units(
     motion: Literal["linear", "rotary"], unit: str
 ) -> None:
     log = made(3, n=2000)
@@ -95,7 +95,7 @@ def test_runs_by_steps_are_fitted_by_their_runs_alone() -> None:
     nothing, and a lag, which a constant force does not show, would be the start's."""
     rig = Rig("motor", force_per_command=1.0, motion="rotary")
     fit = fit_plant(steps((1.0, -1.0, 0.6, -0.6)), np.random.default_rng(0), rig=rig)
-    assert fit.adequate and not fit.imposed and not fit.surroundings.lag.value
+    assert fit.adequate and not fit.prescribed and not fit.surroundings.lag.value
     for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn"):
         one = fit.estimates[name]
         assert one.low is not None and one.high is not None

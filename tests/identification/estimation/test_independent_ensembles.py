@@ -37,7 +37,7 @@ def test_spread_of_a_normal_density() -> None:
 
 
 @pytest.mark.slow
-def test_a_bent_density_is_walked_until_the_ensembles_agree() -> None:
+def test_a_bent_density_is_sampled_until_the_ensembles_agree() -> None:
     def banana(x: Array) -> Array:
         return np.asarray(x[:, 0] ** 2 + 25.0 * (x[:, 1] - x[:, 0] ** 2) ** 2)
 

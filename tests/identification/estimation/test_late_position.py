@@ -122,11 +122,11 @@ def test_a_plant_that_drifts_more_gains_nothing_by_it(monkeypatch: pytest.Monkey
     assert late_position._run([log], rig, None, none).misfit > 1.2 * own
 
 
-def test_a_halted_run_is_told_as_well_as_a_whole_one() -> None:
+def test_a_halted_run_is_reported_as_well_as_a_whole_one() -> None:
     """The doctor's own end of a run is no end of the comparison."""
     log, rig = cart_log(1, 1), Rig("motor", force_per_command=1.0)
     none = late_position._run([log], rig, None, None)
-    for looks in (0, 20):
-        halt = Halt(partial(next, iter([True] * looks), False))
+    for evaluations in (0, 20):
+        halt = Halt(partial(next, iter([True] * evaluations), False))
         assert np.isfinite(late_position._run([log], rig, halt, none).misfit)
         assert halt.reached()

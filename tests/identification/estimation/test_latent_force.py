@@ -59,7 +59,7 @@ def test_a_body_at_rest_shows_no_force() -> None:
 
 def test_friction_that_is_twice_too_high_is_what_is_missing() -> None:
     p = table(1)
-    log = motion_log(made_log(p, 3), held=False, by_command=True)
+    log = motion_log(made_log(p, 3), zoh=False, by_command=True)
     double = replace(p, F_cp=2.0 * p.F_cp, F_cn=2.0 * p.F_cn)
     found = latent_forces(Plant(double), [log], 1.2 * max(p.dv_p, -p.dv_n))
     (one,) = found.logs
@@ -69,7 +69,7 @@ def test_friction_that_is_twice_too_high_is_what_is_missing() -> None:
     assert latent_forces(Plant(p), [log], 1.2 * max(p.dv_p, -p.dv_n)).rms < 2e-3 * p.F_cp
 
 
-def test_of_prescribed_motion_the_force_alone_is_told() -> None:
+def test_of_prescribed_motion_the_force_alone_is_reported() -> None:
     rng, h = np.random.default_rng(0), 2e-3
     t = h * np.arange(8000, dtype=np.float64)
     since = np.pi * np.maximum(t - 1.0, 0.0)  # it begins at rest
@@ -79,7 +79,7 @@ def test_of_prescribed_motion_the_force_alone_is_told() -> None:
     force = NINE.m * a + np.where(v > 0, NINE.F_cp + NINE.F_vp * v, -NINE.F_cn + NINE.F_vn * v)
     noisy = y + 1e-6 * rng.standard_normal(len(t))
     log = Log("rig", {"t": t, "y": noisy, "F": force - missing + 0.02 * rng.standard_normal(8000)})
-    one = motion_log(log, held=False, by_command=False, imposed=True)
+    one = motion_log(log, zoh=False, by_command=False, prescribed=True)
     found = latent_forces(Plant(NINE), [one], 0.02)
     of = found.logs[0]
     assert np.std((of.force - missing)[of.slides]) < 0.05
@@ -94,7 +94,7 @@ def test_of_prescribed_motion_friction_never_drives_the_body() -> None:
     t = h * np.arange(4000, dtype=np.float64)
     y, v = 0.05 * np.sin(3.0 * t), 0.15 * np.cos(3.0 * t)
     log = Log("rig", {"t": t, "y": y + 1e-6 * rng.standard_normal(len(t)), "F": 0.0 * t})
-    one = motion_log(log, held=False, by_command=False, imposed=True)
+    one = motion_log(log, zoh=False, by_command=False, prescribed=True)
     falls = built_in()["position_dependent_friction"].acting(
         {"c1": -3.0 * LEVEL / 0.05, "period": 0.1}
     )
@@ -109,7 +109,7 @@ def test_a_body_that_rests_or_is_driven_by_nothing_has_a_latent_force_all_the_sa
     noise = 1e-6 * np.random.default_rng(0).standard_normal(2000)
     for y in (noise, 0.05 * np.sin(3.0 * t)):
         log = Log("free", {"t": t, "y": y, "F": np.zeros(2000)})
-        one = motion_log(log, held=False, by_command=False)
+        one = motion_log(log, zoh=False, by_command=False)
         found = latent_forces(Plant(NINE), [one], SLOWEST)
         assert np.all(np.isfinite(found.logs[0].force)) and np.isfinite(found.rms)
         assert (found.rms > 0.0) == bool(np.any(found.logs[0].slides))
@@ -143,7 +143,7 @@ def test_a_force_between_the_samples_is_none_that_a_model_lacks() -> None:
     kept = np.exp(-p.F_vp / p.m * h)
     more = lfilter([h / p.m], [1.0, -kept], 1.5 * rng.standard_normal(len(t)))
     y = h * np.cumsum(v + more) + 1e-6 * rng.standard_normal(len(t))
-    one = motion_log(Log("rig", {"t": t, "y": y, "F": F}), held=False, by_command=False)
+    one = motion_log(Log("rig", {"t": t, "y": y, "F": F}), zoh=False, by_command=False)
     one = replace(one, noise=replace(one.noise, F=0.5))
     found = latent_forces(plant(), [one], SLOWEST)
     assert found.rougher.force > 1.0

@@ -64,7 +64,7 @@ def test_a_posterior_by_a_noisy_force_lies_about_the_sliding_friction_of_the_fit
 
 
 @pytest.mark.slow
-def test_a_short_walk_gives_no_interval() -> None:
+def test_a_short_sampling_gives_no_interval() -> None:
     log = made_log(table(3), seed=12, seconds=4.0)
     fit = fitted(log)
     found = sample_posterior(fit, [log], np.random.default_rng(2), rig=RIG, steps=12)

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter1d
 from benchmarks.drives_rig import make
 from identification.arrays import Array
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.log import Log, Rig
@@ -36,7 +36,7 @@ def of_velocity(v: Array, stiffness: float = 0.0, mass: float = M) -> KarnoppFit
     recorded = recorded_logs(
         [Log("run.csv", {"t": t, "y": np.asarray(y), "F": np.asarray(F)})], Rig("force"), "force"
     )
-    return as_sliding_shows(fit_imposed(recorded, "why"), recorded)
+    return as_sliding_shows(fit_prescribed(recorded, "why"), recorded)
 
 
 def test_one_speed_both_ways_shows_a_sum_alone() -> None:

@@ -24,7 +24,7 @@ def test_sizes_that_chance_makes_begin_as_none() -> None:
     kept = dict(values)
     assert slight(effect, values, sd) == {"c2", "a"}
     assert values == kept
-    # Where every size is poorly told, none is taken for nothing.
+    # Where every size is poorly identified, none is taken for nothing.
     assert slight(effect, values, dict.fromkeys(sd, 1e3)) == set()
 
 

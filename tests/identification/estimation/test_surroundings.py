@@ -67,7 +67,7 @@ def test_gravity_is_found_with_its_interval(a: float, b: float) -> None:
 
 
 def swung(seed: int) -> list[Log]:
-    """Coarse logs of a rod that is led to and fro quickly."""
+    """Coarse logs of a rod that is driven to and fro quickly."""
     h, rng, logs = 1.0 / 190.0, np.random.default_rng(seed), []
     t = h * np.arange(1140, dtype=np.float64)
     for k, both in enumerate(
@@ -127,9 +127,9 @@ def test_columns_of_two_instants_are_found(samples: float) -> None:
     found = surroundings([late], MOTOR)
     assert found.lag.value == pytest.approx(samples * log.h, abs=3.0 * found.lag.sd)
     assert found.lag.sd < 0.5 * log.h
-    told = lag_estimate(found)
-    assert told is not None and told.low is not None and told.high is not None
-    assert told.low < told.high
+    reported = lag_estimate(found)
+    assert reported is not None and reported.low is not None and reported.high is not None
+    assert reported.low < reported.high
 
 
 @pytest.mark.parametrize("samples", [-0.25, 0.25])
@@ -138,14 +138,14 @@ def test_a_measured_force_may_act_anywhere_within_its_sample(samples: float) -> 
     a machine that stays as it is had drifted."""
     found = surroundings([moved_by(samples)], TURNING)
     assert found.lag.value == pytest.approx(samples * 2e-3, abs=4.0 * found.lag.sd)
-    assert 0.0 < found.lag.sd < 0.2e-3 and not found.held
+    assert 0.0 < found.lag.sd < 0.2e-3 and not found.zoh
 
 
 @pytest.mark.parametrize(("samples", "whole"), [(0.5, 0.0), (-0.5, -1.0)])
 def test_half_a_sample_is_the_lag_of_a_force_that_is_held(samples: float, whole: float) -> None:
     """From its row to the next, or until its row."""
     found = surroundings([moved_by(samples)], TURNING)
-    assert found.held and found.lag.value == pytest.approx(whole * 2e-3)
+    assert found.zoh and found.lag.value == pytest.approx(whole * 2e-3)
 
 
 @pytest.mark.parametrize("key", ["spring", "backlash"])
@@ -157,11 +157,11 @@ def test_a_hold_is_seen_beside_what_is_not_known_yet(key: str) -> None:
         log = log.with_signals(F=log["F"] + 0.5 * y)
     else:
         log = log.with_signals(y=y + 2e-4 * np.sign(np.gradient(y)))
-    assert surroundings([log], TURNING).held
+    assert surroundings([log], TURNING).zoh
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_a_hold_of_a_jittering_force_is_seen_behind_its_sensors_noise(held: bool) -> None:
+@pytest.mark.parametrize("zoh", [True, False])
+def test_a_hold_of_a_jittering_force_is_seen_behind_its_sensors_noise(zoh: bool) -> None:
     """As of a slide behind a loop of 1 kHz, which answers its encoder's noise: rows of the equation
     show no lag there, and half a sample left in takes 0.3 to 0.6 N s/m off a viscous friction of
     50 (five deviations and more)."""
@@ -170,20 +170,20 @@ def test_a_hold_of_a_jittering_force_is_seen_behind_its_sensors_noise(held: bool
     F = sum(size * np.sin(2 * np.pi * f * t + f) for f, size in ((0.3, 30), (0.9, 25), (2.1, 20)))
     F = F + rng.standard_normal(len(t))
     fine = np.asarray(np.arange(5 * len(t)) * 0.2 * h, dtype=np.float64)
-    acts: Array = np.repeat(F, 5) if held else np.interp(fine, t, F)
+    acts: Array = np.repeat(F, 5) if zoh else np.interp(fine, t, F)
     blank = Log("slide", {"t": fine, "y": np.zeros(len(fine)), "F": acts})
     run = free_run(Plant(nine), blank, (0.0, 0.0, float(F[0])), "force")
     noise = rng.standard_normal((2, len(t)))
     log = Log("slide", {"t": t, "y": run.y[::5] + 2e-6 * noise[0], "F": F + 0.3 * noise[1]})
     found = surroundings([log], Rig("force"))
-    assert found.held is held and not found.lag.value
+    assert found.zoh is zoh and not found.lag.value
 
 
-def test_a_held_force_is_held_in_the_log_that_is_fitted() -> None:
+def test_a_zero_order_hold_force_is_held_in_the_log_that_is_fitted() -> None:
     log = moved_by(0.5)
     out = surroundings([log], TURNING).taken_out(log)
-    assert out.held and not log.held
-    assert motion_log(out, held=False, by_command=False).held
+    assert out.zoh and not log.zoh
+    assert motion_log(out, zoh=False, by_command=False).zoh
 
 
 def moved_by(samples: float) -> Log:
@@ -231,7 +231,7 @@ def test_a_weight_larger_than_friction_is_taken_out(force: float) -> None:
 
 
 def test_a_constant_force_is_found_in_strokes_of_one_speed_each_way() -> None:
-    """A rod led up at 5 mm/s and, mostly, down at 11, under friction of 6 and 8 N: pressure on
+    """A rod driven up at 5 mm/s and, mostly, down at 11, under friction of 6 and 8 N: pressure on
     another area than the card's leaves -11 N, as a seal's test stand had it. The Coulomb levels at
     rest are not known, and all that goes up was left out as the slow part of the motion."""
     h, rng = 0.01, np.random.default_rng(0)
@@ -265,9 +265,9 @@ def test_a_switched_command_is_no_friction_a_quarter_period_later(period: float)
     assert abs(found.lag.value) < 2.0 * h
 
 
-def brief_swing(size: float, about: float) -> Log:
-    """6 s of a pendulum led about an angle [rad] by sines of this size each, under gravity of 1 N m
-    and noise of its torque that lasts 0.2 s."""
+def short_swing(size: float, about: float) -> Log:
+    """6 s of a pendulum driven about an angle [rad] by sines of this size each, under gravity of 1
+    N m and noise of its torque that lasts 0.2 s."""
     h, rng = 1.0 / 190.0, np.random.default_rng(3)
     t = h * np.arange(1140, dtype=np.float64)
     y = about + size * (np.sin(1.9 * t) + np.sin(3.1 * t + 1.0))
@@ -280,14 +280,14 @@ def brief_swing(size: float, about: float) -> Log:
 
 def test_a_cosine_about_a_constant_force_is_left_out_of_gravity() -> None:
     """Beside Coulomb friction the cosine was 0.4 +- 0.4 N m, and friction was below 0 one way."""
-    found = surroundings([brief_swing(0.2, 0.0)], TURNED)
+    found = surroundings([short_swing(0.2, 0.0)], TURNED)
     assert found.cosine.value == 0.0 < found.cosine.sd
     assert found.sine.value == pytest.approx(1.0, abs=0.15)
 
 
 def test_gravity_of_a_small_swing_shows_by_its_sine() -> None:
     """Beside the cosine neither was significant, and nothing was taken out."""
-    found = surroundings([brief_swing(0.1, 0.3)], TURNED)
+    found = surroundings([short_swing(0.1, 0.3)], TURNED)
     assert found.sine.value == pytest.approx(1.0, abs=0.15)
 
 
@@ -329,7 +329,7 @@ def test_a_shifted_log_loses_the_samples_whose_force_is_not_known() -> None:
     assert Surroundings(lag=Size(-0.01), gives=K_A).effects == ()
 
 
-def test_friction_is_told_beside_gravity() -> None:
+def test_friction_is_reported_beside_gravity() -> None:
     fit = fit_plant([pendulum(3, 3.0)], np.random.default_rng(1), rig=TURNING)
     assert fit.estimates["gravity.a"].value == pytest.approx(3.0, rel=0.01)
     for name, true in (("m", 0.15), ("F_cp", 0.3), ("F_cn", 0.3)):

@@ -5,7 +5,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.effects._library import built_in, numbered, of_key
-from identification.estimation.imposed_motion import way_of
+from identification.estimation.prescribed_motion import way_of
 from identification.estimation.surroundings import surroundings
 from identification.estimation.turn_orders import (
     _by_chance,
@@ -24,7 +24,7 @@ ONE_WAY = 1.3 * T + 0.4 * np.sin(2.0 * T)
 
 
 def log_of(y: Array, cogging: dict[float, float], gravity: float = 0.0, seed: int = 0) -> Log:
-    """A body led along y under friction, inertia, and torques that repeat so often in a turn."""
+    """A body driven along y under friction, inertia, and torques that repeat so often in a turn."""
     v, rng = np.gradient(y, H), np.random.default_rng(seed)
     force = 0.02 * np.gradient(v, H) + 0.15 * np.sign(v) + 0.03 * v + gravity * np.sin(y)
     force += sum((size * np.sin(n * y + 0.3 * n) for n, size in cogging.items()), np.zeros(len(y)))
@@ -101,11 +101,11 @@ def test_they_are_taken_out_and_are_the_plant_s_cogging() -> None:
     assert left < 0.05 * without
 
 
-def test_a_held_command_feels_them_over_its_period() -> None:
-    held = Surroundings(orders=turn_orders([log_of(BOTH_WAYS, {7: 0.8})], RIG), gives=2.0)
+def test_a_zero_order_hold_command_feels_them_over_its_period() -> None:
+    around = Surroundings(orders=turn_orders([log_of(BOTH_WAYS, {7: 0.8})], RIG), gives=2.0)
     log = log_of(BOTH_WAYS, {}).with_signals(u=np.zeros(N))
     middle = np.interp(T + 0.5 * H, T, BOTH_WAYS)
-    whole = held.taken_out(log)
+    whole = around.taken_out(log)
     assert np.asarray(whole["u"])[:-1] == pytest.approx(
         0.5 * (np.asarray(log["F"]) - 0.8 * np.sin(7 * middle + 2.1))[:-1], abs=0.01
     )
@@ -120,6 +120,6 @@ def test_an_effect_acts_again_by_its_number() -> None:
 
 
 def test_the_way_of_a_log() -> None:
-    assert way_of([log_of(ONE_WAY, {})], held=False) is True
-    assert way_of([log_of(-ONE_WAY, {})], held=False) is False
-    assert way_of([log_of(BOTH_WAYS, {})], held=False) is None
+    assert way_of([log_of(ONE_WAY, {})], zoh=False) is True
+    assert way_of([log_of(-ONE_WAY, {})], zoh=False) is False
+    assert way_of([log_of(BOTH_WAYS, {})], zoh=False) is None

@@ -1,4 +1,5 @@
-"""Two masses and a spring, told from the motion of the first; one body is never taken for two."""
+"""Two masses and a spring, identified from the motion of the first; one body is never taken for
+two."""
 
 import numpy as np
 import pytest

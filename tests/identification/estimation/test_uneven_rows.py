@@ -31,7 +31,7 @@ def found(log: Log, rig: Rig) -> dict[str, tuple[float, float]]:
 def test_a_current_read_at_slow_uneven_rows_gives_the_mass() -> None:
     """No window of sliding one way is short enough for such rows, of which many hold a reversal:
     what the loop gave between two of them shows in these alone (m 24 % off before)."""
-    got = found(servo_log(bursts(1300), held=False), MOTOR)
+    got = found(servo_log(bursts(1300), zoh=False), MOTOR)
     assert set(got) == set(TRUTH)  # F_cn was "motion one way alone", of its only window one way
     for name, (value, sd) in got.items():
         assert abs(value - TRUTH[name]) < 3.0 * sd, name

@@ -26,7 +26,7 @@ def test_a_fit_is_as_sure_as_promised() -> None:
         assert 1.96 * found.sd / abs(found.value) <= 2.0 * one.within, name
 
 
-def test_less_noise_is_told_better() -> None:
+def test_less_noise_identifies_better() -> None:
     log, rng = made(3), np.random.default_rng(1)
     noisy = log.with_signals(y=log["y"] + 3e-3 * rng.standard_normal(len(log)))
     clear, dim = (identifiability(recorded_logs([one], RIG)) for one in (log, noisy))
@@ -41,9 +41,9 @@ def test_a_short_piece_of_one_way_cannot_tell_the_other() -> None:
     rng = np.random.default_rng(0)
     one_way = Log("one way", {"t": log["t"], "u": u, "F": K_A * u,
                               "y": y + 1e-6 * rng.standard_normal(len(y))})  # fmt: skip
-    told = identifiability(recorded_logs([one_way], RIG))
-    assert not told["F_cn"].can
-    assert not told["F_sn"].can
+    of_run = identifiability(recorded_logs([one_way], RIG))
+    assert not of_run["F_cn"].can
+    assert not of_run["F_sn"].can
 
 
 def test_an_effect_shows_where_the_motion_calls_for_it() -> None:

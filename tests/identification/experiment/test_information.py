@@ -1,4 +1,4 @@
-"""Information by the exact run: what adds up, what noise does to it, and what luck is worth."""
+"""Information by the exact run: what adds up, what noise does to it, and what chance is worth."""
 
 import numpy as np
 import pytest
@@ -30,33 +30,33 @@ def pulses(signs: tuple[float, ...], size: float = 0.9) -> tuple[Log, Array]:
     return blank.with_signals(y=run.y), run.v
 
 
-def told(signs: tuple[float, ...], noise: float = 1e-5, size: float = 0.9) -> Information:
+def of_run(signs: tuple[float, ...], noise: float = 1e-5, size: float = 0.9) -> Information:
     log, v = pulses(signs, size)
     errors = run_errors(log, log["y"], rests_of(v, H, 0.5), noise, 0.0)
     return information(MOTOR, errors, "command")
 
 
 def test_half_the_noise_tells_four_times_as_much() -> None:
-    assert told((1.0, -1.0), 0.5e-5).matrix == pytest.approx(4.0 * told((1.0, -1.0)).matrix)
+    assert of_run((1.0, -1.0), 0.5e-5).matrix == pytest.approx(4.0 * of_run((1.0, -1.0)).matrix)
 
 
 def test_runs_of_their_own_add_up() -> None:
-    up, down, both = told((1.0,)), told((-1.0,)), told((1.0, -1.0))
+    up, down, both = of_run((1.0,)), of_run((-1.0,)), of_run((1.0, -1.0))
     joined = up + down
     size = np.sqrt(np.outer(np.diag(both.matrix), np.diag(both.matrix)))
     assert np.max(np.abs(joined.matrix - both.matrix) / size) < 0.02
 
 
 def test_one_way_says_nothing_of_the_other() -> None:
-    sd = told((1.0, 1.0)).sd
+    sd = of_run((1.0, 1.0)).sd
     for name in ("F_cn", "F_vn", "dv_n", "F_sn"):
         assert sd[name] == np.inf, name
     assert sd["F_cp"] < np.inf
 
 
 def test_one_pulse_cannot_tell_coulomb_from_mass_as_two_sizes_do() -> None:
-    alike = told((1.0, 1.0)) + told((-1.0, -1.0))
-    varied = told((1.0,)) + told((-1.0,)) + told((1.0, -1.0), size=1.6)
+    alike = of_run((1.0, 1.0)) + of_run((-1.0, -1.0))
+    varied = of_run((1.0,)) + of_run((-1.0,)) + of_run((1.0, -1.0), size=1.6)
     assert varied.sd["F_vp"] < 0.7 * alike.sd["F_vp"]
 
 
@@ -73,16 +73,16 @@ def test_the_bound_is_what_least_squares_scatters_by() -> None:
     assert np.std(draws) == pytest.approx(alone.sd["m"], rel=0.05)
 
 
-def test_what_hangs_on_luck_is_not_counted_on() -> None:
+def test_what_hangs_on_chance_is_not_counted_on() -> None:
     def fun(x: Array) -> Array:
         smooth = 50.0 * x[0] * np.ones(80)
         jumps = np.where(x[0] > 1.0 + 1e-7, 1e4, 0.0) * np.ones(20)
         return np.concatenate([smooth, jumps])
 
-    J, loose = lasting_jacobian(fun, np.array([1.0]), np.inf)
+    J, chaotic = lasting_jacobian(fun, np.array([1.0]), np.inf)
     assert J[:80, 0] == pytest.approx(50.0)
     assert not np.any(J[80:])
-    assert loose == pytest.approx(0.2)
+    assert chaotic == pytest.approx(0.2)
 
 
 def test_rests_are_where_the_body_stands() -> None:

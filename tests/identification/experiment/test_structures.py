@@ -23,18 +23,18 @@ def test_what_others_make_up_for_tells_nothing() -> None:
     assert discriminated((5.0 * q).T @ (5.0 * q), 0, (1, 2)) == pytest.approx(25.0)
 
 
-def test_a_law_is_told_better_from_another_place_than_from_its_like() -> None:
+def test_a_law_is_distinguished_better_from_another_place_than_from_its_like() -> None:
     log, v = pulses((1.0, -1.0, 1.0, -1.0), 1.3)
     errors = run_errors(log, log["y"], rests_of(v, H, 0.5), 1e-5, 0.0)
     keys = ("stribeck", "nonlinear_viscous", "spring")
     rivals = [sought(built_in()[key], MOTOR, STROKE) for key in keys]
-    told = information(MOTOR, errors, "command", rivals)
-    assert told.names[-3:] == keys
-    own = tuple(range(len(told.names) - 3))
-    place = {key: told.names.index(key) for key in keys}
-    none = discriminated(told.matrix, place["stribeck"], own)
-    like = discriminated(told.matrix, place["stribeck"], (*own, place["nonlinear_viscous"]))
-    other = discriminated(told.matrix, place["stribeck"], (*own, place["spring"]))
+    of_run = information(MOTOR, errors, "command", rivals)
+    assert of_run.names[-3:] == keys
+    own = tuple(range(len(of_run.names) - 3))
+    place = {key: of_run.names.index(key) for key in keys}
+    none = discriminated(of_run.matrix, place["stribeck"], own)
+    like = discriminated(of_run.matrix, place["stribeck"], (*own, place["nonlinear_viscous"]))
+    other = discriminated(of_run.matrix, place["stribeck"], (*own, place["spring"]))
     assert 0.0 < like <= none
     assert 0.0 < other <= none
     assert none > 9.0

@@ -38,7 +38,7 @@ def test_plant_velocity_and_controller_are_the_bodys() -> None:
     assert not np.any(found.controller.seen[found.f < 10.0])
 
 
-def test_the_controller_is_told_apart_from_a_prefilter_of_the_reference() -> None:
+def test_the_controller_is_distinguished_from_a_prefilter_of_the_reference() -> None:
     found = machine_responses([logged(3, forward=0.5)]).controller
     assert found is not None
     decibel, degree, points = off(found, controller(found.f) * hold(found.f, H))

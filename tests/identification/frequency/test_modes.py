@@ -52,13 +52,13 @@ def test_both_peaks_of_two_masses_are_found_in_a_log() -> None:
 def test_deviations_are_those_of_repeated_noise() -> None:
     every = [fit_modes(exact(accelerations(), seed=seed)) for seed in range(12)]
     found = np.array([[p.frequency.value for p in one.peaks] for one in every if one])
-    told = np.array([[p.frequency.sd for p in one.peaks] for one in every if one])
+    stated = np.array([[p.frequency.sd for p in one.peaks] for one in every if one])
     assert found.shape == (12, 2)
-    np.testing.assert_array_less(found.std(axis=0), 3.0 * told.mean(axis=0))
+    np.testing.assert_array_less(found.std(axis=0), 3.0 * stated.mean(axis=0))
     np.testing.assert_allclose(found.mean(axis=0), [HERTZ, RESONANCE], rtol=2e-3)
 
 
-def test_one_mass_has_no_peak_and_its_lag_is_told() -> None:
+def test_one_mass_has_no_peak_and_its_lag_is_reported() -> None:
     one = np.asarray(-((2 * np.pi * F) ** 2) * body_response(F, 3.5, VISCOUS, lag=2e-3))
     found = fit_modes(exact(one))
     assert found is not None and found.peaks == ()
@@ -68,7 +68,7 @@ def test_one_mass_has_no_peak_and_its_lag_is_told() -> None:
     np.testing.assert_allclose(found.undelayed(F), straight, rtol=0.02)
 
 
-def test_a_peak_where_nothing_is_seen_is_not_told() -> None:
+def test_a_peak_where_nothing_is_seen_is_not_reported() -> None:
     response = exact(accelerations())
     around = np.abs(F / HERTZ - 1.0) < 0.15
     hidden = replace(response, coherence=np.where(around, 0.1, response.coherence))

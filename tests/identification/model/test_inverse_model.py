@@ -106,10 +106,10 @@ def test_one_viscous_coefficient_and_an_offset() -> None:
     assert model.covariance.shape == (5, 5)
 
 
-def test_a_held_force_is_seen_half_a_sample_late() -> None:
+def test_a_zero_order_hold_force_is_seen_half_a_sample_late() -> None:
     log = moving(TRUE)
-    held = log.with_signals(F=np.append(0.5 * (log["F"][1:] + log["F"][:-1]), log["F"][-1]))
-    blind, aware = (force_error(held, TRUE, Smoothing(held=k)).relative for k in (False, True))
+    zoh = log.with_signals(F=np.append(0.5 * (log["F"][1:] + log["F"][:-1]), log["F"][-1]))
+    blind, aware = (force_error(zoh, TRUE, Smoothing(zoh=k)).relative for k in (False, True))
     assert aware < 0.6 * blind
     np.testing.assert_allclose(zoh_force(np.array([1.0, 3.0, 5.0])), [1.0, 2.0, 4.0])
 

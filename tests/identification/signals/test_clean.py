@@ -101,7 +101,7 @@ def test_rows_are_lost_between_gaps_and_not_in_them() -> None:
     assert rows_lost(np.array([0.0]), 0.0) == 0
 
 
-def test_the_share_of_lost_rows_is_told_and_follows_the_log() -> None:
+def test_the_share_of_lost_rows_is_reported_and_follows_the_log() -> None:
     kept = np.arange(1000) % 10 != 7
     log = sliding_log(n=1000)
     log = Log("run", {k: x[kept] for k, x in log.signals.items()})
@@ -234,7 +234,7 @@ def test_too_short_constant_and_out_of_stroke_are_refused() -> None:
         check(log.with_signals(y=1000.0 * log["y"]), RIG)
 
 
-def test_wrong_sign_and_swap_are_told_apart() -> None:
+def test_wrong_sign_and_swap_are_distinguished() -> None:
     log = sliding_log(n=4000)
     no_stroke = Rig(kind="force")
     with pytest.raises(BadLog, match="wrong sign"):
@@ -357,7 +357,7 @@ def test_a_tenth_of_a_log_is_not_cut_out() -> None:
         repair(log.with_signals(F=F))
 
 
-def test_a_command_at_its_limit_is_told_and_kept() -> None:
+def test_a_command_at_its_limit_is_reported_and_kept() -> None:
     log = sliding_log()
     u = np.clip(log["F"] + 0.01 * np.sin(30.0 * log["t"]), -9.5, 9.5)
     made = prepare(log.with_signals(u=u), RIG)
@@ -374,8 +374,8 @@ def test_a_value_that_a_logger_repeats_is_no_limit() -> None:
     for step in (6, 8):
         u = np.repeat(loop[::step], step)[: len(log)]
         assert limits(log.with_signals(u=u), "u") == []
-        told = limits(log.with_signals(u=np.clip(u, -9.0, 9.0)), "u")
-        assert {one.kind for one in told} == {"saturated"}
+        reported = limits(log.with_signals(u=np.clip(u, -9.0, 9.0)), "u")
+        assert {one.kind for one in reported} == {"saturated"}
 
 
 def noisy_force(log: Log) -> Log:

@@ -1,4 +1,4 @@
-"""The clock's jitter, told from a position whose noise grows with speed."""
+"""The clock's jitter, estimated from a position whose noise grows with speed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The walk of an actuator's force off its logged command: how large, and when it is none."""
+"""The random walk of an actuator's force off its logged command: how large, and when it is none."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ NOISE = 0.01  # N, of the measured force
 
 
 def signals(step: float, seed: int, dead: float = 0.0) -> tuple[Array, Array, Array]:
-    """Force, position, and integral of the command, of a force that walks by so much a sample.
+    """Force, position, and integral of the command, of a force that drifts by so much a sample.
 
     dead [V]: command that the valve swallows.
     """
@@ -23,14 +23,14 @@ def signals(step: float, seed: int, dead: float = 0.0) -> tuple[Array, Array, Ar
     u = 0.3 * np.sin(2 * np.pi * 0.7 * t) + 0.2 * np.sign(np.sin(2 * np.pi * 0.31 * t))
     y = 0.02 * np.sin(2 * np.pi * 0.4 * t + 1.0)
     reached = np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)
-    walk = np.cumsum(step * rng.standard_normal(N))
-    F = K1 * H * np.cumsum(reached) - K2 * y + walk + NOISE * rng.standard_normal(N)
+    random_walk = np.cumsum(step * rng.standard_normal(N))
+    F = K1 * H * np.cumsum(reached) - K2 * y + random_walk + NOISE * rng.standard_normal(N)
     return F, y, H * np.cumsum(u)
 
 
 @settings(max_examples=20, deadline=None)
 @given(step=st.floats(3e-4, 0.1), seed=st.integers(0, 10_000))
-def test_the_step_of_a_walk_is_found(step: float, seed: int) -> None:
+def test_the_step_of_a_random_walk_is_found(step: float, seed: int) -> None:
     found = force_random_walk(*signals(step, seed), H, 8 * H)
     assert found == pytest.approx(step, rel=0.3)
 

@@ -70,13 +70,13 @@ def pneumatic(seed: int) -> Log:
 def test_breakaways_that_a_force_only_just_reaches_are_followed(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = motion_log(pneumatic(seed), held=False, by_command=False)
+    one = motion_log(pneumatic(seed), zoh=False, by_command=False)
     found = misfit(Plant(NINE), [one], "force", every=True)
     monkeypatch.setattr(
         "identification.estimation.regression.motion_log.kinks",
         lambda F, _noise: np.zeros(len(F)),
     )
-    bare = motion_log(pneumatic(seed), held=False, by_command=False)
+    bare = motion_log(pneumatic(seed), zoh=False, by_command=False)
     without = misfit(Plant(NINE), [bare], "force", every=True)
     assert found < 0.2 * without
 

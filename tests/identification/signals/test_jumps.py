@@ -15,7 +15,7 @@ ROTARY = Rig("force", motion="rotary")
 
 
 def moving(h: float = 1e-3, seconds: float = 12.0, seed: int = 0, noise: float = 1e-5) -> Log:
-    """A body led to and fro over 0.1 m with rests, against 10 N of Coulomb friction."""
+    """A body driven to and fro over 0.1 m with rests, against 10 N of Coulomb friction."""
     t = h * np.arange(round(seconds / h), dtype=np.float64)
     phase = np.cumsum(np.clip(1.5 * np.sin(2 * np.pi * 0.2 * t), -1.0, 1.0)) * h
     y = 0.05 * np.sin(2.0 * phase)

@@ -1,4 +1,5 @@
-"""How signals hang together: force, velocity, reference and command told from each other."""
+"""How signals hang together: force, velocity, reference and command distinguished from each
+other."""
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def force_of(y: Array, m: float = 2.0, F_v: float = 30.0, F_c: float = 8.0) -> A
 @settings(max_examples=30)
 @given(seed=st.integers(0, 200), scale=st.sampled_from([1e-3, 1.0, 40.0]), sign=st.sampled_from(
     [1.0, -1.0]))  # fmt: skip
-def test_a_force_is_told_with_its_sign_whatever_its_unit(
+def test_a_force_is_reported_with_its_sign_whatever_its_unit(
     seed: int, scale: float, sign: float
 ) -> None:
     y = swing(np.random.default_rng(seed))

@@ -5,7 +5,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.log import Log
-from identification.signals.renewal import held_drives, held_for, renewed
+from identification.signals.renewal import hold_length, renewed, zoh_remarks
 
 H = 2e-3
 T = H * np.arange(6000, dtype=np.float64)
@@ -18,7 +18,7 @@ def motion(seed: int) -> Array:
     return np.asarray(swing + 1e-5 * rng.standard_normal(len(T)))
 
 
-def held(y: Array, step: int) -> Array:
+def zoh(y: Array, step: int) -> Array:
     return np.asarray(np.repeat(y[::step], step)[: len(y)])
 
 
@@ -27,19 +27,19 @@ def held(y: Array, step: int) -> Array:
 def test_the_period_of_renewal_is_found(step: int, count: float) -> None:
     y = motion(step)
     y = np.round(y / count) * count if count else y
-    assert held_for(held(y, step)) == step
+    assert hold_length(zoh(y, step)) == step
 
 
 @pytest.mark.parametrize("count", [1e-5, 1e-4, 1e-3, 5e-3])
 def test_an_encoder_s_counts_are_no_renewal(count: float) -> None:
     ramp = 0.02 * T + 0.01 * np.sin(T)
-    assert held_for(np.round(ramp / count) * count) == 1
-    assert held_for(np.round(motion(3) / count) * count) == 1
-    assert held_for(motion(4)) == 1
+    assert hold_length(np.round(ramp / count) * count) == 1
+    assert hold_length(np.round(motion(3) / count) * count) == 1
+    assert hold_length(motion(4)) == 1
 
 
 def test_new_positions_are_kept_with_the_mean_command_until_the_next() -> None:
-    y, u = held(motion(1), 10), np.sin(5.0 * T)
+    y, u = zoh(motion(1), 10), np.sin(5.0 * T)
     found = renewed(Log("a", {"t": T, "y": y, "u": u, "F": 2.0 * u}))
     assert "renewed at 50 Hz" in found.remarks[0]
     log = found.log
@@ -56,11 +56,11 @@ def test_a_log_without_renewals_is_the_same() -> None:
     assert renewed(log).log is log and renewed(log).remarks == ()
 
 
-def test_a_command_that_is_renewed_less_often_than_the_position_is_told() -> None:
+def test_a_command_that_is_renewed_less_often_than_the_position_is_reported() -> None:
     rng = np.random.default_rng(5)
-    log = Log("a", {"t": T, "y": motion(2), "u": held(rng.standard_normal(len(T)), 7)})
-    (said,) = held_drives(log)
+    log = Log("a", {"t": T, "y": motion(2), "u": zoh(rng.standard_normal(len(T)), 7)})
+    (said,) = zoh_remarks(log)
     assert "the command is renewed every 7 rows, at 71.4 Hz" in said and "14 ms old" in said
-    assert held_drives(log.with_signals(y=held(motion(2), 7))) == ()  # which it waits for
-    assert held_drives(log.with_signals(u=held(log["u"], 100))) == ()  # steps of a command
-    assert held_drives(log.with_signals(u=rng.standard_normal(len(T)))) == ()
+    assert zoh_remarks(log.with_signals(y=zoh(motion(2), 7))) == ()  # which it waits for
+    assert zoh_remarks(log.with_signals(u=zoh(log["u"], 100))) == ()  # steps of a command
+    assert zoh_remarks(log.with_signals(u=rng.standard_normal(len(T)))) == ()

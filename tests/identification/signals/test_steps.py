@@ -1,4 +1,5 @@
-"""Small jumps and spikes are told from kinks, impacts and encoders; the callers' arrays stay."""
+"""Small jumps and spikes are distinguished from kinks, impacts and encoders; the callers' arrays
+stay."""
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def test_an_encoder_s_counts_are_neither(count: float) -> None:
     assert not np.any(small_spikes(y))
 
 
-def test_noise_is_told_beside_motion() -> None:
+def test_noise_is_reported_beside_motion() -> None:
     assert white_noise(way()) == pytest.approx(NOISE, rel=0.15)
 
 

@@ -15,8 +15,8 @@ def oscillation(n: int, h: float) -> Log:
     t = h * np.arange(n, dtype=np.float64)
     w = 2 * np.pi * 3.0
     y = np.sin(w * t)
-    held = np.diff(np.sin(w * h * np.arange(n + 1))) / h
-    return Log("a", {"t": t, "y": y, "u": held, "on": (t > 1.0).astype(np.float64)})
+    zoh = np.diff(np.sin(w * h * np.arange(n + 1))) / h
+    return Log("a", {"t": t, "y": y, "u": zoh, "on": (t > 1.0).astype(np.float64)})
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ def test_derivatives_of_a_parabola_are_exact(a: float, b: float, c: float, lengt
     np.testing.assert_allclose(w.second @ x, c, atol=1e-7)
 
 
-def test_a_held_and_a_kinked_signal_are_integrated_as_they_are() -> None:
+def test_a_constant_and_a_kinked_signal_are_integrated_as_they_are() -> None:
     rng = np.random.default_rng(1)
     u = rng.normal(size=300)
     whole = H * np.concatenate([[0.0], np.cumsum(u)[:-1]])
@@ -32,8 +32,8 @@ def test_a_held_and_a_kinked_signal_are_integrated_as_they_are() -> None:
     bump = (1.0 - (2.0 * t - 1.0) ** 2) ** 5
     bump /= np.sum(bump[:-1])
     start = int(w.start[3])
-    held = np.repeat(u[start : start + 30], fine)
-    assert (w.held @ u)[3] == pytest.approx(float(bump[:-1] @ held), abs=2e-4)
+    repeated = np.repeat(u[start : start + 30], fine)
+    assert (w.zoh @ u)[3] == pytest.approx(float(bump[:-1] @ repeated), abs=2e-4)
     line = np.interp(np.arange(30 * fine) / fine, np.arange(31), whole[start : start + 31])
     assert (w.kinked @ whole)[3] == pytest.approx(float(bump[:-1] @ line), abs=1e-7)
 

@@ -11,7 +11,7 @@ from identification.simulation.free_run import run_kernel
 from identification.simulation.karnopp_lanes import (
     WIDTH,
     march,
-    march_held,
+    march_forced,
     place,
     prepare_lanes,
     work_space,
@@ -52,15 +52,15 @@ def alone(
     p: Array,
     start: tuple[float, float, float],
     u: Array,
-    held: tuple[Array, Array, Array] | None = None,
+    forced: tuple[Array, Array, Array] | None = None,
 ) -> Array:
     """Position, velocity and force (3, n) of one row of parameters."""
     n = len(u)
     zero, at = np.zeros(n), np.zeros(1, dtype=np.int64)
-    force, slope, y_m = held or (zero, zero, zero)
+    force, slope, y_m = forced or (zero, zero, zero)
     y, v, f = (np.array([value]) for value in start)
     out, modes = np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-    run_kernel(p[None], H, held is not None, 0.0, u, force, slope, y_m, at, y, v, f, out, modes)
+    run_kernel(p[None], H, forced is not None, 0.0, u, force, slope, y_m, at, y, v, f, out, modes)
     return out
 
 
@@ -77,7 +77,7 @@ def test_lanes_are_the_scalar_run(number: int, start: tuple[float, float, float]
 
 
 @pytest.mark.parametrize("coupling", [0.0, 1e3, 1e6])
-def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
+def test_forced_lanes_are_the_scalar_run(coupling: float) -> None:
     p = spread(table(2), 7)
     p[:, 9], p[:, 10] = 0.0, coupling
     u = excited(4000, 4)
@@ -89,7 +89,7 @@ def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
     for lane in range(WIDTH):
         place(s, modes, tables, p, lane, y[0], 0.0, force[0])
     out = np.zeros((len(u), 2, WIDTH))
-    march_held(p, tables, s, modes, y, force, slope_y, slope, H, out)
+    march_forced(p, tables, s, modes, y, force, slope_y, slope, H, out)
     for lane in range(WIDTH):
         one = alone(p[lane], (y[0], 0.0, force[0]), 0.0 * u, (force, slope, y))
         assert np.max(np.abs(out[:, 0, lane] - one[0])) < 1e-12

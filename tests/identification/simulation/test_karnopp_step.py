@@ -21,10 +21,10 @@ from identification.simulation.karnopp_step import (
     Parameters,
     glided,
     kernel_parameters,
+    mode_at,
     parameters,
     resolve,
     resolve_until,
-    settled_mode,
 )
 from tests.identification.oracle import MUTANTS, euler
 from tests.identification.plants import ACTUATOR, command, table
@@ -81,7 +81,7 @@ def test_fine_euler_steps_come_to_the_same(number: int) -> None:
 
 
 @pytest.mark.parametrize("wrong", MUTANTS)
-def test_wrong_variants_are_told_apart(wrong: int) -> None:
+def test_wrong_variants_are_distinguished(wrong: int) -> None:
     nine, u = table(3), excited(2.0, 3)
     exact, _ = run(nine, u)
     mutant = euler(nine, K1, COUPLING, u, H, 200, wrong)
@@ -120,7 +120,7 @@ def test_no_coupling_and_no_viscous_friction() -> None:
     assert p[K2] == 0.0
 
 
-def test_a_held_mode_of_closed_form() -> None:
+def test_a_constant_mode_of_closed_form() -> None:
     nine, force, v = table(1), 60.0, 0.1
     (y, v_end, _), mode = followed(nine, (0.0, v, force), SLIP_P, 0.0, 0.02)
     rest = (force - nine.F_cp) / nine.F_vp
@@ -157,7 +157,7 @@ def test_breakaway_at_the_limit(limit: float, slope: float, mode: int) -> None:
 def test_band_with_too_little_force_stops_the_body_at_once(sign: float) -> None:
     nine = table(1)
     p = parameters(kernel_parameters(nine.array, 1.0, 0.0)[np.newaxis], 0)
-    assert settled_mode(p, sign * 0.039, sign * 15.0) == STUCK
+    assert mode_at(p, sign * 0.039, sign * 15.0) == STUCK
     (y, v, _), mode = followed(
         nine, (0.0, sign * 0.05, sign * 15.0), SLIP_P if sign > 0 else SLIP_N, 0.0, 0.01
     )

@@ -1,4 +1,4 @@
-"""A trace that is told to end: at whatever ask, a whole result that says what is not in it."""
+"""A trace that is asked to end: at whatever ask, a whole result that says what is not in it."""
 
 import threading
 from dataclasses import asdict
@@ -36,7 +36,7 @@ def traced(logs: tuple[Log, Log], keep_going: KeepGoing = without_end) -> Trace:
     return trace([train], [test], RIG, built_in(), rng, keep_going=keep_going)
 
 
-def told(found: Trace) -> dict[str, Any]:
+def answer(found: Trace) -> dict[str, Any]:
     """What stands in a trace, its numbers as they are."""
     out = {k: getattr(found, k) for k in ("verdict", "rivals", "unknown", "drift", "remarks")}
     out |= {f"{k} {when}": asdict(getattr(found, when)[k]) for when in ("before", "after")
@@ -58,10 +58,10 @@ def whole(logs: tuple[Log, Log]) -> Trace:
 
 @pytest.fixture(scope="module")
 def asks(logs: tuple[Log, Log], whole: Trace) -> int:
-    """How often a trace asks that is never told to end; it is the same to the last digit."""
+    """How often a trace asks that is never asked to end; it is the same to the last digit."""
     asked = Asked(np.inf)
     found = traced(logs, asked)
-    assert told(found) == told(whole)
+    assert answer(found) == answer(whole)
     assert found.not_tried == () and found.verdict == "effect"
     return asked.count
 
@@ -89,7 +89,7 @@ def test_it_ends_at_any_ask_with_a_whole_result(
 
 
 @pytest.mark.method
-def test_what_the_equations_call_for_is_kept_though_the_run_has_not_judged_it(
+def test_what_the_equations_call_for_is_kept_though_the_run_has_not_tested_it(
     logs: tuple[Log, Log], asks: int
 ) -> None:
     found = traced(logs, Asked(int(0.93 * asks)))

@@ -72,15 +72,15 @@ def test_force_is_missing_above_the_band_of_the_model_that_explains_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The plain model's own band may have taken the place of the effect."""
-    held, asked = judged(), list[float]()
+    evaluated, asked = judged(), list[float]()
 
     def missing(before: Any, after: Any, logs: Any, slowest: float) -> None:
         asked.append(slowest)
 
     monkeypatch.setattr(held_out, "missing_force", missing)
-    swollen = replace(held.choice.start, band=0.5)
-    replace(held, choice=replace(held.choice, start=swollen)).missing  # noqa: B018
-    assert asked[0] <= max(band(held.model), held.choice.base["mechanical"].slowest) < 0.5
+    swollen = replace(evaluated.choice.start, band=0.5)
+    replace(evaluated, choice=replace(evaluated.choice, start=swollen)).missing  # noqa: B018
+    assert asked[0] <= max(band(evaluated.model), evaluated.choice.base["mechanical"].slowest) < 0.5
 
 
 def test_before_an_effect_a_plain_run_that_is_not_followed_has_the_values_of_the_equation() -> None:
@@ -99,27 +99,29 @@ def test_a_force_that_is_explained_as_measured_is_not_outvoted_by_the_position(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Through stops a run loses its way by chance; an effect of the sensor makes its own force."""
-    held = replace(judged(), seen=judged().logs)
+    evaluated = replace(judged(), seen=judged().logs)
     monkeypatch.setattr(held_out, "predicts_worse", lambda *_: Worse(0.2, 9.0, 11.0))
-    assert held.share < 0.1 and held.against == ""
+    assert evaluated.share < 0.1 and evaluated.against == ""
     shown = built_in()["backlash"]
-    (step,) = held.choice.steps
+    (step,) = evaluated.choice.steps
     by_sensor = replace(step, candidate=replace(step.candidate, effect=shown))
-    other = replace(held, choice=replace(held.choice, steps=(by_sensor,)))
+    other = replace(evaluated, choice=replace(evaluated.choice, steps=(by_sensor,)))
     vars(other).update(
-        {name: getattr(held, name) for name in ("share", "before", "after", "drift")}
+        {name: getattr(evaluated, name) for name in ("share", "before", "after", "drift")}
     )
     assert "position" in other.against
 
 
 def test_an_effect_is_not_named_with_which_a_plant_predicts_the_force_worse() -> None:
     """The equation's own coefficients may explain a force that the refined plant does not have."""
-    held = judged()
-    assert held.against == ""
+    evaluated = judged()
+    assert evaluated.against == ""
     wrong = plant({"spring": {"k": 300.0}})
-    other = replace(held, model=replace(held.model, plant=wrong))
+    other = replace(evaluated, model=replace(evaluated.model, plant=wrong))
     assert other.share > 1.0 and "is left" in other.against
-    nothing_missing = replace(held.plain, model=replace(held.plain.model, plant=held.model.plant))
+    nothing_missing = replace(
+        evaluated.plain, model=replace(evaluated.plain.model, plant=evaluated.model.plant)
+    )
     assert replace(other, plain=nothing_missing).share > 1.0
 
 
@@ -127,11 +129,11 @@ def test_a_run_that_loses_its_way_does_not_outvote_the_force_that_an_effect_expl
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Nor does one that finds it again make up for a force that is left."""
-    held, wrong = judged(), plant({"spring": {"k": 300.0}})
+    evaluated, wrong = judged(), plant({"spring": {"k": 300.0}})
     monkeypatch.setattr(held_out, "share_left", lambda *_: 0.9)
-    assert replace(held).share < 0.01
+    assert replace(evaluated).share < 0.01
     monkeypatch.setattr(held_out, "share_left", lambda *_: 0.1)
-    assert replace(held, model=replace(held.model, plant=wrong)).share > 1.0
+    assert replace(evaluated, model=replace(evaluated.model, plant=wrong)).share > 1.0
 
 
 def latent(force: float, sd: float) -> LatentForces:
@@ -153,11 +155,11 @@ def test_where_hardly_any_force_was_missing_the_error_says_how_probable_an_effec
     force: float, sd: float, expected: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(held_out, "follows", lambda *_: False)
-    held, n = replace(judged()), np.ones(8)
+    evaluated, n = replace(judged()), np.ones(8)
     sliding = Residual("mechanical", n, n, n, n, n, {})
     left = MissingForce(latent(force, sd), latent(0.5 * force, 0.5 * sd), sliding)
-    vars(held).update(share=0.04, missing=left, changed=())
-    assert 10.0 ** held.evidence[1] == pytest.approx(expected, rel=0.01)
+    vars(evaluated).update(share=0.04, missing=left, changed=())
+    assert 10.0 ** evaluated.evidence[1] == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize(("gained", "judged_by_force"), [(60.0, True), (1.0, False)])
@@ -170,18 +172,18 @@ def test_an_effect_that_seldom_acts_is_judged_by_the_likelihood_of_the_held_out_
     own, n = judged(), np.ones(8)
     before, after, noise = own.before["test"], own.after["test"], own.noise.force_rms
     assert noise is not None
-    held = replace(own, seen=own.logs)
+    evaluated = replace(own, seen=own.logs)
     lacks = latent(1e-3, 1e-4)
     likelier = replace(lacks, logs=(replace(lacks.logs[0], log_density=gained / 8.0 * n),))
-    vars(held).update(
+    vars(evaluated).update(
         before={"test": replace(before, force_rms=9.0 * noise)},
         after={"test": replace(after, force_rms=1.1 * noise)},
         missing=MissingForce(lacks, likelier, Residual("mechanical", n, n, n, n, n, {})),
         was=OnTest(before, 22.0), now=OnTest(after, 13.6), changed=(),
     )  # fmt: skip
-    assert held._force_left(held.missing) is None
-    assert held.share == pytest.approx(0.21 / 80.0 if judged_by_force else 12.6 / 21.0)
-    assert ("half" not in held.against) == judged_by_force
+    assert evaluated._force_left(evaluated.missing) is None
+    assert evaluated.share == pytest.approx(0.21 / 80.0 if judged_by_force else 12.6 / 21.0)
+    assert ("half" not in evaluated.against) == judged_by_force
 
 
 @pytest.mark.parametrize("measured", [True, False])
@@ -195,9 +197,9 @@ def test_no_effect_of_an_actuator_is_proved_by_the_force_that_a_body_lacks(
     (step,) = own.choice.steps
     effect = built_in()["valve_dead_zone"]
     named = replace(step, candidate=replace(step.candidate, effect=effect))
-    held = replace(own, choice=replace(own.choice, steps=(named,)))
+    evaluated = replace(own, choice=replace(own.choice, steps=(named,)))
     sliding = Residual("mechanical", n, n, n, n, n, {})
-    found = held._force_left(MissingForce(latent(2.0, 0.1), latent(0.02, 0.001), sliding))
+    found = evaluated._force_left(MissingForce(latent(2.0, 0.1), latent(0.02, 0.001), sliding))
     assert (found is None) == measured
 
 
@@ -206,8 +208,13 @@ def test_other_levels_are_no_drift_where_a_force_of_account_is_missing(
     lacks_force: bool, verdict: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Behind an elastic shaft any level follows better than another."""
-    held = judged()
-    none = replace(held, model=held.plain.model, choice=only(held.choice, ()), seen=held.logs)
+    evaluated = judged()
+    none = replace(
+        evaluated,
+        model=evaluated.plain.model,
+        choice=only(evaluated.choice, ()),
+        seen=evaluated.logs,
+    )
     vars(none).update(lacks_force=lacks_force, lacking=True)
     level = Change("F_cp", "N", 15.0, 16.0, 0.1)
     monkeypatch.setattr(judgement, "levels_refitted", lambda *_: ((level,), "how"))

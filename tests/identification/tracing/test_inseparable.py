@@ -58,7 +58,7 @@ def test_the_run_that_is_named_tells_the_rivals_apart() -> None:
     assert keys == {"stribeck", "nonlinear_viscous"}
     assert "explains as much" in found.rivals[0].why_not
     assert "strokes at several constant speeds" in found.next_experiment
-    told = traced((0.02, 0.05, 0.1, 0.2, 0.3))
-    assert told.verdict == "effect"
-    assert [e.effect.key for e in told.effects] == ["nonlinear_viscous"]
-    assert abs(told.effects[0].params["k"].value or 0.0) > 0.7 * SIZE["k"]
+    several = traced((0.02, 0.05, 0.1, 0.2, 0.3))
+    assert several.verdict == "effect"
+    assert [e.effect.key for e in several.effects] == ["nonlinear_viscous"]
+    assert abs(several.effects[0].params["k"].value or 0.0) > 0.7 * SIZE["k"]

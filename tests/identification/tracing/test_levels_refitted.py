@@ -27,11 +27,11 @@ def run_of(law: Karnopp, seed: int, noise: float = 1e-6) -> MotionLog:
     blank = Log("run", {"t": t, "y": np.zeros(N), "F": u, "u": u})
     run = free_run(Plant(law, Motor(1.0)), blank, (0.0, 0.0, float(u[0])), "command")
     log = blank.with_signals(y=run.shown + noise * rng.standard_normal(N))
-    return motion_log(log, held=True, by_command=False)
+    return motion_log(log, zoh=True, by_command=False)
 
 
 def found(test: Karnopp, wrong: float = 1.0) -> dict[str, float]:
-    """Relative changes that are told of a machine that became `test`; the plant of the training
+    """Relative changes that are reported of a machine that became `test`; the plant of the training
     logs has so many times the mass."""
     plant = Plant(replace(LAW, m=wrong * LAW.m), Motor(1.0))
     changes, said = levels_refitted(plant, LAW, [run_of(LAW, 1)], [run_of(test, 2)], "command", RIG)

@@ -22,7 +22,7 @@ def plain_of(effects: dict[str, dict[str, float]] | None) -> PlainModel:
 
 
 @pytest.mark.slow
-def test_only_a_plant_that_is_followed_says_how_far_noise_walks() -> None:
+def test_only_a_plant_that_is_followed_says_how_far_noise_drifts() -> None:
     followed, lost = plain_of(None), plain_of(COGGING)
     assert followed.model.misfit <= ADEQUATE < lost.model.misfit
     assert [one.reference for one in followed.rows.logs] == [followed.model.plant.friction]

@@ -148,7 +148,7 @@ def test_the_strongest_of_equations_breakaways_and_run_is_named(
     assert set(found.depends_on) == signals
 
 
-def test_how_large_an_error_is_tells_where_its_sign_is_a_matter_of_luck() -> None:
+def test_how_large_an_error_is_tells_where_its_sign_is_a_matter_of_chance() -> None:
     # Breakaways come a little early or late, by chance: no mean depends on anything.
     _, after = lacking({})
     one = after.stage.logs[0]

@@ -13,7 +13,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.tracing import structure_search
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.regression.stepwise import Choice, choose
-from identification.tracing.structure_search import likelier, settled_plain
+from identification.tracing.structure_search import finished_plain, likelier
 from tests.identification.motor_logs import made, plant, seen
 from tests.identification.tracing.settings import setting_of
 
@@ -47,7 +47,7 @@ def model(k: float) -> FittedStructure:
 def test_a_run_whose_numbers_are_as_likely_as_any_has_its_own() -> None:
     setting, choice = spring()
     assert likelier(choice, model(40.0), setting).plant == model(40.0).plant
-    prescribed = replace(model(55.0), imposed=True)
+    prescribed = replace(model(55.0), prescribed=True)
     assert likelier(choice, prescribed, setting) is prescribed
 
 
@@ -86,9 +86,9 @@ def test_what_follows_with_the_runs_numbers_lacks_nothing_with_likelier_ones(
     p = plant()
     fit = SimpleNamespace(
         friction=p.friction, actuator=p.actuator, adequate=adequate, chi_square=1.0,
-        drive=setting.drive, imposed=False,
+        drive=setting.drive, prescribed=False,
     )  # fmt: skip
     monkeypatch.setattr(structure_search, "finished", lambda *_: fit)
     monkeypatch.setattr(structure_search, "misfit", lambda *_: 4.0)
-    found = settled_plain(setting.plain, np.random.default_rng(0), lambda *_: None)
+    found = finished_plain(setting.plain, np.random.default_rng(0), lambda *_: None)
     assert found.model.misfit == left

@@ -263,9 +263,9 @@ def driven(seed: int, u: Array, plain: Karnopp, effects: Mapping[str, Mapping[st
 def test_scale_of_forces_is_as_exact_as_its_interval() -> None:
     found = traced(made(11))
     for name, true in (("k1", ACTUATOR.k1), ("k2", ACTUATOR.k2), ("m", PLAIN.m)):
-        told = found.parameters_after[name]
-        assert told.value is not None and told.sd is not None
-        assert abs(told.value - true) < 4.0 * told.sd, name
+        estimated = found.parameters_after[name]
+        assert estimated.value is not None and estimated.sd is not None
+        assert abs(estimated.value - true) < 4.0 * estimated.sd, name
 
 
 @pytest.mark.method

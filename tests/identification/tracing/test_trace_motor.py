@@ -75,18 +75,18 @@ def test_a_spring_on_a_motor_is_no_dead_zone() -> None:
     assert found.effects[0].params["k"].value == pytest.approx(60.0, rel=0.02)
 
 
-def test_noise_of_a_logged_command_is_told_from_what_a_controller_passes() -> None:
+def test_noise_of_a_logged_command_is_distinguished_from_what_a_controller_passes() -> None:
     log, rng = made(6), np.random.default_rng(0)
     noise = 0.3 * rng.standard_normal(len(log))
     noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
     assert pytest.approx(0.3, rel=0.15) == seen(noisy).noise.F
-    assert seen(noisy).walks("command") and not seen(log).walks("command")
+    assert seen(noisy).has_random_walk("command") and not seen(log).has_random_walk("command")
     filtered = np.convolve(log["y"], [400.0, -300.0, -100.0])[: len(log)]
     passed = log.with_signals(F=log["F"] + filtered, u=log["u"] + filtered / K_A)
     assert seen(passed).noise.F < 0.02
 
 
-def test_a_plant_that_walks_more_is_not_forgiven_for_it() -> None:
+def test_a_plant_that_drifts_more_is_not_forgiven_for_it() -> None:
     log, rng = made(6), np.random.default_rng(0)
     noise = 0.3 * rng.standard_normal(len(log))
     noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
@@ -137,9 +137,9 @@ def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
     high = replace(NINE, F_cp=8.0, F_cn=7.0, F_sp=22.0, F_sn=-19.0)
     one = seen(made(6, friction=high))
     start, first = first_stage([one], by_command=False)
-    told = {key: found for key, found in first.items() if key != BREAKAWAY}
+    estimated = {key: found for key, found in first.items() if key != BREAKAWAY}
     model = fitted_structure(
-        start, told, (), RecordedLogs((one,), RIG, "command"), np.random.default_rng(0)
+        start, estimated, (), RecordedLogs((one,), RIG, "command"), np.random.default_rng(0)
     )
     assert begun[0].friction.F_sp == pytest.approx(high.F_sp, rel=0.1)
     assert begun[0].friction.F_sn == pytest.approx(high.F_sn, rel=0.1)

@@ -54,7 +54,7 @@ def moved_finely(u: Array, h: float, valve: Valve, travel: float = 0.3) -> Array
 
 def made(
     seed: int, valve: Valve = TRUE, *, h: float = 0.01, duration: float = 40.0,
-    noise: float = 0.2e-3, step: float = 0.0, held: int = 1, u: Array | None = None,
+    noise: float = 0.2e-3, step: float = 0.0, zoh: int = 1, u: Array | None = None,
 ) -> Log:  # fmt: skip
     """A log; noise [m] white, step [m] of an encoder, held: samples for which y is held."""
     rng = np.random.default_rng(seed)
@@ -63,6 +63,6 @@ def made(
     y = y + noise * rng.standard_normal(len(y))
     if step:
         y = step * np.round(y / step)
-    y = y[held * (np.arange(len(y)) // held)]
+    y = y[zoh * (np.arange(len(y)) // zoh)]
     y = np.asarray(y, dtype=np.float64)
     return Log(f"valve_{seed}", {"t": h * np.arange(len(y), dtype=np.float64), "u": u, "y": y})

@@ -46,7 +46,7 @@ def test_it_finds_the_truth(seed: int, how: Mapping[str, Any]) -> None:
 
 
 def test_a_position_that_is_held_in_a_faster_log() -> None:
-    log = renewed(made(44, h=0.002, held=10, noise=1e-4, duration=30.0)).log
+    log = renewed(made(44, h=0.002, zoh=10, noise=1e-4, duration=30.0)).log
     assert log.h == pytest.approx(0.02)
     near(found_in(log), log.h)
 
@@ -75,7 +75,7 @@ def test_commands_that_never_move_it_tell_no_gain() -> None:
     assert found["g_n"].value is None and found["d_n"].value is None
 
 
-def test_no_dead_zone_is_told_as_small() -> None:
+def test_no_dead_zone_is_reported_as_small() -> None:
     found = found_in(made(50, replace(TRUE, d_p=0.0, d_n=0.0)))
     for name in ("d_p", "d_n"):
         assert found[name].value is None and found[name].known

@@ -14,15 +14,15 @@ from tests.identification.velocity.made import made
 def test_a_valve_is_no_body() -> None:
     record = recorded([made(70, duration=30.0)])
     found = fit(record)
-    held = held_out(record, found.valve, found.free, None).long
-    assert clearly_better(held, body_squares(record, found.valve))[0]
+    errors = held_out(record, found.valve, found.free, None).long
+    assert clearly_better(errors, body_squares(record, found.valve))[0]
 
 
 @pytest.mark.slow
 def test_a_body_is_no_valve() -> None:
     record = recorded([made_motor(3)])
     found = fit(record)
-    held = held_out(record, found.valve, found.free, None).long
+    errors = held_out(record, found.valve, found.free, None).long
     body = body_squares(record, found.valve)
-    assert np.sqrt(np.mean(body)) < 0.7 * np.sqrt(np.mean(held))
-    assert clearly_better(body, held)[0]
+    assert np.sqrt(np.mean(body)) < 0.7 * np.sqrt(np.mean(errors))
+    assert clearly_better(body, errors)[0]

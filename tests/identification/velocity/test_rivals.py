@@ -39,7 +39,7 @@ def test_what_is_missing_is_named(key: str) -> None:
     found = left_by_valve(recorded([slow(61, RICHER[key])]))
     assert (found.verdict, found.named) == ("effect", key)
     best = next(one for one in found.rivals if one.key == key)
-    assert best.left.rms[0] < 0.6 * found.held.rms[0]
+    assert best.left.rms[0] < 0.6 * found.unextended.rms[0]
 
 
 def test_on_a_log_that_no_fit_has_seen() -> None:
@@ -47,7 +47,7 @@ def test_on_a_log_that_no_fit_has_seen() -> None:
     train, test = recorded([slow(62, valve)]), recorded([slow(63, valve)])
     found = left_by_valve(train, replace(test, u_max=train.u_max))
     assert (found.verdict, found.named) == ("effect", "curved_gain")
-    assert len(found.held.long) == test.windows
+    assert len(found.unextended.long) == test.windows
     assert found.fitted.valve.curve_p == pytest.approx(0.25, abs=0.02)
 
 
@@ -58,7 +58,7 @@ def test_what_no_rival_has_is_unknown() -> None:
     assert (found.verdict, found.named) == ("unknown", None)
 
 
-def test_time_that_is_up_is_told() -> None:
+def test_time_that_is_up_is_reported() -> None:
     found = left_by_valve(recorded([slow(65)]), keep_going=lambda: False)
     assert set(found.not_tried) == set(RICHER)
 

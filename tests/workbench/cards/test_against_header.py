@@ -18,7 +18,7 @@ MOTOR = Rig("motor", force_per_command=30.0, command_unit="A")
         ("y", "stroke [inch]", "mm", "25.4"),
     ],
 )
-def test_another_unit_than_the_headers_is_told(
+def test_another_unit_than_the_headers_is_reported(
     name: str, column: str, unit: str, times: str
 ) -> None:
     (line,) = contradicted_units({name: SignalSpec(column=column, unit=unit)}, MOTOR).values()
@@ -39,5 +39,5 @@ def test_another_unit_than_the_headers_is_told(
         ("y", SignalSpec(column=3, unit="m")),
     ],
 )
-def test_nothing_is_told_where_the_header_says_no_other(name: str, spec: SignalSpec) -> None:
+def test_nothing_is_reported_where_the_header_says_no_other(name: str, spec: SignalSpec) -> None:
     assert contradicted_units({name: spec}, MOTOR) == {}

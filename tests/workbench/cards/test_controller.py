@@ -38,7 +38,7 @@ def card(folder: Path, rig: str = AMPS, unit: str = "A", rest: str = "") -> Card
 
 
 @pytest.mark.parametrize(
-    ("unit", "rig", "motion", "held"),
+    ("unit", "rig", "motion", "unit_kept"),
     [
         ("A", "force_per_command = 45", "linear", "A"),
         ("mA", "force_per_command = 45", "linear", "A"),
@@ -50,7 +50,7 @@ def card(folder: Path, rig: str = AMPS, unit: str = "A", rest: str = "") -> Card
     ],
 )
 def test_a_command_is_held_in_its_own_unit(
-    tmp_path: Path, unit: str, rig: str, motion: str, held: str
+    tmp_path: Path, unit: str, rig: str, motion: str, unit_kept: str
 ) -> None:
     if motion == "rotary":
         text = MOTOR.replace('"mm"', '"rad"')
@@ -59,10 +59,10 @@ def test_a_command_is_held_in_its_own_unit(
         found = load_card(path)
     else:
         found = card(tmp_path, rig, unit)
-    assert found.rig().command_unit == held
+    assert found.rig().command_unit == unit_kept
     factor, shift = found.signals["u"].scale("u", found.rig())
     assert shift == 0.0
-    expected = {"mA": 1e-3, "%": 1e-2 if held == "1" else 1.0}
+    expected = {"mA": 1e-3, "%": 1e-2 if unit_kept == "1" else 1.0}
     assert factor == pytest.approx(expected.get(unit, 1.0))
 
 

@@ -139,11 +139,11 @@ def test_a_lost_sample_is_taken_as_it_last_was(lost: float, tmp_path: Path) -> N
     inputs = what.test.inputs[:400].copy()
     inputs[100] = inputs[99]
     code = library(what, tmp_path, "gcc -O2")
-    held = driven(code, inputs)
+    repaired = driven(code, inputs)
     for at in range(inputs.shape[1]):
         holed = inputs.copy()
         holed[100, at] = lost
-        assert np.array_equal(driven(code, holed), held)
+        assert np.array_equal(driven(code, holed), repaired)
     holed[0] = lost  # before any good one: at rest where it was begun
     assert np.all(np.isfinite(driven(code, holed)))
     header = " ".join(c_files(what, filled)[f"{what.program.name}.h"].replace(" * ", "").split())

@@ -24,7 +24,7 @@ from workbench.export.filled import filled
 from workbench.export.table_targets import tables_asked
 
 ONE_PER_CENT = 0.01
-UNTOLD = Estimate(None, "N", reason="too weak; log longer", assumed=0.02)
+NOT_IDENTIFIABLE = Estimate(None, "N", reason="too weak; log longer", assumed=0.02)
 SCREW = 0.01  # m a turn
 
 
@@ -369,7 +369,7 @@ def test_what_else_a_model_lacks() -> None:
 
 def test_a_wave_of_which_a_part_is_not_told_keeps_the_rest() -> None:
     model = linear(COGGING)
-    first = {**model.effects["cogging"], "b": UNTOLD}
+    first = {**model.effects["cogging"], "b": NOT_IDENTIFIABLE}
     found = made(replace(model, effects={**model.effects, "cogging": first}), "cogging-table")
     _, orders = read.neutral(one(found, "known_cogging.csv").text)
     assert sorted(orders[:, 2]) == pytest.approx(
@@ -377,7 +377,7 @@ def test_a_wave_of_which_a_part_is_not_told_keeps_the_rest() -> None:
     )
     assert any("cogging.b is not identified (too weak)" in line for line in found.files[0].remarks)
     assert "cogging.b is not identified" in found.files[0].text
-    shape = {**model.effects["cogging"], "period": UNTOLD}
+    shape = {**model.effects["cogging"], "period": NOT_IDENTIFIABLE}
     found = made(replace(model, effects={**model.effects, "cogging": shape}), "cogging-table", "st")
     assert len(read.neutral(one(found, "known_cogging.csv").text)[1]) == 1
     assert "so cogging is left out" in one(found, ".st").text
@@ -387,7 +387,7 @@ def test_a_wave_of_which_a_part_is_not_told_keeps_the_rest() -> None:
 
 def test_an_effect_of_speed_is_needed_whole() -> None:
     model = linear(STRIBECK)
-    shape = {**model.effects["stribeck"], "v_s": UNTOLD}
+    shape = {**model.effects["stribeck"], "v_s": NOT_IDENTIFIABLE}
     with pytest.raises(BadModel, match=r"needs stribeck\.v_s, which is not identified"):
         made(replace(model, effects={"stribeck": shape}), "friction-table")
 

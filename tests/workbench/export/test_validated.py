@@ -33,7 +33,7 @@ def test_one_that_passed_is_not_spoken_of(design: Path) -> None:
     assert validation_line(DESIGN, design) == ""
 
 
-def test_one_that_failed_is_told_first(design: Path) -> None:
+def test_one_that_failed_is_reported_first(design: Path) -> None:
     validated(design, "loop", False)
     said = validation_line(DESIGN, design)
     assert said.startswith("its validation did NOT pass (loop/validation.json)")

@@ -100,7 +100,7 @@ def test_what_is_secret_in_a_url_is_not_shown(url: str) -> None:
     assert "geheim" not in str(caught.value)
 
 
-def test_a_log_that_has_gone_is_told(folder: Path) -> None:
+def test_a_log_that_has_gone_is_reported(folder: Path) -> None:
     memory = fsspec.filesystem("memory")
     memory.pipe("/gone/a/1.parquet", b"x")
     (log,) = find_logs("memory://gone")

@@ -139,7 +139,7 @@ def test_a_worker_killed_from_outside(cluster: Cluster, tmp_path: Path) -> None:
     assert done.verdicts == {"identified": 12}
 
 
-def test_what_a_worker_raises_is_told(cluster: Cluster, tmp_path: Path) -> None:
+def test_what_a_worker_raises_is_reported(cluster: Cluster, tmp_path: Path) -> None:
     done = run(cluster, tmp_path, fault, LOGS[:1])
     assert done.verdicts == {"failed": 1}
     assert "ZeroDivisionError" in done.bad[0].reason
@@ -206,7 +206,7 @@ def test_a_database_that_goes_away_loses_nothing(
 def test_a_result_against_a_version_that_is_gone_is_left(registry: Registry) -> None:
     recorder = InRegistry(registry, "tester", clock, Patience(1.0))
     assert recorder.record(result_of(log_of("a", 1)))
-    assert not recorder.record(result_of(log_of("a", 2)))  # judged without a model in force
+    assert not recorder.record(result_of(log_of("a", 2)))  # judged without an active model
     assert recorder.record(result_of(log_of("a", 1)))
 
 

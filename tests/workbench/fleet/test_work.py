@@ -48,12 +48,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     memory.rm("/bench", recursive=True)
 
 
-def done(name: str, card: str | None = None, in_force: Result | None = None) -> Result:
+def done(name: str, card: str | None = None, active: Result | None = None) -> Result:
     """The result of the log of that name."""
     (log,) = (one for one in find_logs(URL) if one.machine == name)
     item = Item(URL, log, card or card_text(), 0)
-    if in_force is not None:
-        item = replace(item, version=VERSION, model=in_force.model)
+    if active is not None:
+        item = replace(item, version=VERSION, model=active.model)
     return work(item)
 
 
@@ -64,11 +64,11 @@ def test_a_first_model_and_a_judgement_against_it(place: Path) -> None:
     assert first.model is not None and first.made is not None
     assert first.made.model == first.model
     for name in ("m", "F_cp", "F_sn"):
-        told = first.model["friction"][name]["value"]
-        assert told == pytest.approx(getattr(TABLES["paper_table1"], name), rel=2e-2)
+        value = first.model["friction"][name]["value"]
+        assert value == pytest.approx(getattr(TABLES["paper_table1"], name), rel=2e-2)
     assert len(first.sha256) == 64 and first.seconds > 0 and first.memory > 1e7
     assert first.versions["numpy"]
-    judged = done("again", in_force=first)
+    judged = done("again", active=first)
     assert (judged.verdict, judged.against) == ("none", 3)
     assert judged.sha256 != first.sha256
 
@@ -96,7 +96,7 @@ def test_a_bad_card_leaves_the_log_waiting(place: Path) -> None:
     assert found.reason.startswith("good.parquet: card.toml: is not TOML")
 
 
-def test_a_log_that_has_gone_is_set_aside(place: Path) -> None:
+def test_a_log_that_has_gone_is_excluded(place: Path) -> None:
     (log,) = (one for one in find_logs(URL) if one.machine == "good")
     found = work(Item(URL, replace(log, path="/bench/none.parquet"), card_text(), 0))
     assert (found.verdict, found.sha256) == ("set_aside", "")

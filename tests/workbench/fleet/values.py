@@ -37,12 +37,12 @@ def result_of(log: LogFile, m: float = 1.0) -> Result:
 
 
 def answer(item: Item) -> Result:
-    """A result at once; it tells the model in force that it was given."""
+    """A result at once; it tells the active model that it was given."""
     return result_of(item.log) if item.version is None else judged(item)
 
 
 def judged(item: Item) -> Result:
-    """No drift, against the version in force."""
+    """No drift, against the active version."""
     assert item.version is not None
     digest = hashlib.sha256(item.log.name.encode()).hexdigest()
     return Result(item.log, "none", "same", digest, against=item.version.number)

@@ -22,10 +22,10 @@ from workbench.interface.models import IdentifyResult
 from workbench.output import dumps
 
 
-def result(walk: Posterior | None = None) -> IdentifyResult:
+def result(sampled: Posterior | None = None) -> IdentifyResult:
     found = identified()
     return IdentifyResult(
-        found.card if hasattr(found, "card") else _card(), replace(found, posterior_samples=walk)
+        found.card if hasattr(found, "card") else _card(), replace(found, posterior_samples=sampled)
     )
 
 
@@ -36,17 +36,17 @@ def _card() -> Any:
     return load_card(card_path("paper_table1_rich"))
 
 
-def walk(draws: int = 30) -> Posterior:
+def sampled(draws: int = 30) -> Posterior:
     """Chains whose values say parameter, ensemble and draw: 1000 k + ensemble + draw / 100."""
     names = tuple(identified().fit.free)
     ensemble, draw, k = np.meshgrid(
         np.arange(4), np.arange(draws), np.arange(len(names)), indexing="ij"
     )
     chains = 1000.0 * k + ensemble + draw / 100.0
-    told = dict.fromkeys(names, 1.0)
+    ones = dict.fromkeys(names, 1.0)
     way = "the run over the whole of each log"
     return Posterior(
-        names, chains, told, told, way, 0.3, 32, draws, 32 * draws, True, "converged"
+        names, chains, ones, ones, way, 0.3, 32, draws, 32 * draws, True, "converged"
     )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def test_the_plant_and_the_loop_in_python_control() -> None:
 
 @pytest.mark.slow
 def test_the_posterior_in_arviz_has_a_chain_for_each_ensemble() -> None:
-    found = result(walk()).to_arviz()
+    found = result(sampled()).to_arviz()
     names = identified().fit.free
     assert list(found.posterior.data_vars) == list(names)
     assert dict(found.posterior.sizes) == {"chain": 4, "draw": 30}
@@ -94,7 +94,7 @@ def test_without_arviz_the_command_that_installs_it_is_named(
 
     monkeypatch.setattr(importlib, "import_module", without)
     with pytest.raises(UserError, match=r"pip install 'servo-workbench\[arviz\]'"):
-        result(walk()).to_arviz()
+        result(sampled()).to_arviz()
 
 
 def test_nothing_heavy_is_imported_before_it_is_named() -> None:

@@ -397,7 +397,7 @@ def test_missing_values_of_a_table_are_missing_samples(bench: Bench) -> None:
     assert [(one.signal, one.kind) for one in found.bad] == [("y", "missing")]
 
 
-def test_several_tables_are_told_apart(bench: Bench) -> None:
+def test_several_tables_are_distinguished(bench: Bench) -> None:
     from workbench.interface.inputs import sources
 
     found = sources([bench.frame(name) for name in LOGS], None, "force", None)

@@ -1,4 +1,4 @@
-"""Folders of machines with logs of one line, and a first version in force."""
+"""Folders of machines with logs of one line, and a first active version."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,8 +19,8 @@ def machine(root: Path, name: str, logs: dict[str, str]) -> Path:
     return folder
 
 
-def in_force(registry: Registry, *names: str) -> None:
-    """A first version of each machine, in force."""
+def activate(registry: Registry, *names: str) -> None:
+    """A first version of each machine, active."""
     for name in names:
         registry.add(name, Candidate({"first": name}), reason="first", by="test", now=NOW)
         registry.promote(name, 1, reason="first", by="test", now=NOW)

@@ -13,7 +13,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.workbench.jobs.listener import Listener
-from tests.workbench.jobs.machines import in_force, machine
+from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import ignore, judge, short_pass
 from workbench.jobs.alarms import (
     GIVEN_UP_AFTER,
@@ -37,7 +37,7 @@ MINUTE = timedelta(minutes=1)
 @pytest.fixture
 def judged(registry: Registry, tmp_path: Path) -> Registry:
     """A registry with a quiet log, a drifted one and a bad one."""
-    in_force(registry, "a")
+    activate(registry, "a")
     machine(tmp_path / "m", "a", {"1.csv": "quiet", "2.csv": "drift", "3.csv": "bad"})
     short_pass(registry, judge, tmp_path / "m", "w").run()
     return registry
@@ -47,14 +47,14 @@ def judged(registry: Registry, tmp_path: Path) -> Registry:
 def fleet(registry: Registry, tmp_path: Path) -> Registry:
     """A registry with an alarm of each of ten machines, m0 to m9."""
     names = [f"m{i}" for i in range(10)]
-    in_force(registry, *names)
+    activate(registry, *names)
     for name in names:
         machine(tmp_path / "m", name, {"1.csv": f"bad {name}"})
     short_pass(registry, judge, tmp_path / "m", "w").run()
     return registry
 
 
-class Told(list[tuple[str, dict[str, Any]]]):
+class Reports(list[tuple[str, dict[str, Any]]]):
     """Events as they were reported."""
 
     def __call__(self, event: str, **details: object) -> None:
@@ -100,12 +100,12 @@ def test_alarms_are_sent_once_although_the_server_stumbles(
 
 
 @pytest.mark.slow
-def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: Listener) -> None:
-    told = Told()
-    found = send(judged, dead(), report=told)
+def test_a_dead_webhook_is_reported_and_tried_again(judged: Registry, listener: Listener) -> None:
+    reports = Reports()
+    found = send(judged, dead(), report=reports)
     assert (found.sent, found.waiting) == (0, 2)
-    assert [event for event, _ in told] == ["webhook_failed"]
-    assert "Connection refused" in told[0][1]["reason"]
+    assert [event for event, _ in reports] == ["webhook_failed"]
+    assert "Connection refused" in reports[0][1]["reason"]
     assert send(judged, webhook(listener)).sent == 2
     assert send(judged, webhook(listener), later=2 * GIVEN_UP_AFTER) == Delivery()
 
@@ -113,11 +113,11 @@ def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: L
 @pytest.mark.slow
 def test_a_refused_alarm_delays_itself_alone(fleet: Registry, listener: Listener) -> None:
     listener.by_machine = {"m0": 422}
-    told = Told()
-    found = send(fleet, webhook(listener), report=told)
+    reports = Reports()
+    found = send(fleet, webhook(listener), report=reports)
     assert found == Delivery(9, 1, 0, "answered 422 Unprocessable Entity")
     assert {a["machine"] for a in listener.taken} == {f"m{i}" for i in range(1, 10)}
-    assert [(event, said["machine"]) for event, said in told] == [("alarm_refused", "m0")]
+    assert [(event, said["machine"]) for event, said in reports] == [("alarm_refused", "m0")]
     # Another process finds it waiting, and does not try it before its time.
     listener.by_machine = {}
     with Registry(str(fleet.database.where)) as other:
@@ -130,18 +130,18 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
     fleet: Registry, listener: Listener
 ) -> None:
     listener.by_machine = {"m3": 400}
-    told, passed = Told(), timedelta(0)
+    reports, passed = Reports(), timedelta(0)
     tries: list[timedelta] = []
     while passed < GIVEN_UP_AFTER + 10 * MINUTE:
-        before = told.events().count("alarm_refused")
-        send(fleet, webhook(listener), later=passed, report=told)
-        if told.events().count("alarm_refused") > before:
+        before = reports.events().count("alarm_refused")
+        send(fleet, webhook(listener), later=passed, report=reports)
+        if reports.events().count("alarm_refused") > before:
             tries.append(passed)
         passed += 5 * MINUTE
     gaps = [after - earlier for earlier, after in pairwise(tries)]
     assert gaps == sorted(gaps) and gaps[0] <= 5 * MINUTE and gaps[-1] >= LONGEST_DELAY
     assert len(tries) < 20
-    given_up = [said for event, said in told if event == "alarm_given_up"]
+    given_up = [said for event, said in reports if event == "alarm_given_up"]
     assert [said["machine"] for said in given_up] == ["m3"]
     assert send(fleet, webhook(listener), later=passed) == Delivery()
 
@@ -164,13 +164,13 @@ def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
         raise Unreachable("no answer within 5 s")
 
     monkeypatch.setattr(Webhook, "send", hang)
-    told = Told()
+    reports = Reports()
     for _ in range(3):
-        assert send(fleet, dead(), report=told) == Delivery(0, 10, 0, "no answer within 5 s")
+        assert send(fleet, dead(), report=reports) == Delivery(0, 10, 0, "no answer within 5 s")
     assert tried == [f"m{i}" for i in range(3 * IN_A_ROW)]
-    assert told.events() == ["webhook_failed"] * 3
-    assert [said["waiting"] for _, said in told] == [10] * 3
-    assert send(fleet, dead(), later=GIVEN_UP_AFTER + MINUTE, report=told).given_up == 10
+    assert reports.events() == ["webhook_failed"] * 3
+    assert [said["waiting"] for _, said in reports] == [10] * 3
+    assert send(fleet, dead(), later=GIVEN_UP_AFTER + MINUTE, report=reports).given_up == 10
 
 
 @pytest.mark.slow
@@ -192,12 +192,12 @@ def test_an_alarm_on_which_we_fail_does_not_stop_the_others(
         sent(self, alarm, client)
 
     monkeypatch.setattr(Webhook, "send", fail)
-    told = Told()
-    found = send(fleet, webhook(listener, "/secret"), report=told)
+    reports = Reports()
+    found = send(fleet, webhook(listener, "/secret"), report=reports)
     assert found == Delivery(9, 1, 0, "fault of ours: ZeroDivisionError")
-    assert told.events() == ["fault_of_ours", "alarm_refused"]
-    assert "in fail" in told[0][1]["traceback"]
-    assert "secret" not in repr(told)
+    assert reports.events() == ["fault_of_ours", "alarm_refused"]
+    assert "in fail" in reports[0][1]["traceback"]
+    assert "secret" not in repr(reports)
 
 
 @pytest.mark.slow
@@ -233,7 +233,7 @@ def test_any_machine_goes_from_its_folder_to_the_webhook(
     registry: Registry, listener: Listener, tmp_path: Path
 ) -> None:
     names = ["Pr\u00fcfstand", 'a "b"', "\u65e5" * 80]
-    in_force(registry, *names)
+    activate(registry, *names)
     for name in names:
         machine(tmp_path / "m", name, {f"{name[:40]}\udcff.csv": f"bad {name}"})
     for count in (3, 0):
@@ -265,16 +265,16 @@ def test_the_address_is_never_shown(
         listener.by_machine = {"a": status}
     port = 9 if status is None else listener.server_port
     to = Webhook(SECRET.format(port=port), longest_wait=0.01)
-    told = Told()
+    reports = Reports()
     with caplog.at_level(logging.INFO):
-        found = send(judged, to, report=told)
-        send(judged, to, later=GIVEN_UP_AFTER + MINUTE, report=told)
+        found = send(judged, to, report=reports)
+        send(judged, to, later=GIVEN_UP_AFTER + MINUTE, report=reports)
     assert found.sent == (2 if status == 200 else 0)
-    shown = repr((told, to, found)) + caplog.text
+    shown = repr((reports, to, found)) + caplog.text
     assert "geheim" not in shown and "services" not in shown
     if status != 200:
         assert f"http://127.0.0.1:{port}/..." in shown
-        assert told.events()[-2:] == ["alarm_given_up"] * 2
+        assert reports.events()[-2:] == ["alarm_given_up"] * 2
 
 
 @pytest.mark.parametrize(

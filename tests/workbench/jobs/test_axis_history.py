@@ -1,4 +1,4 @@
-"""What the registry gives an axis test: the last logs of a machine, and its model in force."""
+"""What the registry gives an axis test: the last logs of a machine, and its active model."""
 
 from collections.abc import Iterator
 from dataclasses import replace

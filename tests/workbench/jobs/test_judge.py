@@ -147,7 +147,7 @@ def test_a_drifted_machine_gets_a_new_version(shop: Path, first: Judgement) -> N
 
 
 @pytest.mark.slow
-def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
+def test_a_model_alone_is_replaced_where_the_active_design_is_not_beaten(
     shop: Path, first: Judgement
 ) -> None:
     found = Chain(says("drift"), Terms(loop=0.9))(task(shop, "drifted", first))

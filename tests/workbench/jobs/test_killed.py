@@ -3,7 +3,7 @@
 30 of them, or as many as the variable KILLS says.
 
 Among the logs are some that come late and some that are to be judged again: none of them puts an
-older model in force.
+older model active.
 """
 
 import json
@@ -21,7 +21,7 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-from tests.workbench.jobs.machines import in_force, machine
+from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import LEASE, clock, one_pass, work
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
@@ -35,7 +35,7 @@ MOST = 4 * KILLS  # where starting takes long, few do: kills go on for so long
 LONGEST = 0.16  # s that a worker lives at most
 SEED = 20260301
 KINDS = ("quiet", "drift", "bad")
-LED_TO = {"quiet": {"none"}, "drift": {"promoted", "refused"}, "bad": {"set_aside"}}
+EXPECTED_OUTCOMES = {"quiet": {"none"}, "drift": {"promoted", "refused"}, "bad": {"set_aside"}}
 DECIDED = """SELECT d.kind, d.machine, l.sha256 FROM decision d JOIN log l ON l.id = d.log_id"""
 OUTCOMES = """SELECT o.verdict, l.machine, l.sha256 FROM outcome o JOIN log l ON l.id = o.log_id
 WHERE o.verdict IN ('promoted', 'refused')"""
@@ -91,7 +91,7 @@ def test_killed_at_random_points(where: str, tmp_path: Path) -> None:
     root = tmp_path / "machines"
     rng = random.Random(SEED)
     with Registry(where) as registry:
-        in_force(registry, *MACHINES)
+        activate(registry, *MACHINES)
     fill(root, 0, rng)  # a worker with no folder to look at would end by itself
     context = starter()
     running = [begin(context, where, root, i) for i in range(2)]
@@ -134,7 +134,7 @@ def begin(
 
 
 def check(registry: Registry) -> None:
-    """Every result has all that belongs to it, and no older log has changed what is in force.
+    """Every result has all that belongs to it, and no older log has changed what is active.
 
     Read in one transaction, since another worker goes on meanwhile.
     """
@@ -146,7 +146,7 @@ def check(registry: Registry) -> None:
     for name in MACHINES:
         own = [row for row in promoted if row[0] == name]
         for before, after in pairwise(own):
-            assert json.loads(after[5])["after"] == before[2]  # judged against the one in force
+            assert json.loads(after[5])["after"] == before[2]  # judged against the active one
             if before[3] is not None:
                 assert (before[3], before[4]) <= (after[3], after[4])
                 assert number_of(before[4]) <= number_of(after[4])
@@ -167,14 +167,14 @@ def complete(registry: Registry, root: Path) -> None:
     queue = Queue(registry.database)
     for name in MACHINES:
         assert not queue.waiting(name)
-        led_to: dict[str, set[str]] = {}
+        outcomes_of: dict[str, set[str]] = {}
         for outcome in queue.outcomes(name):
-            led_to.setdefault(outcome.log.file, set()).add(outcome.verdict)
+            outcomes_of.setdefault(outcome.log.file, set()).add(outcome.verdict)
         files = {path.name: path for path in (root / name / "logs").glob("*.csv")}
-        assert set(led_to) == set(files)
-        for file, verdicts in led_to.items():
+        assert set(outcomes_of) == set(files)
+        for file, verdicts in outcomes_of.items():
             kind = files[file].read_text(encoding="utf-8").split()[0]
-            assert verdicts <= LED_TO[kind], file
+            assert verdicts <= EXPECTED_OUTCOMES[kind], file
     with registry.database.reading() as session:
         turns = rows(session, TURNS)
     assert all(results == again + 1 for _, results, again in turns)

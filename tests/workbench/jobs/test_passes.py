@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from identification.errors import BadCard, BadLog, NotIdentifiable
-from tests.workbench.jobs.machines import in_force, machine
+from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, short_pass
 from tests.workbench.registry.postgres import Server
 from workbench.jobs.options import is_gone
@@ -44,8 +44,8 @@ def verdicts(done: PassReport) -> dict[str, str]:
     return {one.log.file: one.verdict for one in done.outcomes}
 
 
-def test_each_log_once_a_bad_one_set_aside(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a", "b")
+def test_each_log_once_a_bad_one_excluded(run: Run, registry: Registry, root: Path) -> None:
+    activate(registry, "a", "b")
     machine(root, "a", {"1.csv": "quiet", "2.csv": "bad", "3.csv": "drift", "4.csv": "quiet too"})
     logs = machine(root, "b", {"1.csv": "quiet"})
     (logs / "notes.md").write_text("no log", encoding="utf-8")
@@ -73,7 +73,7 @@ def test_each_log_once_a_bad_one_set_aside(run: Run, registry: Registry, root: P
 def test_logs_of_a_machine_come_in_order_and_evidence_goes_on(
     run: Run, registry: Registry, root: Path
 ) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {f"{i}.csv": f"quiet {i}" for i in range(4)})
     for i in range(4):
         os.utime(logs / f"{i}.csv", (1000.0 - i, 1000.0 - i))
@@ -88,22 +88,22 @@ def test_logs_of_a_machine_come_in_order_and_evidence_goes_on(
 
 @pytest.mark.slow
 def test_a_file_still_being_written_is_left(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {"old.csv": "quiet", "new.csv": "quiet 2", "late.csv": "quiet 3"})
     os.utime(logs / "old.csv", (1000.0, 1000.0))
     future = datetime.now(UTC).timestamp() + 3600
     os.utime(logs / "late.csv", (future, future))
-    told: list[tuple[str, Any]] = []
-    done = run(settle=30.0, report=lambda e, **d: told.append((e, d.get("file"))))
+    reports: list[tuple[str, Any]] = []
+    done = run(settle=30.0, report=lambda e, **d: reports.append((e, d.get("file"))))
     assert verdicts(done) == {"old.csv": "none"}
     assert done.growing == 2
-    assert ("log_from_the_future", "late.csv") in told
+    assert ("log_from_the_future", "late.csv") in reports
     assert verdicts(run()) == {"new.csv": "none"}
 
 
 @pytest.mark.slow
 def test_a_file_open_for_writing_is_left(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {})
     with (logs / "1.csv").open("w", encoding="utf-8") as file:
         file.write("quiet")
@@ -121,7 +121,7 @@ def test_a_file_open_for_writing_is_left(run: Run, registry: Registry, root: Pat
 def test_a_file_that_changes_while_it_is_judged_has_no_result(
     run: Run, registry: Registry, root: Path
 ) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {"1.csv": "quiet"})
 
     def slow(task: Task) -> Judgement:
@@ -131,7 +131,7 @@ def test_a_file_that_changes_while_it_is_judged_has_no_result(
 
     assert run(slow).outcomes == ()
     done = run(slow)
-    # Of the earlier content nothing can be told any more; the later one has its own result.
+    # Of the earlier content nothing can be reported any more; the later one has its own result.
     assert [(o.verdict, "changed before" in o.reason) for o in done.outcomes] == [
         ("set_aside", True),
         ("none", False),
@@ -140,7 +140,7 @@ def test_a_file_that_changes_while_it_is_judged_has_no_result(
 
 @pytest.mark.slow
 def test_a_log_taken_away_waits(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
     run(stopping_judge)
     (logs / "2.csv").rename(root / "elsewhere.csv")
@@ -170,7 +170,7 @@ def stopping_judge_after(file: str) -> Judge:
 def test_one_machine_that_fails_does_not_stop_others(
     run: Run, registry: Registry, root: Path
 ) -> None:
-    in_force(registry, "a", "b", "c")
+    activate(registry, "a", "b", "c")
     for name in "abc":
         machine(root, name, {"1.csv": f"quiet {name}"})
 
@@ -194,7 +194,7 @@ def test_one_machine_that_fails_does_not_stop_others(
 def test_a_fault_of_ours_on_one_machine_does_not_stop_others(
     run: Run, registry: Registry, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    in_force(registry, "a", "b")
+    activate(registry, "a", "b")
     for name in "ab":
         machine(root, name, {"1.csv": f"quiet {name}"})
     announce = Queue.announce
@@ -205,11 +205,11 @@ def test_a_fault_of_ours_on_one_machine_does_not_stop_others(
         return announce(queue, name, *given, **more)
 
     monkeypatch.setattr(Queue, "announce", failing)
-    told: list[tuple[str, Any]] = []
-    done = run(report=lambda event, **more: told.append((event, more.get("traceback"))))
+    reports: list[tuple[str, Any]] = []
+    done = run(report=lambda event, **more: reports.append((event, more.get("traceback"))))
     assert dict(done.failed) == {"a": "fault of ours: ZeroDivisionError: of ours"}
     assert [o.machine for o in done.outcomes] == ["b"]
-    (trace,) = (shown for event, shown in told if event == "fault_of_ours")
+    (trace,) = (shown for event, shown in reports if event == "fault_of_ours")
     assert "Traceback" in trace and "of ours" in trace
 
 
@@ -220,7 +220,7 @@ def odd(folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a", "z")
+    activate(registry, "a", "z")
     logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "quiet 2"})
     odd(logs).write_text("bad", encoding="utf-8")
     machine(root, os.fsdecode(b"caf\xe9"), {"1.csv": "drift"})
@@ -240,7 +240,7 @@ def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root
 def test_a_marker_tells_that_a_writer_has_finished(
     run: Run, registry: Registry, root: Path
 ) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "quiet 2"})
     (logs / "2.csv.done").touch()
     done = run(marker=".done")
@@ -252,7 +252,7 @@ def test_a_marker_tells_that_a_writer_has_finished(
 
 @pytest.mark.slow
 def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     machine(root, "a", {"log5.csv": "drift 5"})
     assert verdicts(run()) == {"log5.csv": "promoted"}
     machine(root, "a", {"log0.csv": "drift 0"})
@@ -284,7 +284,7 @@ def test_the_clock_is_the_databases_where_it_has_one(registry: Registry) -> None
 
 @pytest.mark.slow
 def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     raises = {
         "1.csv": (BadLog("1.csv: gap"), "set_aside", "1.csv: gap"),
         "2.csv": (NotIdentifiable("nothing moves"), "not_judged", "nothing moves"),
@@ -296,20 +296,20 @@ def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Pat
         "4.csv": (KeyError("oops"), "set_aside", "4.csv: fault of ours: KeyError: 'oops'"),
     }
     machine(root, "a", {name: name for name in raises})
-    told: list[str] = []
+    reports: list[str] = []
 
     def failing(task: Task) -> Judgement:
         raise raises[task.log.file][0]
 
-    done = run(failing, report=lambda event, **_: told.append(event))
+    done = run(failing, report=lambda event, **_: reports.append(event))
     found = {o.log.file: (o.verdict, o.reason) for o in done.outcomes}
     assert found == {name: (verdict, reason) for name, (_, verdict, reason) in raises.items()}
-    assert told.count("fault_of_ours") == 1
+    assert reports.count("fault_of_ours") == 1
 
 
 @pytest.mark.slow
-def test_a_log_that_ends_its_workers_is_set_aside(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+def test_a_log_that_ends_its_workers_is_excluded(run: Run, registry: Registry, root: Path) -> None:
+    activate(registry, "a")
     machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
     for _ in range(3):
         assert run(stopping_judge).outcomes == ()
@@ -332,7 +332,7 @@ def test_a_machine_without_a_model_waits(run: Run, registry: Registry, root: Pat
 @pytest.mark.slow
 def test_many_workers_at_once_judge_every_log_once(registry: Registry, root: Path) -> None:
     names = [f"m{i}" for i in range(4)]
-    in_force(registry, *names)
+    activate(registry, *names)
     for name in names:
         machine(root, name, {f"{i}.csv": f"{'drift' if i % 3 else 'quiet'} {i}" for i in range(6)})
     where = registry.database.where
@@ -356,7 +356,7 @@ def test_a_database_away_in_the_middle(postgres: Server, tmp_path: Path) -> None
     root = tmp_path / "machines"
     url = postgres.database()
     with Registry(url) as registry:
-        in_force(registry, "a")
+        activate(registry, "a")
         machine(root, "a", {"1.csv": "drift"})
 
         def outage(task: Task) -> Judgement:
@@ -392,7 +392,7 @@ def test_a_root_that_is_none(run: Run, root: Path) -> None:
 
 
 def test_notes_beside_the_logs_are_no_alarm(run: Run, registry: Registry, root: Path) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     logs = {"1.csv": "bad", "empty.txt": "", "notes.txt": "28.11.2026 changed the belt of axis 2\n",
             "2.txt": "t y u\n0.0 1.0 2.0\n0.1 1.1 2.0\n"}  # fmt: skip
     machine(root, "a", logs)
@@ -405,7 +405,7 @@ def test_notes_beside_the_logs_are_no_alarm(run: Run, registry: Registry, root: 
 def test_a_machine_in_other_hands_is_said_and_a_dead_workers_is_taken(
     run: Run, registry: Registry, root: Path
 ) -> None:
-    in_force(registry, "a")
+    activate(registry, "a")
     machine(root, "a", {"1.csv": "quiet"})
     queue, here = Queue(registry.database), f"{socket.gethostname()}:"
     living, minute = f"{here}{os.getpid()}:abcd", timedelta(minutes=1)

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from watchfiles import Change
 
-from tests.workbench.jobs.machines import in_force, machine
+from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import clock, ignore
 from workbench.jobs.passes import Report
 from workbench.jobs.watching import BadSchedule, of_log, watch_machines
@@ -121,10 +121,10 @@ def test_passes_never_overlap(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_watcher_dies_of_is_told_and_it_goes_on(tmp_path: Path) -> None:
+def test_what_the_watcher_dies_of_is_reported_and_it_goes_on(tmp_path: Path) -> None:
     logs = machine(tmp_path, "a", {})
     passes: list[int] = []
-    told: list[str] = []
+    reports: list[str] = []
 
     def once() -> bool:
         passes.append(len(list(logs.iterdir())))
@@ -134,11 +134,11 @@ def test_what_the_watcher_dies_of_is_told_and_it_goes_on(tmp_path: Path) -> None
         (logs / f"{time.monotonic_ns()}.csv").write_text("quiet", encoding="utf-8")
         return len(passes) >= 4
 
-    with watching(tmp_path, once, lambda event, **_: told.append(event)):
+    with watching(tmp_path, once, lambda event, **_: reports.append(event)):
         until(lambda: len(passes) == 1)
-        until(lambda: "watcher_failed" in told or not write_odd(logs))
+        until(lambda: "watcher_failed" in reports or not write_odd(logs))
         until(one_more)
-    assert set(told) == {"watcher_failed"}
+    assert set(reports) == {"watcher_failed"}
 
 
 def write_odd(logs: Path) -> bool:
@@ -177,7 +177,7 @@ def test_a_schedule_that_is_none(tmp_path: Path) -> None:
 def test_the_command_serves_metrics_and_ends_on_a_signal(tmp_path: Path) -> None:
     where, root = tmp_path / "r.db", tmp_path / "machines"
     with Registry(str(where)) as registry:
-        in_force(registry, "a")
+        activate(registry, "a")
     machine(root, "a", {"1.csv": "t,y\n0,0\n"})
     (root / "a" / "card.toml").write_text(
         '[card]\nname = "a"\n[rig]\nkind = "force"\n[signals]\nt = { column = "t", unit = "s" }\n'

@@ -30,7 +30,7 @@ def clock() -> datetime:
 
 
 def judge(task: Task) -> Judgement:
-    """By the file's text: "bad" is set aside, "drift" makes a new version, others are quiet."""
+    """By the file's text: "bad" is excluded, "drift" makes a new version, others are quiet."""
     text = task.path.read_text(encoding="utf-8")
     time.sleep(0.002)
     if "bad" in text:

@@ -56,7 +56,7 @@ def test_waveforms_of_tdms_have_a_clock_from_the_earliest_start(tmp_path: Path) 
     np.testing.assert_allclose(log["F"][smooth], expected[smooth], rtol=1e-4)
 
 
-def test_what_is_brought_to_another_clock_is_told(tmp_path: Path) -> None:
+def test_what_is_brought_to_another_clock_is_reported(tmp_path: Path) -> None:
     fast = signals(4000, 0.001)
     groups = {"A": (0.0, 0.01, {"y": signals()["y"]}), "B": (0.0, 0.001, {"F": fast["F"]})}
     write_waveforms(tmp_path / "a.tdms", groups)

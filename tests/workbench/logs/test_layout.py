@@ -119,7 +119,7 @@ def test_a_header_below_a_preamble(tmp_path: Path, above: str, units: str) -> No
         np.testing.assert_allclose(log[name], expected, rtol=1e-8, atol=1e-12)
 
 
-def test_a_bad_field_is_told_with_its_line_in_the_file(tmp_path: Path) -> None:
+def test_a_bad_field_is_reported_with_its_line_in_the_file(tmp_path: Path) -> None:
     rows = [";".join(row) for row in zip(*columns().values(), strict=True)]
     rows[50:60] = ["500;OFF;1"] * 10
     head = PREAMBLES["key and value"] + "t;ActPos;Force\n" + UNITS["plain"]

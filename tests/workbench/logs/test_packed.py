@@ -60,7 +60,7 @@ def test_what_is_packed_is_text_of_a_bounded_size(
         read_unknown(archive(tmp_path / "long.zip", plain))
 
 
-def test_a_workbook_by_another_name_is_told(tmp_path: Path) -> None:
+def test_a_workbook_by_another_name_is_reported(tmp_path: Path) -> None:
     (tmp_path / "[Content_Types].xml").write_text("<x/>", "utf-8")
     path = archive(tmp_path / "log.csv", tmp_path / "[Content_Types].xml")
     with pytest.raises(BadLog, match=r"an Excel workbook by its content; name it \.xlsx"):

@@ -21,7 +21,7 @@ def files(folder: Path, *names: str) -> list[str]:
     return [str(folder / name) for name in names]
 
 
-def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
+def test_files_of_one_name_in_two_folders_are_distinguished(tmp_path: Path) -> None:
     names = files(tmp_path, "monday/run.csv", "friday/run.csv", "friday/other.csv")
     found = read_sources(names, str(tmp_path / "card.toml")).runs
     assert [run.log.name for run in found] == ["monday/run.csv", "friday/run.csv", "other.csv"]

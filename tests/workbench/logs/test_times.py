@@ -80,7 +80,7 @@ def test_numbers_are_no_times() -> None:
     assert seconds(np.asarray(["0.1", "0.2"], dtype=object), "a", 1) is None
 
 
-def test_what_is_no_time_among_times_is_told_with_its_row() -> None:
+def test_what_is_no_time_among_times_is_reported_with_its_row() -> None:
     with pytest.raises(BadLog, match="a, row 3: 'soon' is no time as the first cell is"):
         read(["0 sec", "1 sec", "soon"])
 

@@ -14,7 +14,7 @@ from workbench.page.worker import Work
 from workbench.registry.bench import Bench
 
 LEASE = timedelta(seconds=1.0)
-LOOKS_EVERY = 0.05  # s
+POLL_PERIOD = 0.05  # s
 
 
 def quick(work: Work, course: Course) -> str:
@@ -37,7 +37,7 @@ def work(where: str, root: str, *, once: bool = False) -> None:
     """Run a worker with `quick` in place of the fits, which Ctrl-C ends however it was started."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     patched: Any = worker
-    patched.done, patched.TASK_LEASE, patched.QUEUE_POLL = quick, LEASE, LOOKS_EVERY
+    patched.done, patched.TASK_LEASE, patched.QUEUE_POLL = quick, LEASE, POLL_PERIOD
     settings = PageSettings(where, Path(root))
     worker.run_worker(settings, lambda event, **details: None, once=once)
 

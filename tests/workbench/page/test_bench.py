@@ -77,7 +77,7 @@ def test_what_is_given_back_waits_and_what_kills_is_given_up(where: str) -> None
     with Registry(where) as registry:
         bench = bench_of(registry)
         task = bench.ask(UPLOAD, "trace", by="anna", now=NOW)
-        for _ in range(2 * MOST_BEGUN):  # told to end is not the task's fault
+        for _ in range(2 * MOST_BEGUN):  # asked to end is not the task's fault
             bench.give_back(claimed(bench, "w"))
         for k in range(MOST_BEGUN):
             claimed(bench, "w", 60.0 * k)

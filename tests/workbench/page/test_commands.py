@@ -42,7 +42,7 @@ def test_a_prefix_is_a_path(prefix: str, capsys: pytest.CaptureFixture[str]) -> 
     assert "a path needed, as /servo" in capsys.readouterr().err
 
 
-def test_what_is_wrong_with_a_registry_is_told_first(
+def test_what_is_wrong_with_a_registry_is_reported_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

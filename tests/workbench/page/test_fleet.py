@@ -1,4 +1,4 @@
-"""The fleet at a glance: states by the last log, what moved most, pages cut by the database."""
+"""Summary of the fleet: states by the last log, what moved most, pages cut by the database."""
 
 from datetime import timedelta
 from typing import Any
@@ -24,7 +24,7 @@ from workbench.registry.values import Candidate, Judgement, LogVerdict, SeenLog
 HOUR = timedelta(hours=1)
 
 
-def told(name: str, change: float, sd: float = 0.01) -> dict[str, Any]:
+def parameter_moved(name: str, change: float, sd: float = 0.01) -> dict[str, Any]:
     after = 10.0 * (1.0 + change)
     return {"name": name, "unit": "N", "before": 10.0, "after": after, "low": after - 0.2,
             "high": after + 0.2, "change": change, "sd": sd}  # fmt: skip
@@ -62,8 +62,14 @@ def test_a_state_is_that_of_the_last_log(where: str) -> None:
         for name in ("tuned", "drifts", "changed", "bad", "unsure", "new"):
             registry.add(name, Candidate({"m": 1.0}), reason="r", by="t", now=NOW)
         judge(registry, "tuned", 1, "refused", evidence(verdict="drift"))
-        judge(registry, "tuned", 2, "none", evidence(told("F_cp", 0.01)))
-        judge(registry, "drifts", 1, "refused", evidence(told("F_cp", 0.3), verdict="drift"))
+        judge(registry, "tuned", 2, "none", evidence(parameter_moved("F_cp", 0.01)))
+        judge(
+            registry,
+            "drifts",
+            1,
+            "refused",
+            evidence(parameter_moved("F_cp", 0.3), verdict="drift"),
+        )
         judge(registry, "changed", 1, "structure", evidence(verdict="structure"))
         judge(registry, "bad", 1, "set_aside", {})
         judge(registry, "unsure", 1, "not_judged", {})
@@ -89,7 +95,13 @@ def test_pages_are_filtered_sorted_and_cut(where: str) -> None:
         for k in range(7):
             registry.add(f"m{k}", Candidate({"m": 1.0}), reason="r", by="t", now=NOW)
         for k, moved in ((1, -0.2), (3, 0.1), (5, 0.4)):
-            judge(registry, f"m{k}", k, "refused", evidence(told("m", moved), verdict="drift"))
+            judge(
+                registry,
+                f"m{k}",
+                k,
+                "refused",
+                evidence(parameter_moved("m", moved), verdict="drift"),
+            )
         judge(registry, "m2", 2, "structure", evidence())
         assert names(registry, order="machine", per_page=3) == ["m0", "m1", "m2"]
         assert names(registry, order="machine", per_page=3, page=3) == ["m6"]
@@ -108,14 +120,19 @@ def test_pages_are_filtered_sorted_and_cut(where: str) -> None:
 
 def test_what_moved_most_is_what_surely_moved() -> None:
     assert most_moved({}) == (None, None)
-    assert most_moved(evidence(told("a", 0.5, 0.5), told("b", -0.1, 0.01))) == ("b", -0.1)
-    assert most_moved(evidence(told("a", 0.01, 0.01), told("b", 0.015, 0.1)))[0] == "a"
+    assert most_moved(
+        evidence(parameter_moved("a", 0.5, 0.5), parameter_moved("b", -0.1, 0.01))
+    ) == ("b", -0.1)
+    assert (
+        most_moved(evidence(parameter_moved("a", 0.01, 0.01), parameter_moved("b", 0.015, 0.1)))[0]
+        == "a"
+    )
     old = {"drift": {"moved": [{"name": "F_cp", "before": 10.0, "after": 12.0}]}}
     name, by = most_moved(old)
     assert name == "F_cp" and by == pytest.approx(0.2)
     trend: dict[str, list[float]] = {}
     for k in range(TREND_LOGS + 5):
-        trend = with_log(trend, evidence(told("a", k / 10)))
+        trend = with_log(trend, evidence(parameter_moved("a", k / 10)))
     assert len(trend["a"]) == TREND_LOGS and trend["a"][-1] == pytest.approx(10 * (1 + 3.6))
     assert state_of("refused", {}) == "not_judged"
     assert state_of("refused", evidence(verdict="structure")) == "structure"
@@ -129,7 +146,9 @@ def test_an_older_log_does_not_move_the_state(where: str) -> None:
         queue.announce("a", [log], now=NOW)
         claim = queue.claim("a", owner="w", lease=HOUR, now=NOW)
         assert claim is not None
-        made = Judgement("promoted", "r", Candidate({"m": 2.0}), evidence(told("m", 0.2)))
+        made = Judgement(
+            "promoted", "r", Candidate({"m": 2.0}), evidence(parameter_moved("m", 0.2))
+        )
         queue.finish(claim, log, made, by="w", now=NOW)
         queue.release(claim)
         assert condition(registry.database, "a") == "in_tune"
@@ -144,7 +163,13 @@ def test_the_table_and_the_machine_show_it(page: Page) -> None:
             continue
         registry.add(name, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
         for k in range(1, 4):
-            judge(registry, name, k, "none", evidence(told("F_cp", k / 100), told("m", 0.001)))
+            judge(
+                registry,
+                name,
+                k,
+                "none",
+                evidence(parameter_moved("F_cp", k / 100), parameter_moved("m", 0.001)),
+            )
     text = page.client.get("/?order=machine").text
     assert 'href="/machine/c%20d"' in text and "x&amp;y" in text and "<polyline" in text
     part = page.client.get("/?state=no_log", headers={"HX-Target": "fleet"}).text
@@ -161,9 +186,15 @@ def test_a_machine_shows_the_lights_of_its_newest_log(page: Page) -> None:
     for name in ("fresh", "same", "worn"):  # a page is kept for a moment, so one for each state
         registry.add(name, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
         for k in range(1, 8) if name != "fresh" else ():
-            found = evidence(told("F_cp", 0.01 * (k % 3)), told("m", 0.001))
+            found = evidence(parameter_moved("F_cp", 0.01 * (k % 3)), parameter_moved("m", 0.001))
             judge(registry, name, k, "none", found)
-    judge(registry, "worn", 8, "none", evidence(told("F_cp", 0.4), told("m", 0.001)))
+    judge(
+        registry,
+        "worn",
+        8,
+        "none",
+        evidence(parameter_moved("F_cp", 0.4), parameter_moved("m", 0.001)),
+    )
     fresh, same, worn = (
         page.client.get(f"/machine/{name}").text for name in ("fresh", "same", "worn")
     )
@@ -184,11 +215,17 @@ def promoted_by_a_worker(registry: Registry, machine: str) -> None:
     registry.add(machine, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
     registry.promote(machine, 1, reason="first", by="t", now=NOW)
     for k in range(1, 8):
-        judge(registry, machine, k, "none", evidence(told("F_cp", 0.001 * (k % 3)), told("m", 0.0)))
-    found = evidence(told("F_cp", 0.4), told("m", 0.001), verdict="drift")
+        judge(
+            registry,
+            machine,
+            k,
+            "none",
+            evidence(parameter_moved("F_cp", 0.001 * (k % 3)), parameter_moved("m", 0.0)),
+        )
+    found = evidence(parameter_moved("F_cp", 0.4), parameter_moved("m", 0.001), verdict="drift")
     judge(registry, machine, 8, "promoted", found, Candidate({"m": 2.0}))
-    after = {**told("F_cp", 0.4), "before": 14.0, "change": 0.0}
-    judge(registry, machine, 9, "none", evidence(after, told("m", 0.011)))
+    after = {**parameter_moved("F_cp", 0.4), "before": 14.0, "change": 0.0}
+    judge(registry, machine, 9, "none", evidence(after, parameter_moved("m", 0.011)))
     judge(registry, machine, 10, "set_aside", {})
     judge(registry, machine, 11, "not_judged", {})
 
@@ -210,12 +247,12 @@ def test_a_drift_stays_until_somebody_accepts_it(page: Page) -> None:
         '<td class="nowrap">', "<td>"
     )
     promoted_by_a_worker(registry, "b")
-    judge(registry, "b", 12, "refused", evidence(told("m", 0.5), verdict="drift"))
+    judge(registry, "b", 12, "refused", evidence(parameter_moved("m", 0.5), verdict="drift"))
     for name in ("a", "b"):
         registry.promote(name, 2, reason="new guide", by="anna", now=NOW)
     assert condition(registry.database, "a") == "in_tune"
     assert condition(registry.database, "b") == "drifting"  # since that version, too
-    judge(registry, "b", 13, "none", evidence(told("F_cp", 0.0)))
+    judge(registry, "b", 13, "none", evidence(parameter_moved("F_cp", 0.0)))
     assert condition(registry.database, "b") == "in_tune"
 
 
@@ -233,8 +270,13 @@ def test_a_bad_or_inconclusive_log_hides_no_change() -> None:
 
 def test_the_active_model_is_drawn_in_steps_and_what_moved_comes_first() -> None:
     def log(k: int, active: float, found: float) -> results.TestedLog:
-        dv = {**told("dv_p", 0.0005, 0.0001), "before": 0.04, "after": 0.04002, "unit": "m/s"}
-        F_cp = {**told("F_cp", 0.0), "before": active, "after": found}
+        dv = {
+            **parameter_moved("dv_p", 0.0005, 0.0001),
+            "before": 0.04,
+            "after": 0.04002,
+            "unit": "m/s",
+        }
+        F_cp = {**parameter_moved("F_cp", 0.0), "before": active, "after": found}
         return results.TestedLog(
             f"{k}", f"{k}", 60.0 * k, "none", "", 1, None, (dv, F_cp), "", True
         )

@@ -1,4 +1,4 @@
-"""Servers and workers that are killed, cancelled or told to end: nothing is lost or done twice."""
+"""Servers and workers that are killed, cancelled or asked to end: nothing is lost or done twice."""
 
 import multiprocessing
 import os

@@ -253,7 +253,7 @@ def test_behind_a_prefix(tmp_path: Path) -> None:
     below.registry.close()
 
 
-def test_errors_are_told_as_they_are_asked_for(page: Page) -> None:
+def test_errors_are_reported_as_they_are_asked_for(page: Page) -> None:
     asked = {"Accept": "application/json"}
     answer = page.client.get("/machine/none", headers=asked)
     assert answer.status_code == 404 and "no machine 'none'" in answer.json()["error"]

@@ -14,7 +14,7 @@ from tests.chain import CARD
 from tests.workbench.jobs.worker import short_pass
 from tests.workbench.page.browser import CHROMIUM, DRIVER, NARROW, NO_BROWSER, Person
 from tests.workbench.page.served import serving
-from tests.workbench.page.test_fleet import evidence, told
+from tests.workbench.page.test_fleet import evidence, parameter_moved
 from workbench.jobs.passes import Task
 from workbench.registry.access import Access
 from workbench.registry.store import Registry
@@ -71,13 +71,15 @@ def drifted(task: Task) -> Judgement:
     friction = dict(task.model["friction"])
     friction["F_cp"] = {**friction["F_cp"], "value": 1.3 * friction["F_cp"]["value"]}
     candidate = Candidate({**task.model, "friction": friction}, task.design)
-    found = evidence(told("F_cp", 0.3), told("m", 0.001), verdict="drift")
+    found = evidence(parameter_moved("F_cp", 0.3), parameter_moved("m", 0.001), verdict="drift")
     return Judgement("refused", "moved: F_cp; but no better on the held-out part", candidate, found)
 
 
 def quiet(task: Task) -> Judgement:
     """A judge that finds nothing."""
-    return Judgement("none", "no parameter has moved", evidence=evidence(told("F_cp", 0.01)))
+    return Judgement(
+        "none", "no parameter has moved", evidence=evidence(parameter_moved("F_cp", 0.01))
+    )
 
 
 def test_the_story(plant: Plant) -> None:
@@ -130,7 +132,7 @@ def _drops_and_corrects(plant: Plant) -> None:
     assert person.find("[name=unit_y]").get_attribute("value") == "mm"
     person.type("[name=unit_y]", "parsec per fortnight")
     person.find("#card button[type=submit]").click()
-    person.until(lambda: person.find("#card .bad"), "a wrong unit is not told")
+    person.until(lambda: person.find("#card .bad"), "a wrong unit is not reported")
     person.type("[name=unit_y]", "mm")
     person.type("#name", "bench-a")
     person.find("#card button[type=submit]").click()

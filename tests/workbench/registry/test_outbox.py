@@ -17,7 +17,7 @@ OTHER = SeenLog("b" * 64, "b.csv", 20, 50)
 
 @pytest.fixture
 def outbox(registry: Registry) -> Outbox:
-    """With one alarm, of a log that was set aside; the other log was quiet."""
+    """With one alarm, of a log that was excluded; the other log was quiet."""
     registry.add("m", Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
     registry.promote("m", 1, reason="first", by="t", now=NOW)
     queue = Queue(registry.database)

@@ -78,7 +78,7 @@ def test_a_gap_stays_a_gap() -> None:
     assert np.all(np.isnan(kept[within])) and np.all(kept[places < 3980] == 1.0)
 
 
-def test_even_places_are_told_by_their_step() -> None:
+def test_even_places_are_reported_by_their_step() -> None:
     even = 5.0 + 1e-3 * np.arange(10_000.0)
     assert coded_x(even)["count"] == 10_000
     assert decoded(coded_x(even)) == pytest.approx(even, abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 
 from design.machine.model import Model
 from design.machine.source import Source
-from identification.estimation.settling import STOP_TURNS_ON_LESS
+from identification.estimation.converged_fit import STOP_TURNS_ON_LESS
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
 from tests.chain import EMPS, model_of, short_recipe

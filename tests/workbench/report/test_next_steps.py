@@ -245,9 +245,9 @@ def test_logs_of_a_fleet_to_look_at() -> None:
     assert then(report()) is None
     assert taken(then(report(later=2), "f.db")).endswith("fleet logs --card emps --registry f.db")
     assert taken(then(report("promoted"))) == "workbench registry show m1"
-    look = "workbench doctor /logs/m1/a.parquet --card emps"
-    assert taken(then(report("set_aside", "promoted"))) == look
-    assert taken(then(report("promoted"), in_registry=False)) == look
+    doctor_command = "workbench doctor /logs/m1/a.parquet --card emps"
+    assert taken(then(report("set_aside", "promoted"))) == doctor_command
+    assert taken(then(report("promoted"), in_registry=False)) == doctor_command
 
 
 def test_limits_of_a_registry_are_asked_for_only_where_one_is(

@@ -59,7 +59,7 @@ def test_surely_beyond_a_limit_it_is_red_and_says_by_which() -> None:
 
 
 def test_where_the_log_is_not_sure_it_is_yellow() -> None:
-    told = Estimate(10.0, "N", 0.5, 9.0, 11.0)
+    reported = Estimate(10.0, "N", 0.5, 9.0, 11.0)
     for allowed, light, said in (
         (Allowed(8.0, 12.0, "card"), "green", ""),
         (Allowed(8.0, 10.5, "card"), "yellow", "perhaps above"),
@@ -68,11 +68,11 @@ def test_where_the_log_is_not_sure_it_is_yellow() -> None:
         (Allowed(8.0, 8.9, "card"), "red", "above"),
         (Allowed(11.1, 12.0, "card"), "red", "below"),
     ):
-        one = judged("F_cp", told, allowed)
+        one = judged("F_cp", reported, allowed)
         assert one.light == light and said in one.why, allowed
-    untold = Estimate(None, "m", reason="no play seen; trace it")
-    assert judged("backlash", untold, None).light == ""
-    one = judged("backlash", untold, Allowed(0.0, 1e-4, "card"))
+    not_identifiable = Estimate(None, "m", reason="no play seen; trace it")
+    assert judged("backlash", not_identifiable, None).light == ""
+    one = judged("backlash", not_identifiable, Allowed(0.0, 1e-4, "card"))
     assert one.light == "yellow" and "is not identifiable, and the card has limits" in one.why
 
 
@@ -126,7 +126,7 @@ def test_without_limits_it_is_yellow_and_says_what_to_give() -> None:
     assert "short has 1 tested logs" in axis_test_of_sources(sources(), few).reasons[0]
 
 
-def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:
+def test_what_is_larger_than_friction_is_said_and_no_number_is_reported() -> None:
     found = sources({"F_cp": (11.0, 13.0)})
     log = found.runs[0].log
     rough = 60.0 * np.sin(40.0 * log["t"])
@@ -136,7 +136,7 @@ def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:
     assert test.of("explained").light == "red" or test.of("F_cp").estimate.value is None
 
 
-def test_a_fit_of_the_model_in_force_goes_before_the_equation() -> None:
+def test_a_fit_of_the_model_active_goes_before_the_equation() -> None:
     own = {"F_cp": Estimate(9.0, "N", None, 8.9, 9.1), "backlash": Estimate(1e-4, "m")}
     past = replace(earlier(F_cp=9.0), estimates=own, remarks=("by the fit of version 3",))
     test = axis_test_of_sources(sources(), past)

@@ -23,7 +23,7 @@ from design.measured.predict import predict
 from design.tune import Asked, Goals
 from identification.arx.design_period import common_period, decimated, decimation
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -178,9 +178,9 @@ def test_a_model_that_carries_no_design_is_refused() -> None:
     heavy = replace(model_of(TABLES["paper_table1"], ACTUATOR), plant=wild)
     with pytest.raises(NotIdentifiable, match="design; the mass is identified: design on it"):
         designed(heavy, source="arx")
-    imposed = replace(model.log[0], position_rms=None)
+    prescribed = replace(model.log[0], position_rms=None)
     with pytest.raises(NotIdentifiable, match="prescribed"):
-        designed(replace(model, log=(imposed,), actuator=None))
+        designed(replace(model, log=(prescribed,), actuator=None))
 
 
 def test_another_plant_can_fail_what_the_model_passes() -> None:
@@ -282,7 +282,7 @@ def test_a_friction_that_is_surely_small_keeps_no_run_back() -> None:
     assert found.refused is None and found.position_rms is not None
 
 
-def test_without_an_actuator_that_is_told_the_force_drives() -> None:
+def test_without_an_actuator_that_is_reported_the_force_drives() -> None:
     model, log = identified().model, identified().sources[0].log
     blank = Estimate(None, "N/(V s)", reason="no linear actuator", assumed=ACTUATOR.k1)
     vague = replace(model, actuator={**(model.actuator or {}), "k1": blank})
@@ -463,14 +463,14 @@ def test_a_run_by_force_says_what_held_it() -> None:
     assert not any("corrected to" in line for line in fit_lines(alone))
 
 
-def test_what_an_equation_leaves_is_told_as_it_was_fitted() -> None:
+def test_what_an_equation_leaves_is_reported_as_it_was_fitted() -> None:
     """In the weak form, which a clock that jitters does not spoil as it does derivatives."""
     log = made_log(table(2), seed=1, seconds=8.0)
     shaken = log.with_signals(y=log["y"] + 2e-5 * rng().standard_normal(len(log)))
     rig = Rig("force")
-    fit = fit_imposed(recorded_logs([shaken], rig, "force"), "why")
-    told = _force_error([shaken], fit, rig)
+    fit = fit_prescribed(recorded_logs([shaken], rig, "force"), "why")
+    reported = _force_error([shaken], fit, rig)
     by_derivatives = _force_error([shaken], replace(fit, left=None), rig)
-    assert told is not None and by_derivatives is not None
-    assert told.relative < 0.1
-    assert told.relative < by_derivatives.relative
+    assert reported is not None and by_derivatives is not None
+    assert reported.relative < 0.1
+    assert reported.relative < by_derivatives.relative

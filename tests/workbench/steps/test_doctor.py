@@ -52,7 +52,7 @@ def motor(tmp_path: Path) -> tuple[Card, Table]:
     return load_card(tmp_path / "card.toml"), {name: np.array(log[name]) for name in "tyu"}
 
 
-def look(card: Card, table: Table) -> Examined:
+def examined_log(card: Card, table: Table) -> Examined:
     path = card.path.parent / "run.csv"
     pd.DataFrame(table).to_csv(path, index=False)
     return examine(path, card)
@@ -61,7 +61,7 @@ def look(card: Card, table: Table) -> Examined:
 @pytest.mark.slow
 def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    found = look(card, table)
+    found = examined_log(card, table)
     path = card.path.parent / "run.csv"
     model = identify_sources(read_sources([str(path)], str(card.path))).model
     can = {one.name: one.can for one in found.identifiability}
@@ -73,7 +73,7 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
 def test_identify_says_that_a_voltage_brakes(motor: tuple[Card, Table]) -> None:
     card, table = motor
     voltage = table["u"] + 40.0 * np.gradient(table["y"], table["t"])  # the motor's own, 40 V s/m
-    look(card, {**table, "u": voltage})
+    examined_log(card, {**table, "u": voltage})
     path = card.path.parent / "run.csv"
     remarks = identify_sources(read_sources([str(path)], str(card.path))).remarks
     assert any("if it is the motor's voltage, F_vp and F_vn hold" in one for one in remarks)
@@ -85,7 +85,7 @@ def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> 
     up = table["u"] > 0
     y = np.cumsum(np.where(np.diff(table["y"], prepend=table["y"][0]) > 0,
                            np.diff(table["y"], prepend=table["y"][0]), 0.0))  # fmt: skip
-    found = look(card, {"t": table["t"], "y": y, "u": np.where(up, table["u"], 0.0)})
+    found = examined_log(card, {"t": table["t"], "y": y, "u": np.where(up, table["u"], 0.0)})
     can = {one.name: one for one in found.identifiability}
     assert not can["F_cn"].can and not can["F_sn"].can
     assert "negative direction" in can["F_cn"].why
@@ -97,7 +97,7 @@ def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> 
     ("kind", "signal"),
     [("spike", "y"), ("jump", "y"), ("missing", "F"), ("saturated", "u"), ("saturated", "F")],
 )
-def test_bad_samples_are_told(force: tuple[Card, Table], kind: Kind, signal: str) -> None:
+def test_bad_samples_are_reported(force: tuple[Card, Table], kind: Kind, signal: str) -> None:
     card, table = force
     x = table[signal]
     if kind == "spike":
@@ -109,19 +109,21 @@ def test_bad_samples_are_told(force: tuple[Card, Table], kind: Kind, signal: str
     else:
         limit = np.quantile(np.abs(x), 0.8)
         table[signal] = np.clip(x, -limit, limit)
-    found = look(card, table)
-    told = [one for one in found.bad if (one.kind, one.signal) == (kind, signal)]
-    assert told
-    assert all(("command" in one.line) == (signal == "u") for one in told if kind == "saturated")
+    found = examined_log(card, table)
+    reported = [one for one in found.bad if (one.kind, one.signal) == (kind, signal)]
+    assert reported
+    assert all(
+        ("command" in one.line) == (signal == "u") for one in reported if kind == "saturated"
+    )
 
 
-def test_gaps_and_jitter_of_the_clock_are_told(force: tuple[Card, Table]) -> None:
+def test_gaps_and_jitter_of_the_clock_are_reported(force: tuple[Card, Table]) -> None:
     card, table = force
     keep = np.ones(len(table["t"]), dtype=bool)
     keep[1000:1100] = False
     rng = np.random.default_rng(1)
     table["t"] = table["t"] + 2e-4 * rng.uniform(-1, 1, len(keep))
-    found = look(card, {name: x[keep] for name, x in table.items()})
+    found = examined_log(card, {name: x[keep] for name, x in table.items()})
     assert found.clock.gaps == 1
     assert found.clock.longest_gap == pytest.approx(0.202, abs=1e-3)
     assert found.clock.jitter == pytest.approx(2e-4 / np.sqrt(3) * np.sqrt(2) / 2e-3, rel=0.2)
@@ -129,11 +131,11 @@ def test_gaps_and_jitter_of_the_clock_are_told(force: tuple[Card, Table]) -> Non
 
 
 @pytest.mark.parametrize("late", [0, 8])
-def test_a_late_command_is_told(force: tuple[Card, Table], late: int) -> None:
+def test_a_late_command_is_reported(force: tuple[Card, Table], late: int) -> None:
     card, table = force
     u = table["u"]
     table["u"] = np.concatenate([u[late:], np.full(late, u[-1])])  # logged before it acts
-    found = look(card, table)
+    found = examined_log(card, table)
     delay = next(one for one in found.delays if one.of == "u")
     if late:
         assert delay.seconds is not None
@@ -143,7 +145,7 @@ def test_a_late_command_is_told(force: tuple[Card, Table], late: int) -> None:
 
 
 @pytest.mark.parametrize("exchanged", [False, True])
-def test_a_position_ahead_of_its_reference_is_told(
+def test_a_position_ahead_of_its_reference_is_reported(
     motor: tuple[Card, Table], exchanged: bool
 ) -> None:
     card, table = motor
@@ -152,7 +154,7 @@ def test_a_position_ahead_of_its_reference_is_told(
     smooth = np.convolve(table["y"], np.ones(5) / 5.0, mode="same")
     ahead, behind = np.append(smooth[1:], smooth[-1]), table["y"] + noise
     own = {"y": ahead, "r": behind} if exchanged else {"y": behind, "r": ahead}
-    found = look(load_card(card.path), {**table, **own})
+    found = examined_log(load_card(card.path), {**table, **own})
     assert found.exchanged == exchanged
     said = "the columns of r and y look exchanged; exchange them in the card"
     text = doctor_view(found, None).text()
@@ -164,7 +166,7 @@ def test_a_position_ahead_of_its_reference_is_told(
 def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Card, Table]) -> None:
     card, table = motor
     card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
-    found = look(load_card(card.path), table)
+    found = examined_log(load_card(card.path), table)
     text = doctor_view(found, None).text().splitlines()
     assert after_doctor(found, "run.csv", "card.toml", None) is None
     assert text[1].split(maxsplit=1) == [
@@ -175,9 +177,9 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
 
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    then = after_doctor(look(card, table), "logs/run.csv", "my card.toml", None)
+    then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml", None)
     assert then and then.command == "workbench identify logs/run.csv --card 'my card.toml'"
-    found = look(card, {**table, "u": -table["u"]})
+    found = examined_log(card, {**table, "u": -table["u"]})
     shown = " ".join(doctor_view(found, None).text().split())
     assert "give the column of y gain = -1" in shown and "..." not in shown
 
@@ -185,39 +187,43 @@ def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, 
 def test_a_card_without_its_constant_is_filled_in_first(motor: tuple[Card, Table]) -> None:
     card, table = motor
     card.path.write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
-    text = doctor_view(look(load_card(card.path), table), None).text()
+    text = doctor_view(examined_log(load_card(card.path), table), None).text()
     assert "write force_per_command under the card's [rig]" in text
 
 
 def test_rounding_is_no_noise(motor: tuple[Card, Table]) -> None:
     card, table = motor
     card.path.write_text(MOTOR + 'r = { column = "r", unit = "m" }\n', "utf-8")
-    found = look(load_card(card.path), {**table, "r": 0.1 + 0.02 * table["t"]})
+    found = examined_log(load_card(card.path), {**table, "r": 0.1 + 0.02 * table["t"]})
     assert next(one for one in found.sensors if one.name == "r").noise == 0.0
 
 
-def test_a_unit_that_the_header_denies_is_told_though_the_log_is_refused(
+def test_a_unit_that_the_header_denies_is_reported_though_the_log_is_refused(
     motor: tuple[Card, Table],
 ) -> None:
     card, table = motor
     text = MOTOR.replace('column = "y", unit = "m"', 'column = "y [mm]", unit = "m"')
     card.path.write_text(text, "utf-8")
-    found = look(load_card(card.path), {"t": table["t"], "y [mm]": table["y"], "u": -table["u"]})
+    found = examined_log(
+        load_card(card.path), {"t": table["t"], "y [mm]": table["y"], "u": -table["u"]}
+    )
     assert found.verdict == "refused"
     assert any("the header 'y [mm]' says mm, the card 'm'" in one for one in found.remarks)
 
 
-def test_counts_are_told_as_a_step(motor: tuple[Card, Table]) -> None:
+def test_counts_are_reported_as_a_step(motor: tuple[Card, Table]) -> None:
     card, table = motor
     table["y"] = 2e-5 * np.round(table["y"] / 2e-5)
-    state = next(one for one in look(card, table).sensors if one.name == "y")
+    state = next(one for one in examined_log(card, table).sensors if one.name == "y")
     assert state.step == pytest.approx(2e-5, rel=1e-6)
 
 
 def test_a_motor_without_its_constant_is_looked_at_all_the_same(tmp_path: Path) -> None:
     (tmp_path / "card.toml").write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
     log = made(3)
-    found = look(load_card(tmp_path / "card.toml"), {name: np.array(log[name]) for name in "tyu"})
+    found = examined_log(
+        load_card(tmp_path / "card.toml"), {name: np.array(log[name]) for name in "tyu"}
+    )
     assert found.ways is not None and found.ways.positive.breakaways >= 3
 
 
@@ -227,7 +233,7 @@ def test_a_log_that_a_fit_refuses_is_refused_with_its_reason(
 ) -> None:
     card, table = force
     table[name] = np.full(len(table["t"]), 1.0) if name == "y" else -table["F"]
-    found = look(card, table)
+    found = examined_log(card, table)
     assert found.verdict == "refused"
     assert found.refused
     assert doctor_document(found, card.name)["refused"] == found.refused
@@ -240,7 +246,7 @@ def test_one_screen_and_a_picture(rig: str, tmp_path: Path, request: pytest.Fixt
     table["y"][::50] += 0.02  # as much to tell as can be
     for refused in (False, True):
         table["y"] = np.zeros(len(table["t"])) if refused else table["y"]
-        found = look(card, table)
+        found = examined_log(card, table)
         lines = one_screen(doctor_view(found, tmp_path)).splitlines()
         assert "written: " in lines[-1] or "written: " in lines[-2]
         doctor_picture(found, tmp_path / "doctor.png")
@@ -249,7 +255,7 @@ def test_one_screen_and_a_picture(rig: str, tmp_path: Path, request: pytest.Fixt
 
 def test_speeds_and_rests_are_those_of_the_log(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    found = look(card, table)
+    found = examined_log(card, table)
     assert found.ways is not None
     v = np.abs(np.gradient(table["y"], H))
     assert found.ways.positive.fast == pytest.approx(float(np.quantile(v, 0.99)), rel=0.5)
@@ -258,11 +264,13 @@ def test_speeds_and_rests_are_those_of_the_log(motor: tuple[Card, Table]) -> Non
     assert found.ways.rests > 5
 
 
-def test_what_a_coarse_sensor_calls_rest_is_told_by_its_speed(motor: tuple[Card, Table]) -> None:
+def test_what_a_coarse_sensor_calls_rest_is_reported_by_its_speed(
+    motor: tuple[Card, Table],
+) -> None:
     card, table = motor
 
     def hidden(step: float) -> float:
-        found = look(card, {**table, "y": step * np.round(table["y"] / step)})
+        found = examined_log(card, {**table, "y": step * np.round(table["y"] / step)})
         text = " ".join(doctor_view(found, None).text().split())
         return float(text.partition("at rest (slower than ")[2].split()[0])
 
@@ -273,4 +281,4 @@ def test_what_a_coarse_sensor_calls_rest_is_told_by_its_speed(motor: tuple[Card,
 def test_times_that_are_no_numbers_are_refused_and_no_fault(motor: tuple[Card, Table]) -> None:
     card, table = motor
     table["t"][::50] = np.inf
-    assert look(card, table).verdict == "refused"
+    assert examined_log(card, table).verdict == "refused"

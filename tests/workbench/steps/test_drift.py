@@ -1,4 +1,4 @@
-"""The drift command and what lies behind it: model in force, stored stream, report, refusals."""
+"""The drift command and what lies behind it: active model, stored stream, report, refusals."""
 
 import hashlib
 import json
@@ -21,7 +21,7 @@ from identification.drift.reference_model import OwnLogs
 from identification.errors import BadModel
 from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
-from tests.told import broken_in
+from tests.reported import broken_in
 from workbench.cli import main
 from workbench.documents.result_files import read_model
 from workbench.output import dumps

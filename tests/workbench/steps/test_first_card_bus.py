@@ -177,5 +177,5 @@ def test_a_command_without_its_sign_is_named(tmp_path: Path, signed: bool) -> No
     said = "'MotorPWM' is never negative, though 'Encoder' goes both ways"
     found = propose(tmp_path, "time_ms,MotorPWM,Encoder", 100.0 * np.arange(len(u)), u, y)
     assert any(said in remark for remark in found.remarks) is not signed
-    told = no_body(columns_of(read_unknown(tmp_path / "run.csv"), NOTATION))
-    assert (said in str(told)) is not signed
+    refused = no_body(columns_of(read_unknown(tmp_path / "run.csv"), NOTATION))
+    assert (said in str(refused)) is not signed

@@ -16,7 +16,7 @@ H, ROWS = 5e-3, 1600
 @pytest.fixture(scope="module")
 def servo() -> dict[str, Array]:
     """Clock, angle and torque of a servo in its loop."""
-    log = servo_log(np.full(ROWS, H), held=True, seed=2)
+    log = servo_log(np.full(ROWS, H), zoh=True, seed=2)
     return {"t": log["t"], "y": log["y"], "F": log["F"]}
 
 

@@ -83,9 +83,9 @@ def test_an_error_drives_nothing_and_names_its_reference(
 
 
 def test_what_is_hardly_told_stands_in_the_card(joint: dict[str, Array], tmp_path: Path) -> None:
-    held = joint["y"][(np.arange(len(T)) // 10) * 10]
+    zoh = joint["y"][(np.arange(len(T)) // 10) * 10]
     found = checked_proposal(
-        propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, held, joint["F"])
+        propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, zoh, joint["F"])
     )
     assert any("the position is renewed at 50 Hz" in one for one in found.hardly)
     assert "# the position is renewed at 50 Hz" in written(found)
@@ -344,12 +344,12 @@ def test_letters_that_tell_columns_apart_are_no_units(
 def test_what_a_controllers_output_follows_is_no_command(tmp_path: Path) -> None:
     """Of r, k (r - y) and y the first is the reference, though its header says u."""
     r = np.sin(2.0 * np.pi * (1.0 + 0.1 * T) * T)
-    y, v, held = np.zeros(len(T)), 0.0, np.zeros(len(T))
+    y, v, zoh = np.zeros(len(T)), 0.0, np.zeros(len(T))
     for k in range(1, len(T)):
-        held[k - 1] = 30.0 * (r[k - 1] - y[k - 1]) - 0.2 * v
-        v += 2e-3 * (40.0 * held[k - 1] - 25.0 * v - 15.0 * np.sign(v))
+        zoh[k - 1] = 30.0 * (r[k - 1] - y[k - 1]) - 0.2 * v
+        v += 2e-3 * (40.0 * zoh[k - 1] - 25.0 * v - 15.0 * np.sign(v))
         y[k] = y[k - 1] + 2e-3 * v
-    found = propose(tmp_path, "t,u,v,$\\theta$", T, 50.0 * r, 50.0 * held, 50.0 * y)
+    found = propose(tmp_path, "t,u,v,$\\theta$", T, 50.0 * r, 50.0 * zoh, 50.0 * y)
     columns = {one.name: one.shown for one in found.signals}
     assert (columns["r"], columns["u"]) == ("'u'", "'v'")
 
@@ -405,13 +405,13 @@ def test_a_reference_and_a_position_alone_are_refused(
     assert "log its current, torque or force too" in str(refused.value)
 
 
-@pytest.mark.parametrize(("header", "told"), [("PI_output_A", True), ("current_A", False)])
+@pytest.mark.parametrize(("header", "reported"), [("PI_output_A", True), ("current_A", False)])
 def test_a_controllers_output_may_lack_what_is_fed_forward(
-    joint: dict[str, Array], tmp_path: Path, header: str, told: bool
+    joint: dict[str, Array], tmp_path: Path, header: str, reported: bool
 ) -> None:
     found = propose(tmp_path, f"time_s,angle_deg,{header}", T, joint["y"], joint["u"])
     assert found.kind == "motor"
-    assert any("feedforward of its own" in one for one in found.remarks) == told
+    assert any("feedforward of its own" in one for one in found.remarks) == reported
 
 
 def test_a_column_that_stands_twice_is_in_no_other_unit(

@@ -8,7 +8,7 @@ from workbench.report.doctor import installation_view
 from workbench.steps.installation import check_installation
 
 
-def test_versions_kernels_and_cards_are_told(
+def test_versions_kernels_and_cards_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "emps").mkdir()

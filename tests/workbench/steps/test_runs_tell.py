@@ -78,7 +78,7 @@ def promised(model: Model, share: float) -> Model:
 
 
 @pytest.mark.slow
-def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
+def test_a_broken_promise_is_reported(both_ways: tuple[Path, Identified]) -> None:
     model = both_ways[1].model
     assert broken_promises(model) == ()
     (line,) = broken_promises(promised(model, 0.9 / BROKEN))
@@ -87,7 +87,7 @@ def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
 
 
 @pytest.mark.method
-def test_runs_to_add_are_those_of_what_is_not_told(tmp_path: Path) -> None:
+def test_runs_to_add_are_those_of_what_is_not_reported(tmp_path: Path) -> None:
     log = made(3)
     step = np.diff(log["y"], prepend=log["y"][0])
     u = np.where(log["u"] > 0, log["u"], 0.0)
@@ -95,8 +95,10 @@ def test_runs_to_add_are_those_of_what_is_not_told(tmp_path: Path) -> None:
     runs = runs_to_add(found.model)
     assert any("that way" in one for one in runs), runs
     assert any(line.startswith("to identify the rest: ") for line in fit_lines(found.model))
-    told = {
+    reported = {
         name: replace(one, value=one.assumed, reason=None) if one.value is None else one
         for name, one in found.model.friction.items()
     }
-    assert not any("that way" in one for one in runs_to_add(replace(found.model, friction=told)))
+    assert not any(
+        "that way" in one for one in runs_to_add(replace(found.model, friction=reported))
+    )

@@ -16,7 +16,7 @@ from design.machine.documents import model_document
 from design.measured.friction_curve import sliding_friction
 from identification.effects._library import built_in
 from identification.errors import BadLog
-from identification.estimation.estimates import HELD, of_effect
+from identification.estimation.estimates import FIXED_AT_DEFAULT, of_effect
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
@@ -31,7 +31,7 @@ from identification.tracing.result import (
     Residual,
     TraceVerdict,
 )
-from tests.told import broken_in
+from tests.reported import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.result_files import read_model
@@ -210,7 +210,7 @@ def test_the_verdict_is_a_plain_sentence(
     assert (errors in text) == bool(keys)
 
 
-def test_an_effect_that_is_not_all_is_told_with_its_share_and_the_rest() -> None:
+def test_an_effect_that_is_not_all_is_reported_with_its_share_and_the_rest() -> None:
     found = replace(trace_of("effect"), complete=False, left=Left(0.0012, ("v",)))
     text = trace_sentence(traced(found))
     assert text.startswith("Missing: stribeck")
@@ -234,7 +234,7 @@ def test_beside_a_change_of_the_machine_the_rest_is_no_riddle() -> None:
     ("like", "said"),
     [((), "the actuator is not linear."), (("leakage",), "which acts like leakage.")],
 )
-def test_what_lies_in_the_actuator_is_told_beside_the_verdict(
+def test_what_lies_in_the_actuator_is_reported_beside_the_verdict(
     like: tuple[str, ...], said: str
 ) -> None:
     found = replace(trace_of("none"), actuator_like=like)
@@ -280,12 +280,12 @@ def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     assert text.startswith("Unknown: the free run has an error of") and "10 µm in 2 s" in text
 
 
-def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:
+def test_an_actuator_that_was_inconclusive_is_not_called_complete() -> None:
     text = trace_sentence(traced(replace(trace_of("none", ()), noise_actuator=None)))
     assert text.startswith("Nothing is missing in the equation of motion: the model leaves 0.07 N")
 
 
-def test_the_error_in_which_an_effect_shows_is_told() -> None:
+def test_the_error_in_which_an_effect_shows_is_reported() -> None:
     found = trace_of("effect", ("valve_dead_zone",), actuator=True)
     before = {"train": Errors(0.07, 0.002, 1e-5, 90.0), "test": Errors(0.07, 0.002, 1e-5, 90.0)}
     shown = replace(found, before=before)
@@ -327,7 +327,7 @@ def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
     rows = effects_table(sized, Rig("force")).whole
     assert [row[1] for row in rows[1:3]] == ["-", "0"]
     assert rows[1][3].startswith("at its bound 100: ")
-    assert rows[2][3] == HELD
+    assert rows[2][3] == FIXED_AT_DEFAULT
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 from design.first_card.proposal import Proposal, SignalGuess
 from design.identified.hardly_identifiable import hardly_identifiable
 from identification.errors import UserError
-from identification.signals.renewal import HELD_FOR, RENEWED_AT
+from identification.signals.renewal import RENEWED_AT, RENEWED_EVERY
 from workbench.cards.card import card_from, load_card
 from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
@@ -92,6 +92,8 @@ def checked_proposal(of: Proposal) -> Proposal:
         return replace(of, refused=str(error))
     before = f"{Path(of.log).name}: "
     renewed = [
-        one.removeprefix(before) for one in found.remarks if RENEWED_AT in one or HELD_FOR in one
+        one.removeprefix(before)
+        for one in found.remarks
+        if RENEWED_AT in one or RENEWED_EVERY in one
     ]
     return replace(of, hardly=tuple(dict.fromkeys([*lines, *renewed])))

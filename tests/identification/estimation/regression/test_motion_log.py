@@ -17,14 +17,14 @@ from tests.identification.jumping_command import cart_log
 def test_a_command_that_jumps_every_few_rows_is_not_taken_for_noisy_however_late_it_acts(
     late: int,
 ) -> None:
-    one = motion_log(cart_log(0, late), held=True, by_command=False)
+    one = motion_log(cart_log(0, late), zoh=True, by_command=False)
     assert one.noise.F < 0.05  # N, of 9; by its third differences 0.5
 
 
 def test_noise_that_the_motor_is_not_given_is_seen() -> None:
     log = cart_log(0, 0)
     noisy = log["F"] + 0.3 * np.random.default_rng(1).standard_normal(len(log))
-    one = motion_log(log.with_signals(F=noisy), held=True, by_command=False)
+    one = motion_log(log.with_signals(F=noisy), zoh=True, by_command=False)
     assert 0.25 < one.noise.F < 0.9
 
 
@@ -42,7 +42,7 @@ def test_what_a_loop_adds_to_a_measured_force_is_no_noise_of_its_sensor(
     y = np.asarray(free_run(body, blank, (0.0, 0.0, 0.0), "force").y)
     y = y + 1e-6 * rng.standard_normal(len(t))
     seen = F + of_sensor * rng.standard_normal(len(t))
-    one = motion_log(blank.with_signals(y=y, F=seen), held=False, by_command=False)
+    one = motion_log(blank.with_signals(y=y, F=seen), zoh=False, by_command=False)
     known = float(np.hypot(chatter, of_sensor))
     assert local_noise(seen) == pytest.approx(known, rel=0.2)
     if chatter:
@@ -56,5 +56,5 @@ def test_no_position_is_more_exact_than_a_thousand_millionth_of_its_range() -> N
     of forces far below any that matters."""
     t: Array = 1e-3 * np.arange(8000, dtype=np.float64)
     y = 0.3 * np.sin(2.0 * t) + 0.1 * np.sin(5.0 * t)
-    one = motion_log(Log("exact", {"t": t, "y": y, "F": np.cos(t)}), held=False, by_command=False)
+    one = motion_log(Log("exact", {"t": t, "y": y, "F": np.cos(t)}), zoh=False, by_command=False)
     assert one.noise.y == pytest.approx(1e-9 * np.ptp(y), rel=0.1)

@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
     HALF_WIDTHS,
+    converged_rows,
     rows_and_windows,
     rows_of_width,
-    settled_rows,
     without_reversals,
 )
 from identification.estimation.regression.weighted_rows import solve_rows
@@ -31,7 +31,7 @@ def swinging(
     five: tuple[float, float, float, float, float], *, hz: float = 1.0, noise_y: float = 0.0,
     noise_F: float = 0.0, seconds: float = 12.0, seed: int = 0,
 ) -> Log:  # fmt: skip
-    """A body led along two sines, its force that of m, F_cp, F_cn, F_vp, F_vn alone."""
+    """A body driven along two sines, its force that of m, F_cp, F_cn, F_vp, F_vn alone."""
     t = H * np.arange(round(seconds / H), dtype=np.float64)
     w = 2.0 * np.pi * hz
     y = 0.05 * np.sin(w * t) + 0.02 * np.sin(2.3 * w * t)
@@ -45,7 +45,7 @@ def swinging(
 
 
 def moved(log: Log) -> MotionLog:
-    return motion_log(log, held=False, by_command=False)
+    return motion_log(log, zoh=False, by_command=False)
 
 
 def by_least_squares(log: Log) -> Array:
@@ -95,7 +95,7 @@ def test_reversals_in_which_a_body_sticks_are_left_out(seed: int) -> None:
     """Table 1's rig sticks at 1.7 times its Coulomb friction."""
     _, recipe = short_recipe(12.0)
     (one,) = recorded_logs([record("made", recipe, seed)], Rig("force"), "force").logs
-    rows = settled_rows([one])
+    rows = converged_rows([one])
     (kept,) = without_reversals(rows)
     assert len(kept.windows.middle) == len(kept.rows.b) < len(rows[0].rows.b)
     found, bent = (solve_rows(part.rows).theta for part in (kept, rows[0]))
@@ -114,14 +114,14 @@ def test_rows_within_the_band_of_a_plant_are_known() -> None:
     assert np.all(made.rows.speed[some] > 0.19)
 
 
-def told(log: Log) -> dict[str, float | None]:
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
+def reported(log: Log) -> dict[str, float | None]:
+    fit = fit_prescribed(recorded_logs([log], Rig("force"), "force"), "prescribed")
     return {name: fit.estimates[name].value for name in FIVE}
 
 
 def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction() -> None:
     log = swinging((0.0, 9.0, 5.0, -12.0, 0.0), noise_F=0.1)
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
+    fit = fit_prescribed(recorded_logs([log], Rig("force"), "force"), "prescribed")
     up, down = fit.estimates["F_vp"], fit.estimates["F_vn"]
     assert up.value is None and up.assumed == 0.0
     assert fit.falling.keys() == {"F_cp", "F_vp"}
@@ -136,17 +136,17 @@ def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction(
 
 
 def test_terms_that_predict_nothing_are_left_out() -> None:
-    plain = told(swinging((0.0, 4.0, 3.0, 0.0, 0.0), noise_F=0.2))
+    plain = reported(swinging((0.0, 4.0, 3.0, 0.0, 0.0), noise_F=0.2))
     assert plain["F_cp"] == pytest.approx(4.0, rel=0.01)
     assert plain["F_vp"] is None and plain["m"] is None
-    whole = told(swinging((2.0, 4.0, 3.0, 8.0, 6.0), noise_F=0.2))
+    whole = reported(swinging((2.0, 4.0, 3.0, 8.0, 6.0), noise_F=0.2))
     assert [whole[name] for name in FIVE] == pytest.approx([2.0, 4.0, 3.0, 8.0, 6.0], rel=0.03)
 
 
 def test_viscous_friction_takes_no_coulomb_friction_below_nothing() -> None:
     """At speeds alike a steep line through them stands for whatever else varies."""
     log = swinging((0.0, -1.0, -1.0, 30.0, 30.0), noise_F=0.2)
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "led")
+    fit = fit_prescribed(recorded_logs([log], Rig("force"), "force"), "prescribed")
     assert fit.estimates["F_vp"].value is None and fit.estimates["F_vn"].value is None
     assert (fit.friction.F_vp, fit.friction.F_vn) == (0.0, 0.0)
     assert min(fit.friction.F_cp, fit.friction.F_cn) > 1.0  # the level at these speeds

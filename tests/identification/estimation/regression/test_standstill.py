@@ -20,7 +20,7 @@ def standing(F: Array, rng: np.random.Generator) -> Log:
 
 def test_rest_is_what_the_coulomb_level_holds() -> None:
     F = np.concatenate([np.linspace(-14.0, 14.0, 3000), np.linspace(14.0, -14.0, 3000)])
-    one = motion_log(standing(F, np.random.default_rng(1)), held=False, by_command=False)
+    one = motion_log(standing(F, np.random.default_rng(1)), zoh=False, by_command=False)
     found = rests(one, 12.0, 10.0)
     means = np.array([F[k : k + MEAN].mean() for k in found.start])
     assert means.max() < 12.0 and means.min() > -10.0
@@ -31,7 +31,7 @@ def test_rest_is_what_the_coulomb_level_holds() -> None:
 def test_the_noise_of_a_force_bends_no_bristle_further() -> None:
     rng = np.random.default_rng(2)
     log = standing(6.0 + 0.05 * rng.standard_normal(20_000), rng)
-    one = motion_log(log, held=False, by_command=False)
+    one = motion_log(log, zoh=False, by_command=False)
     bent = elastic_displacement(
         built_in()["presliding"], {"sigma_0": 1e5}, one.signals, log.h, NINE
     )

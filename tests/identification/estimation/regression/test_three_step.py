@@ -12,7 +12,7 @@ from tests.identification.plants import made_log, table
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_sliding_and_breakaway_are_near(number: int) -> None:
     truth = table(number)
-    first = first_estimate(motion_log(made_log(truth, seed=number), held=False, by_command=False))
+    first = first_estimate(motion_log(made_log(truth, seed=number), zoh=False, by_command=False))
     nine = dict(zip(truth.__dataclass_fields__, first.nine, strict=True))
     assert nine["m"] == pytest.approx(truth.m, rel=0.5)
     for name in ("F_cp", "F_cn", "F_vp", "F_vn"):
@@ -29,4 +29,4 @@ def test_a_still_log_is_refused() -> None:
     log = made_log(table(2), seconds=2.0)
     y = 1e-5 * np.random.default_rng(0).standard_normal(len(log))
     with pytest.raises(NotIdentifiable, match="no motion above the noise"):
-        first_estimate(motion_log(log.with_signals(y=y), held=False, by_command=False))
+        first_estimate(motion_log(log.with_signals(y=y), zoh=False, by_command=False))

@@ -35,7 +35,7 @@ def posed(case: str) -> LikelyWindows:
         plant = Plant(table(2), None if case == "force" else ACTUATOR)
     logs = recorded.logs
     if case == "corrected":
-        logs = tuple(replace(one, noise=replace(one.noise, walk=3e-3)) for one in logs)
+        logs = tuple(replace(one, noise=replace(one.noise, random_walk=3e-3)) for one in logs)
         assert all(0.1 < one.noise.corrected < 0.5 for one in logs)
     names = names_of(plant, recorded.drive)
     size = 0.003 * np.abs(values_of(plant, names))

@@ -149,7 +149,7 @@ def test_least_squares_of_a_curved_valley() -> None:
     assert found.covariance().shape == (2, 2) and found.mean < 1e-8
 
 
-def test_breakaways_lost_by_luck_do_not_count() -> None:
+def test_breakaways_lost_by_chance_do_not_count() -> None:
     r = np.random.default_rng(8).standard_normal(20_000)
     window = np.arange(len(r)) // 1000
     assert mean_loss(r) == pytest.approx(1.0, abs=0.03)
@@ -179,8 +179,8 @@ def test_a_reach_holds_what_least_squares_would_throw_far() -> None:
         return np.asarray(np.array([x[0] - 5.0, 0.1 * (x[1] - 1.0)]))
 
     assert gauss_newton(fun, np.zeros(2), 30).x == pytest.approx([5.0, 1.0], abs=1e-3)
-    held = gauss_newton(fun, np.zeros(2), 30, reach=np.array([0.4, 2.0]))
-    assert held.x == pytest.approx([0.4, 1.0], abs=1e-3)
+    bounded = gauss_newton(fun, np.zeros(2), 30, reach=np.array([0.4, 2.0]))
+    assert bounded.x == pytest.approx([0.4, 1.0], abs=1e-3)
 
 
 def test_a_search_that_only_leads_on_ends_early() -> None:
@@ -205,7 +205,7 @@ def swung(seed: int) -> Log:
 
 
 def test_beside_a_viscous_term_at_its_bound_the_coulomb_force_is_no_better_known() -> None:
-    one = motion_log(swung(40), held=False, by_command=False)
+    one = motion_log(swung(40), zoh=False, by_command=False)
     found = refit(Plant(SLIPPERY), [one], "force", prior={}, effort="near")
     assert found.plant.friction.F_vp < 2e-9 < 1e-3 < found.plant.friction.F_vn
     assert found.sd["F_cp"] > 0.7 * found.sd["F_cn"]

@@ -65,7 +65,7 @@ def test_a_body_without_a_band_is_found_from_its_breakaways() -> None:
     assert (found.F_sp, found.F_sn) == pytest.approx((BARE.F_sp, BARE.F_sn), rel=0.01)
 
 
-def test_the_range_of_a_limit_under_a_held_force_holds_it() -> None:
+def test_the_range_of_a_limit_under_a_zero_order_hold_force_holds_it() -> None:
     """No derivative says it: between two steps of the force a limit changes nothing."""
     true, one = plant(friction=BARE), seen(made(4, friction=BARE))
     found = stick_ranges(true, [one], "command", 2.0, len(one.log))

@@ -99,11 +99,11 @@ def test_a_play_is_where_the_motion_left_it() -> None:
     assert misfit(plant(), [one], "command") > 5.0
 
 
-def test_a_run_by_a_noisy_force_is_judged_less_where_it_walks() -> None:
+def test_a_run_by_a_noisy_force_is_judged_less_where_it_drifts() -> None:
     log = made(5)
     noisy = log["F"] + 0.5 * np.random.default_rng(0).standard_normal(len(log))
     one = seen(log.with_signals(F=noisy))
-    by_force = replace(one, held=False, noise=replace(one.noise, F=0.5))
+    by_force = replace(one, zoh=False, noise=replace(one.noise, F=0.5))
     free = module.freed(plant(), by_force, "force", starts(by_force, "force"))
     assert free is not None
     assert np.min(free.weight) < 0.5 < np.max(free.weight) <= 1.0
@@ -111,7 +111,7 @@ def test_a_run_by_a_noisy_force_is_judged_less_where_it_walks() -> None:
     assert even is not None and np.all(even.weight == 1.0)
 
 
-def test_a_window_that_a_run_loses_by_luck_bends_no_parameter() -> None:
+def test_a_window_that_a_run_loses_by_chance_bends_no_parameter() -> None:
     """A bump that no plant explains, in one window: all others count as they did."""
     one = seen(made(2))
     t = np.asarray(one.log["t"])

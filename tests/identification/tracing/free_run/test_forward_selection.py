@@ -22,9 +22,9 @@ from identification.tracing.free_run.backward_elimination import Setting, equati
 from identification.tracing.free_run.contenders import RunContender, less_load
 from identification.tracing.free_run.forward_selection import (
     contest,
+    corrected_p_value,
     decisive,
     judged_forward,
-    luck,
     most_left,
 )
 from identification.tracing.regression.candidates import EffectCandidate
@@ -143,11 +143,11 @@ def test_what_is_decisive() -> None:
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
 
 
-def test_luck_grows_with_what_was_tried() -> None:
+def test_a_p_value_grows_with_what_was_tried() -> None:
     spring = EffectCandidate(built_in()["spring"], {"k": 1.0, "k_3": 0.0}, {}, 12.0)
-    assert luck(spring, 1) == pytest.approx(np.exp(-6.0))  # chi-square of two, at 12
-    assert luck(spring, 18) == pytest.approx(18 * luck(spring, 1))
-    assert luck(replace(spring, gain=-3.0), 18) == 1.0
+    assert corrected_p_value(spring, 1) == pytest.approx(np.exp(-6.0))  # chi-square of two, at 12
+    assert corrected_p_value(spring, 18) == pytest.approx(18 * corrected_p_value(spring, 1))
+    assert corrected_p_value(replace(spring, gain=-3.0), 18) == 1.0
 
 
 def test_the_stretch_of_which_most_is_left_is_where_the_run_errs() -> None:
@@ -171,8 +171,8 @@ def test_friction_by_load_takes_its_share_of_the_plain() -> None:
 
 
 def test_asymmetries_of_zero_are_held() -> None:
-    held = even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1}, "spring": {"k": 1.0}}))
-    assert held == {"stribeck.asymmetry": 0.0, "stribeck.delta": 0.0}
+    fixed = even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1}, "spring": {"k": 1.0}}))
+    assert fixed == {"stribeck.asymmetry": 0.0, "stribeck.delta": 0.0}
     uneven = {"F_s": 1.0, "v_s": 0.1, "asymmetry": 0.1, "delta": 1.5}
     assert even(plant({"stribeck": uneven})) == {}
 
@@ -202,7 +202,7 @@ def test_a_winner_begins_from_the_equations_too(
     setting: Any = SimpleNamespace(
         drive="command", plain=SimpleNamespace(model=SimpleNamespace(misfit=40.0))
     )
-    done, anew = SimpleNamespace(misfit=left), SimpleNamespace(misfit=again, imposed=False)
+    done, anew = SimpleNamespace(misfit=left), SimpleNamespace(misfit=again, prescribed=False)
     monkeypatch.setattr(forward_selection, "_taken", lambda *_: (None, None))
     monkeypatch.setattr(forward_selection, "fitted", lambda *_: anew)
     found: Any = forward_selection._from_equations(winner, done, setting)  # type: ignore[arg-type]

@@ -35,10 +35,10 @@ def test_a_change_in_time_is_even_where_the_directions_are_not() -> None:
     assert found.outcomes["mechanical"].fit.theta[2] == pytest.approx(uneven.F_cn, rel=0.02)
 
 
-@pytest.mark.parametrize(("delta", "held"), [(2.0, True), (1.0, False)])
-def test_an_exponent_stays_unless_the_log_calls_for_another(delta: float, held: bool) -> None:
+@pytest.mark.parametrize(("delta", "stays"), [(2.0, True), (1.0, False)])
+def test_an_exponent_stays_unless_the_log_calls_for_another(delta: float, stays: bool) -> None:
     found = best("stribeck", {"stribeck": {"F_s": 6.0, "v_s": 0.06, "delta": delta}})
-    assert (found.values["delta"] == 2.0) == held
+    assert (found.values["delta"] == 2.0) == stays
     assert found.values["delta"] == pytest.approx(delta, rel=0.3)
 
 
@@ -91,7 +91,7 @@ def test_a_chamber_whose_seal_has_no_friction_comes_out_as_nothing(seed: int) ->
             "p_n": p_n,
         },
     )
-    stage, base = first_stage([motion_log(log, held=False, by_command=False)], by_command=False)
+    stage, base = first_stage([motion_log(log, zoh=False, by_command=False)], by_command=False)
     found = best_of(stage, built_in()["pressure_dependent_friction"], base)
     assert found is not None
     assert found.values["mu_p"] >= 0.0

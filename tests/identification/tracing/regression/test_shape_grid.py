@@ -36,7 +36,7 @@ def test_another_log_of_the_machine_is_seen_alike() -> None:
     one = replace(seen(made(4, {})), rotary=True)
     same = again(one, one.log)
     assert same.rotary
-    assert same.held == one.held
+    assert same.zoh == one.zoh
     assert same.noise == one.noise
 
 

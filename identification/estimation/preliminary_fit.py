@@ -25,7 +25,7 @@ FIRST_FIT_SEED = 0  # the answer is the same each time
 
 
 @dataclass(frozen=True, eq=False)
-class FirstLook:
+class PreliminaryFit:
     """A fit as far as it is seen in seconds; open: whether the whole fit may follow the log's run,
     which this one was near to when it ended."""
 
@@ -33,7 +33,7 @@ class FirstLook:
     open: bool = False
 
 
-def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> FirstLook:
+def preliminary_fit(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> PreliminaryFit:
     """The first part of `fit_plant` of the same logs, by its sources (weak form, Messenger, Bortz
     2021).
 
@@ -45,8 +45,8 @@ def first_look(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> Fir
     beside = what_acts_beside(logs, rig, each=lambda: _ending(RUNS_OF_LAG * len(logs)))
     rng, halt = np.random.default_rng(FIRST_FIT_SEED), _ending(runs)
     fit = fit_beside(logs, beside, rng, rig, drive, None, halt, quick=True)
-    near = not (fit.imposed or fit.adequate) and fit.chi_square <= HOPELESS
-    return FirstLook(fit, halt.reached() and near)
+    near = not (fit.prescribed or fit.adequate) and fit.chi_square <= HOPELESS
+    return PreliminaryFit(fit, halt.reached() and near)
 
 
 def _ending(runs: float) -> Halt:

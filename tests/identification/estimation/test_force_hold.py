@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.estimation import held_force
-from identification.estimation.held_force import whole_samples_late
+from identification.estimation import force_hold
+from identification.estimation.force_hold import whole_samples_late
 from identification.log import Log
 
 N = 10
@@ -12,7 +12,7 @@ LOG = Log("rod", {"t": 1e-3 * np.arange(float(N)), "y": np.zeros(N), "F": np.one
 
 
 @pytest.mark.parametrize(
-    ("line", "late", "held", "until", "half", "whole"),
+    ("line", "late", "zoh", "until", "half", "whole"),
     [
         (0.0, 0.0, 20.0, 0.0, 0.0, 0.0),
         (0.0, 0.0, 0.0, 20.0, 0.0, -1.0),
@@ -23,14 +23,14 @@ LOG = Log("rod", {"t": 1e-3 * np.arange(float(N)), "y": np.zeros(N), "F": np.one
     ],
 )
 def test_the_likelier_instant_is_taken(
-    line: float, late: float, held: float, until: float, half: float, whole: float | None,
+    line: float, late: float, zoh: float, until: float, half: float, whole: float | None,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    likely = np.array([line, late, held, until, half, 0.0])
-    monkeypatch.setattr(held_force, "sliding_likelihoods", lambda *_, **__: likely)
+    likely = np.array([line, late, zoh, until, half, 0.0])
+    monkeypatch.setattr(force_hold, "sliding_likelihoods", lambda *_, **__: likely)
     assert whole_samples_late([LOG], 3.0, rotary=True) == whole
 
 
 def test_nothing_is_said_of_a_log_without_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(held_force, "sliding_likelihoods", lambda *_, **__: None)
+    monkeypatch.setattr(force_hold, "sliding_likelihoods", lambda *_, **__: None)
     assert whole_samples_late([LOG], 0.0, rotary=False) is None

@@ -1,4 +1,4 @@
-"""Trace of imposed motion: every stroke counts, however slow it is."""
+"""Trace of prescribed motion: every stroke counts, however slow it is."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -121,21 +121,21 @@ def test_test_logs_are_recorded_as_the_training_logs_are() -> None:
     assert sizes[0] is not None and sizes[0] == pytest.approx(sizes[1])
 
 
-@pytest.mark.parametrize("imposed", [True, False])
-def test_no_imposed_stroke_is_taken_for_rest(imposed: bool) -> None:
+@pytest.mark.parametrize("prescribed", [True, False])
+def test_no_prescribed_stroke_is_taken_for_rest(prescribed: bool) -> None:
     # The slower half of the strokes has another friction than the faster, as a band would have.
     logs = [strokes(bar, [speed] * 4, bar) for bar, speed in ((1, 13e-3), (5, 9e-3))]
-    parts = [motion_log(log, held=False, by_command=False, imposed=imposed) for log in logs]
+    parts = [motion_log(log, zoh=False, by_command=False, prescribed=prescribed) for log in logs]
     zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
     o = base_fits(EffectRows(tuple(parts), *zeros, by_command=False))[MECHANICAL]
-    assert bool(np.all(o.rows.speed >= o.slowest)) is imposed
+    assert bool(np.all(o.rows.speed >= o.slowest)) is prescribed
 
 
 def test_no_mass_is_fitted_where_a_rig_moves_the_body() -> None:
     """Mass that a wrong structure left took half of the force where the motion was less smooth."""
-    log = motion_log(strokes(3.0, SPEEDS, 2), held=False, by_command=False, imposed=True)
+    log = motion_log(strokes(3.0, SPEEDS, 2), zoh=False, by_command=False, prescribed=True)
     theta = np.array([0.0, COULOMB, COULOMB, 0.0, 0.0])
-    for one, given in ((log, True), (replace(log, imposed=False), False)):
+    for one, given in ((log, True), (replace(log, prescribed=False), False)):
         rows = EffectRows((one,), theta, np.zeros(3), by_command=False).parts[MECHANICAL][0]
         assert np.all(rows.X[:, 0] == 0.0) == given
         assert np.all(np.any(rows.X[:, 1:] != 0.0, axis=0))
@@ -145,7 +145,7 @@ def test_no_mass_is_fitted_where_a_rig_moves_the_body() -> None:
 def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
     effects = {"position_dependent_friction": {"c1": 150.0, "period": 0.1}}
     log = made(21, effects) if free else strokes(1, [9e-3] * 3, 1)
-    logs = [motion_log(log, held=False, by_command=False)]
+    logs = [motion_log(log, zoh=False, by_command=False)]
     _, first = first_stage(logs, False)
     assert inertia_is_lost(first[MECHANICAL])
     assert inertia_has_no_part(logs) is not free
@@ -154,7 +154,7 @@ def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
 def test_inertia_that_a_lag_of_viscous_friction_cancels_is_no_rig_s_motion() -> None:
     damped = replace(PLAIN, F_vp=200.0, F_vn=200.0)
     effects = {"frictional_lag": {"tau": damped.m / damped.F_vp}}
-    logs = [motion_log(made(21, effects, damped), held=False, by_command=False)]
+    logs = [motion_log(made(21, effects, damped), zoh=False, by_command=False)]
     _, first = first_stage(logs, False)
     assert inertia_is_lost(first[MECHANICAL])
     assert not inertia_has_no_part(logs)
@@ -163,10 +163,10 @@ def test_inertia_that_a_lag_of_viscous_friction_cancels_is_no_rig_s_motion() -> 
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_is_no_inertia(seed: int) -> None:
     logs = [strokes(bar, [9e-3] * 3, seed) for bar in (1, 5)]
-    assert inertia_has_no_part([motion_log(log, held=False, by_command=False) for log in logs])
+    assert inertia_has_no_part([motion_log(log, zoh=False, by_command=False) for log in logs])
     short = Log("short", {k: x[:200] for k, x in logs[0].signals.items()})
     # Too little to tell
-    assert inertia_has_no_part([motion_log(short, held=False, by_command=False)])
+    assert inertia_has_no_part([motion_log(short, zoh=False, by_command=False)])
 
 
 def bursts(rate: float, seed: int) -> Log:
@@ -181,11 +181,12 @@ def bursts(rate: float, seed: int) -> Log:
 @pytest.mark.parametrize("rate", [2.0, 4.0, 6.0])
 def test_rest_between_strokes_is_not_smoothed_away(rate: float) -> None:
     log = bursts(rate, 1)
-    free, imposed = (
-        motion_log(log, held=False, by_command=False, imposed=imposed) for imposed in (False, True)
+    free, prescribed = (
+        motion_log(log, zoh=False, by_command=False, prescribed=prescribed)
+        for prescribed in (False, True)
     )
-    assert len(imposed.sliding.start) == len(free.sliding.start)
-    assert imposed.signals["v"] == pytest.approx(free.signals["v"])
+    assert len(prescribed.sliding.start) == len(free.sliding.start)
+    assert prescribed.signals["v"] == pytest.approx(free.signals["v"])
 
 
 @pytest.mark.method

@@ -37,7 +37,7 @@ from identification.estimation.regression.force_terms import (
 )
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
-    settled_rows,
+    converged_rows,
     usual_fastest,
     without_reversals,
 )
@@ -74,7 +74,7 @@ FALLS_WHY = (
 )
 
 
-def fit_imposed(recorded: RecordedLogs, why: str) -> KarnoppFit:
+def fit_prescribed(recorded: RecordedLogs, why: str) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
     why: what kept a free run from being fitted; it is the first of the remarks.
@@ -157,7 +157,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
     """
-    every = settled_rows(recorded.logs)
+    every = converged_rows(recorded.logs)
     made = without_reversals(every)
     rows = [one.rows for one in made]
     up, down = ways_of(rows)
@@ -167,7 +167,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
             f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
             " directions"
         )
-    late = None if recorded.held else Lateness.of([one.windows for one in made], recorded.plain)
+    late = None if recorded.zoh else Lateness.of([one.windows for one in made], recorded.plain)
     return fewest_terms(rows, late, stacked([one.rows for one in every])), rows
 
 
@@ -175,23 +175,23 @@ def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
     """The equation of motion of logs that move one way, as `fit_imposed` has it of both: mass,
     viscous and Coulomb friction. Raises NotIdentifiable where they go both ways, or hardly slide.
     Source: Messenger, Bortz (2021)."""
-    moved = _moved(recorded.plain, recorded.held)
+    moved = _moved(recorded.plain, recorded.zoh)
     up = np.concatenate([one.up for one in moved])
     way = _way(up)
     if way is None or len(up) < FEWEST_COMPARED:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
     windows = [one.sliding.at(np.flatnonzero(one.up == way)) for one in moved]
-    late = None if recorded.held else Lateness.of(windows, recorded.plain)
+    late = None if recorded.zoh else Lateness.of(windows, recorded.plain)
     return _made(fitted(robust_parts(data), ONE_WAY[way], late), data, recorded, why)
 
 
-def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
+def way_of(logs: Sequence[Log], *, zoh: bool) -> bool | None:
     """Whether logs slide up alone (True) or down alone (False); None: both ways, or hardly.
 
     By windows of sliding, of quick motion, which has few of them, by samples.
     """
-    moved = _moved(logs, held)
+    moved = _moved(logs, zoh)
     up = np.concatenate([one.up for one in moved])
     if len(up) < FEWEST_COMPARED:
         d = np.concatenate([one.signals["d"] for one in moved])
@@ -199,9 +199,9 @@ def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     return _way(up)
 
 
-def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
+def _moved(logs: Sequence[Log], zoh: bool) -> list[MotionLog]:
     """The logs with their motion, smoothed until its direction is significant."""
-    return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
+    return [motion_log(one, zoh=zoh, by_command=False, prescribed=True) for one in logs]
 
 
 def _way(up: BoolArray) -> bool | None:
@@ -258,7 +258,7 @@ def _estimates(
     return _reasoned(known, nine, fit.share, recorded)
 
 
-def imposed_estimates(
+def prescribed_estimates(
     plant: Plant, theta: Array, sd: Mapping[str, float], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
     """The nine of a plant with effects under prescribed motion; sd: of the five of sliding.

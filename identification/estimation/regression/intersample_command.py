@@ -79,8 +79,8 @@ def is_faster_loop(share: float) -> bool:
 def rate_column(one: MotionLog, windows: WeakWindows | None = None) -> Array:
     """What a whole step to the next sample would add to the rows of a log, (r,); windows: of a
     motor's, by default those of sliding one way."""
-    if one.held:
-        return np.asarray((windows or one.sliding).held @ _steps(one.log.commanded))
+    if one.zoh:
+        return np.asarray((windows or one.sliding).zoh @ _steps(one.log.commanded))
     assert one.whole is not None
     return np.asarray(one.whole.first @ (one.log.h * one.log["u"]))
 
@@ -97,17 +97,17 @@ def significant_share(share: float, sd: float, gain: float) -> float:
     return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + beyond else 0.0
 
 
-def between_samples(log: Log, share: float, held: bool) -> Log:
+def between_samples(log: Log, share: float, zoh: bool) -> Log:
     """The log with the mean command until the next sample in place of the logged one.
 
-    held: a motor's, so that its force is that mean too, beside what acts at a place, which is of
+    zoh: a motor's, so that its force is that mean too, beside what acts at a place, which is of
     each sample. Ours: `README.md`, (13).
     """
     if share == 0.0:
         return log
     kernel = _mean_until_next(share)
 
-    keys = [key for key in (("u", "F") if held else ("u",)) if key in log]
+    keys = [key for key in (("u", "F") if zoh else ("u",)) if key in log]
     means = dict[str, Array]()
     for key in keys:
         x = np.asarray(log[key], dtype=np.float64)
@@ -139,11 +139,11 @@ def period_of(share: float, h: float) -> float | None:
     return h * (1.0 - 2.0 * share) if is_faster_loop(share) else None
 
 
-def with_period(log: Log, period: float | None, held: bool) -> Log:
+def with_period(log: Log, period: float | None, zoh: bool) -> Log:
     """Another log of such a machine, whatever its clock, with the mean command until its next
-    sample; held: as in `between_samples`."""
+    sample; zoh: as in `between_samples`."""
     share = 0.0 if period is None else 0.5 * (1.0 - period / log.h)
-    return between_samples(log, max(share, 0.0), held)
+    return between_samples(log, max(share, 0.0), zoh)
 
 
 def unseen(log: Log, share: float) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.regression.held_command import (
+from identification.estimation.regression.intersample_command import (
     between_samples,
     share_between,
     unseen,
@@ -108,7 +108,7 @@ def test_the_mean_of_a_command_that_bends_is_exact(R: int) -> None:
     t: Array = H * np.arange(40, dtype=np.float64)
     signals = {"t": t, "y": np.zeros(40), "u": u[::R]}
     log = Log("bends", signals)
-    found = between_samples(log, (R - 1) / (2 * R), held=False)
+    found = between_samples(log, (R - 1) / (2 * R), zoh=False)
     mean = u.reshape(40, R).mean(axis=1)
     assert found["u"][1:-2] == pytest.approx(mean[1:-2], rel=1e-12)
 
@@ -147,7 +147,7 @@ def test_what_the_loop_adds_between_the_samples_is_noise(R: int, chatter: float)
     """The jumps of the force where friction turns with it: of them no parabola knows."""
     share = (R - 1) / (2 * R)
     log, mean = driven(R, chatter)
-    means = between_samples(log, share, held=True)
+    means = between_samples(log, share, zoh=True)
     true = float(np.std(means["F"] - mean))
     assert true < unseen(means, share) < 1.6 * true
     assert unseen(log, 0.0) == 0.0
@@ -190,10 +190,10 @@ def test_the_share_shows_behind_an_actuator_too(R: int, share: float, chatter: f
 
 
 @pytest.mark.parametrize("R", [1, 2, 8])
-def test_what_the_loop_adds_between_the_samples_walks(R: int) -> None:
+def test_what_the_loop_adds_between_the_samples_drifts(R: int) -> None:
     """One sample of the command has been logged, and so many more were not."""
     log = behind_valve(R, chatter=0.05)
     found = recorded_logs([log], CYLINDER, "command").logs[0]
     tick = H / R
     unlogged = 900.0 * tick * 0.05 * np.sqrt((R - 1) + (R - 1) ** 2)
-    assert found.noise.walk == pytest.approx(unlogged, rel=0.35, abs=2e-4)
+    assert found.noise.random_walk == pytest.approx(unlogged, rel=0.35, abs=2e-4)

@@ -11,7 +11,7 @@ from identification.errors import NotIdentifiable
 from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
-from identification.tracing import surroundings_told
+from identification.tracing import restored_surroundings
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.estimation.test_turn_orders import BOTH_WAYS, ONE_WAY, RIG, log_of
@@ -55,11 +55,11 @@ def test_a_lag_that_leaves_but_noise_is_the_machines(
     complete: bool, probable: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Noise was half of what was missing: a run down to the noise had a probability of 23 %."""
-    monkeypatch.setattr(surroundings_told, "lag_explains", lambda *_: (0.155, 0.117))
+    monkeypatch.setattr(restored_surroundings, "lag_explains", lambda *_: (0.155, 0.117))
     of = trace_of("none", ())
     late = Surroundings(lag=Size(8e-3, 5e-4), gives=20.0)
     log = Log("late", dict.fromkeys("ty", np.linspace(0.0, 1.0, 9)))
-    found = surroundings_told.with_surroundings(
+    found = restored_surroundings.with_surroundings(
         replace(of, complete=complete), late, [log], [log], Rig("motor", force_per_command=1.0)
     )
     (delay,) = found.effects

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.estimation.imposed_motion import fit_imposed, fit_one_way, way_of
+from identification.estimation.prescribed_motion import fit_one_way, fit_prescribed, way_of
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 
@@ -28,7 +28,7 @@ def test_a_mass_that_the_equation_does_without_is_slight_in_any_motion() -> None
     F = np.where(v > 0.0, 6.0, -4.0) + 0.1 * rng.standard_normal(len(v))
     y = h * np.cumsum(v) + 1e-5 * rng.standard_normal(len(v))
     log = Log("seal", {"t": h * np.arange(len(v), dtype=np.float64), "y": y, "F": F})
-    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), "why")
+    fit = fit_prescribed(recorded_logs([log], Rig("force"), "force"), "why")
     assert fit.estimates["m"].value is None
     jerk = float(np.max(np.abs(np.diff(v)))) / h  # a reversal from one sample to the next
     assert fit.friction.m * jerk < 0.01 * 5.0
@@ -39,6 +39,6 @@ def test_jerks_back_before_slow_passes_make_no_motion_both_ways() -> None:
     t = np.arange(10_000, dtype=np.float64) * 2e-3
     v = np.where((t < 3.0) & (t % 0.25 < 0.05), -1.0, 0.5)
     y = np.cumsum(v) * 2e-3 + 1e-5 * np.random.default_rng(0).standard_normal(len(t))
-    assert way_of([Log("slow", {"t": t, "y": y, "F": 0.4 + 0.1 * v})], held=False) is True
+    assert way_of([Log("slow", {"t": t, "y": y, "F": 0.4 + 0.1 * v})], zoh=False) is True
     quick = 0.5 * np.sin(2.0 * np.pi * 8.0 * t)
-    assert way_of([Log("quick", {"t": t, "y": quick, "F": quick})], held=False) is None
+    assert way_of([Log("quick", {"t": t, "y": quick, "F": quick})], zoh=False) is None

@@ -1,4 +1,4 @@
-"""One rule of what is told: no value without an interval, with one too wide, or at a bound."""
+"""One rule of what is reported: no value without an interval, with one too wide, or at a bound."""
 
 import ast
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from identification.effects._base import Acting, Param
 from identification.effects._library import built_in
 from identification.estimation.estimates import (
-    HELD,
+    FIXED_AT_DEFAULT,
     Events,
     effect_estimates,
     estimates,
@@ -22,7 +22,7 @@ from identification.estimation.estimates import (
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE
 from tests.conftest import ROOT
-from tests.told import broken
+from tests.reported import broken
 
 PLENTY = Events((10, 10), (10, 10), (1000, 1000), (0.5, 0.5))
 RULE = "identification/estimation/estimates.py"
@@ -82,17 +82,17 @@ def test_no_estimate_of_an_effect_breaks_it(key: str, p: Param, share: float, wi
             one = of_effect(p, value, sd)
             assert broken(one, (p.low, p.high)) is None, key
             if one.value is not None and one.low is None:
-                assert p.held(value) and one.reason == HELD
+                assert p.at_default(value) and one.reason == FIXED_AT_DEFAULT
 
 
 def test_what_no_log_moves_from_its_default_is_given_with_the_law() -> None:
     stribeck = built_in()["stribeck"]
     plain = Acting(stribeck, (3.0, 0.03, 0.0, 2.0))
     found = effect_estimates([plain], {"stribeck.F_s": 0.1, "stribeck.v_s": 0.002})
-    told = {name.removeprefix("stribeck."): one for name, one in found.items()}
-    assert (told["F_s"].value, told["v_s"].value) == (3.0, 0.03)
-    assert (told["delta"].value, told["delta"].reason) == (2.0, HELD)
-    assert (told["asymmetry"].value, told["asymmetry"].sd) == (0.0, None)
+    of_law = {name.removeprefix("stribeck."): one for name, one in found.items()}
+    assert (of_law["F_s"].value, of_law["v_s"].value) == (3.0, 0.03)
+    assert (of_law["delta"].value, of_law["delta"].reason) == (2.0, FIXED_AT_DEFAULT)
+    assert (of_law["asymmetry"].value, of_law["asymmetry"].sd) == (0.0, None)
 
 
 def test_a_wave_that_has_no_cosine_says_how_small_it_is() -> None:

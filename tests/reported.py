@@ -1,5 +1,5 @@
-"""The rule of what is told, as a reader of the results has it: what breaks it in an estimate or a
-file."""
+"""The rule of what is reported, as a reader of the results has it: what breaks it in an estimate or
+a file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -41,7 +41,11 @@ def _broken(one: Mapping[str, Any], bounds: tuple[float, float] | None) -> str |
         reasoned = one.get("reason") and one.get("assumed") is not None
         return None if reasoned and low is None and high is None else "null without its reason"
     if low is None or high is None:  # given, as by a card, and no estimate
-        return None if low is high is one["sd"] and one.get("reason") else "neither told nor given"
+        return (
+            None
+            if low is high is one["sd"] and one.get("reason")
+            else "neither estimated nor given"
+        )
     if not low < high:
         return "an interval of no width"
     if not low <= value <= high:

@@ -59,8 +59,8 @@ OF_STEPS = 0.1
 # What stops that come and go, in steps of the likelihood, add to deviations over whole runs; for
 # the coverage on seeds 5000 to 5004 of benchmarks/nine_parameters.py.
 WALLS = 1.2
-# Deviations of a stick limit under a held force: between two of its steps, of a step, uniform; and
-# of a measured one's noise, which begins a motion too early (seeds 1 to 6, 34 to 36 of
+# Deviations of a stick limit under a zero-order-hold force: between two of its steps, of a step,
+# uniform; and of a measured one's noise, which begins a motion too early (seeds 1 to 6, 34 to 36 of
 # benchmarks/encoders.py, 8000 and 65536 counts).
 OF_A_STEP, OF_NOISE = 12.0**-0.5, 2.0
 
@@ -71,7 +71,7 @@ NO_REST_WHY = (
 STOP_TURNS_ON_LESS = "a stop turns on less than the noise there"
 
 
-def settled(
+def converged_fit(
     plant: Plant, recorded: RecordedLogs, misfit: float, report: Progress, *,
     refined: Refit | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
@@ -146,7 +146,7 @@ def _remarks(
 
 def _why_windows(recorded: RecordedLogs) -> str:
     """What to say of a fit that follows its logs in windows."""
-    walk = max(one.noise.walk for one in recorded.logs)
+    walk = max(one.noise.random_walk for one in recorded.logs)
     if walk == 0.0:
         return MinorRemark(
             "the model follows the logs in windows of 2 s from measured states, but not the whole:"
@@ -172,7 +172,7 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     covariance[unknown, unknown] = (
         _as_large_as_can_be(near.plant, near.names, values, events)[unknown] ** 2
     )
-    if recorded.held and is_adequate(near.misfit):
+    if recorded.zoh and is_adequate(near.misfit):
         covariance = _with_stick_ranges(covariance, near, recorded)
     covariance = covariance + np.diag(between_samples_sd(near.names, values, recorded) ** 2)
     if not np.all(np.isfinite(covariance)):
@@ -181,8 +181,9 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
 
 
 def _with_stick_ranges(covariance: Array, near: Refit, recorded: RecordedLogs) -> Array:
-    """The covariance with the deviations of stick limits that a held force allows (d, d): where a
-    band is identified the run within it tells of its limit beside the steps."""
+    """The covariance with the deviations of stick limits that a zero-order-hold force allows (d,
+    d): where a band is identified the run within it is informative of its limit beside the
+    steps."""
     independent = len(set(counts(recorded.logs, recorded.drive).tolist()))
     ranges = stick_ranges(near.plant, recorded.logs, recorded.drive, RUN_WINDOW, independent)
     step = OF_A_STEP * usual_limits(recorded.logs, near.plant)[1]
@@ -210,8 +211,8 @@ def between_samples_sd(
     """Deviations (d,) of values that the force between its samples adds, as far as it drives: of
     that part, by default as a run is driven."""
     gain = max(one.noise.corrected for one in recorded.logs)
-    least = OF_STEPS if recorded.held else gain**2
-    drives = recorded.drive == "force" and not recorded.held
+    least = OF_STEPS if recorded.zoh else gain**2
+    drives = recorded.drive == "force" and not recorded.zoh
     part = of if of is not None else 1.0 if drives else least
     return np.asarray(part * np.array([BETWEEN.get(name, 0.0) for name in names]) * np.abs(values))
 
@@ -260,10 +261,10 @@ def _of_both(
 ) -> dict[str, Estimate]:
     """The stick limits of a motor whose force changes between its samples, each midway between the
     run's and the force at its breakaways: the one errs to below and the other to above, and the
-    interval holds both; those under a force that is held likewise, where most breakaways by
+    interval holds both; those under a zero-order-hold force likewise, where most breakaways by
     themselves say another. followed: the logs are to the noise, so that where the run shows no
-    limit the Coulomb level stands in for it. Ours."""
-    if not recorded.held:
+    limit the Coulomb level replaces it. Ours."""
+    if not recorded.zoh:
         return {}
     changes, out = recorded.may_change_between, dict[str, Estimate]()
     if changes:
