@@ -132,8 +132,8 @@ def _are_several(
     of: NDArray[Any], t: Array, values: Sequence[Array], rows: Sequence[NDArray[Any]]
 ) -> bool:
     """Whether rows that numbers tell apart (n,) are of several machines, and the number no signal:
-    a value goes by far less from one of them to the next of its own, and is not recognised by the number
-    alone; or the numbers come round always alike, at times that repeat."""
+    a value goes by far less from one of them to the next of its own, and is not recognised by the
+    number alone; or the numbers come round always alike, at times that repeat."""
     several = len(np.unique(of))
     for x in values:
         own = np.concatenate([np.abs(np.diff(x[at])) for at in rows] or [np.abs(np.diff(x))])
