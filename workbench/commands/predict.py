@@ -38,7 +38,6 @@ def command(
     from workbench.interface.logs import predict
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_predict
-    from workbench.report.view import view
 
     with results("predict", out) as folder:
         if is_velocity_model(model_file):
@@ -46,8 +45,7 @@ def command(
             shown = _of_velocity(model_file, log, card, window)
         else:
             model = load_model(model_file, effects)
-            found = predict(model, log, card, drive=drive, window=window)
-            shown = view(found.found, found.rotary, log)
+            shown = predict(model, log, card, drive=drive, window=window).view
         shown.write(folder)
     shown.show(folder.final, after_predict(log, card))
 

@@ -54,9 +54,10 @@ class PredictResult(Result):
     """What a model says of a log, and how far off it is."""
 
     _command = "predict"
-    _shown = ("found", "rotary")
+    _shown = ("found", "rotary", "log")
     found: Predicted
     rotary: bool = False
+    log: str = "LOG"  # as it was named
 
     @property
     def frame(self) -> "pd.DataFrame":
@@ -160,7 +161,8 @@ def predict(
     with working("predicting"):
         where = str(found.card.path)
         predicted = predict_logs(known, found.logs, where, drive=drive, window=window)
-    return PredictResult(predicted, known.rotary)
+    named = (os.fspath(log),) if isinstance(log, str | os.PathLike) else ()
+    return PredictResult(predicted, known.rotary, *named)
 
 
 def response(

@@ -51,7 +51,7 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
 
 
 @view.register
-def _(found: Predicted, rotary: bool, log: str = "LOG") -> View:
+def _(found: Predicted, rotary: bool, log: str) -> View:
     """How far a model lies from a log."""
     first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
     remarks = found.summary["remarks"]
