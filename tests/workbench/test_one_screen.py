@@ -298,7 +298,7 @@ def test_remarks_on_many_logs_are_reported_once() -> None:
     assert whole.count("uneven clock") == len(LOGS)
 
 
-def test_parameters_not_told_for_one_reason_are_reported_together() -> None:
+def test_parameters_not_identifiable_for_one_reason_are_reported_together() -> None:
     model = many_logs(identified().model)
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]

@@ -196,7 +196,7 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
 
 
 def plant_chart(found: Responded) -> Chart:
-    """Position by force: magnitude, phase and coherence."""
+    """Position over force: magnitude, phase and coherence."""
     every, units = found.found, shown(found.rotary)
     f, by_position = every.f, -1.0 / (2.0 * np.pi * every.f) ** 2 + 0j
     others = [("the model", None if found.curves is None else found.curves.plant)]
