@@ -8,7 +8,7 @@ of 2 us written apart from the kernels of the fit; its sensors have no noise but
 counts (500 to 65536 a turn), and 0.01 N m of a measured torque. Logged are the command of a motor
 ("motor"), or the torque, as it acts from its row on ("zoh") or did until then ("late"), which is
 half a period to either side of where a line through its samples has it. Seeds 1 to 6 served to
-choose the constants of `identification.estimation.settling`; those from 11 on judge.
+choose the constants of `identification.estimation.converged_fit`; those from 11 on judge.
 """
 
 import argparse

@@ -140,8 +140,8 @@ def intervals(case: Case, found: Mapping[str, Any]) -> list[bool]:
 
 
 def false_proof(found: Mapping[str, Any], force_is_measured: bool) -> str:
-    """The held-out prediction of a measured signal that a headlined effect makes worse, or that it
-    was headlined on a log at rest; else empty."""
+    """The held-out prediction of a measured signal that a reported effect makes worse, or that it
+    was reported on a log at rest; else empty."""
     plain, after = found.get("identify", {}), found.get("trace", {})
     if after.get("verdict") != "effect":
         return ""

@@ -123,8 +123,8 @@ def summary(found: Sequence[tuple[Case, Answers]]) -> list[str]:
         for case, one in found
         if (why := false_proof(one, one.get("yardstick", {}).get("measured", "F") == "F"))
     ]
-    headlined = sum(one.get("trace", {}).get("verdict") == "effect" for _, one in found)
-    out.append(f"false proofs: {len(proofs)} of {headlined} headlined"
+    reported = sum(one.get("trace", {}).get("verdict") == "effect" for _, one in found)
+    out.append(f"false proofs: {len(proofs)} of {reported} reported"
                f" ({', '.join(proofs) or 'none'})")  # fmt: skip
     contained = [hold for case, one in found for hold in intervals(case, one)]
     out.append(f"intervals that hold: {sum(contained)} of {len(contained)}")

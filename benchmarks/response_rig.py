@@ -55,7 +55,7 @@ class Machine:
         return None if self.m_2 == 0.0 else float(np.sqrt(self.k / self.m_2) / (2.0 * np.pi))
 
     def truth(self, f: Array) -> NDArray[np.complex128]:
-        """Position of the motor by force at f [Hz], its friction viscous alone."""
+        """Position of the motor over force at f [Hz], its friction viscous alone."""
         s = 2j * np.pi * f
         viscous = 0.5 * (self.F_vp + self.F_vn)
         own = self.m_1 * s**2 + viscous * s

@@ -79,7 +79,7 @@ class DayResult:
     day: Day
     outcome: LogOutcome
     true: float
-    in_force: float | None
+    active: float | None
 
 
 def days() -> Iterator[Day]:
@@ -180,7 +180,7 @@ def silent(_event: str, **_more: object) -> None:
 
 def line(one: DayResult) -> str:
     """One log's line of the timeline."""
-    day, known = one.day, "-" if one.in_force is None else f"{one.in_force:.2f}"
+    day, known = one.day, "-" if one.active is None else f"{one.active:.2f}"
     about = ", ".join(
         part for part in (f"wear {100 * day.wear:.0f} %", "spring" if day.spring else "", day.fault)
         if part
@@ -209,7 +209,7 @@ def picture(results: list[DayResult], path: Path) -> None:
         drawn = figure(9.0, 3.6)
         axes = drawn.subplots(1, 1)
         axes.plot(week, [one.true for one in results], color=REFERENCE, label="F_cp, true")
-        known = [np.nan if one.in_force is None else one.in_force for one in results]
+        known = [np.nan if one.active is None else one.active for one in results]
         axes.step(week, known, where="post", color=MODEL, ls="--", label="F_cp, active")
         for verdict, (marker, colour, words) in marks.items():
             at = [one for one in results if mark_of(one) == verdict]

@@ -218,9 +218,18 @@ class VelocityPrediction:
     simulated: Array
 
 
+@dataclass(frozen=True, eq=False)
+class VelocityPredicted:
+    """The predictions of a log; window [s]: after which each begins anew; rotary: y is in rad."""
+
+    runs: tuple[VelocityPrediction, ...]
+    window: float | None
+    rotary: bool
+
+
 def predict_velocity(
     model: VelocityModel, logs: MachineLogs, where: str, window: float | None = None
-) -> tuple[VelocityPrediction, ...]:
+) -> VelocityPredicted:
     """The position of each run by its command, from where it is measured to be, anew after each
     `window` [s].
 
@@ -241,4 +250,4 @@ def predict_velocity(
         anchors = e[np.minimum(starts, len(e) - 1)]
         simulated = np.where(after < 0, np.nan, log["y"] - e + anchors)
         out.append(VelocityPrediction(log["t"], log["y"], simulated))
-    return tuple(out)
+    return VelocityPredicted(tuple(out), window, model.rotary)

@@ -172,7 +172,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
 
 
 def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
-    """The equation of motion of logs that move one way, as `fit_imposed` has it of both: mass,
+    """The equation of motion of logs that move one way, as `fit_prescribed` has it of both: mass,
     viscous and Coulomb friction. Raises NotIdentifiable where they go both ways, or hardly slide.
     Source: Messenger, Bortz (2021)."""
     moved = _moved(recorded.plain, recorded.zoh)

@@ -10,7 +10,7 @@ def body_response(
     f: Array, m: float, viscous: float, *, stiffness: float = 0.0, lag: float = 0.0,
     second_mass: tuple[float, float, float] | None = None,
 ) -> ComplexArray:  # fmt: skip
-    """Position by force [m/N] at f [Hz], (k,).
+    """Position over force [m/N] at f [Hz], (k,).
 
     m: mass, of both where there are two [kg]; viscous friction [N s/m], stiffness of a spring to
     the ground [N/m], lag of the position [s]; second_mass: resonance and anti-resonance [Hz], and

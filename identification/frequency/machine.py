@@ -51,8 +51,9 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class MachineResponses:
-    """What the logs show at f [Hz]: acceleration by force [1/kg] without friction and with it, and
-    the controller from the position to the force that counters it [N/m]; stretches: lengths [s].
+    """What the logs show at f [Hz]: acceleration over force [1/kg] without friction and with it,
+    and the controller from the position to the force that counters it [N/m]; stretches: lengths
+    [s].
 
     controller is None without a reference, or where the runs identify it nowhere. instrument:
     whether the reference was one.
@@ -71,12 +72,12 @@ class MachineResponses:
 
     @property
     def position(self) -> Response:
-        """Position by force [m/N]."""
+        """Position over force [m/N]."""
         return self.body.times(-1.0 / (2.0 * np.pi * self.f) ** 2 + 0j)
 
     @property
     def velocity(self) -> Response:
-        """Velocity by force [m/(N s)]."""
+        """Velocity over force [m/(N s)]."""
         return self.body.times(1.0 / (2j * np.pi * self.f))
 
 
@@ -104,7 +105,7 @@ def machine_responses(runs: Sequence[Recording], lowest: float | None = None) ->
 
 
 def body_by_force(runs: Sequence[Recording], lowest: float | None = None) -> Response:
-    """Acceleration by force without friction alone, as `machine_responses` has it."""
+    """Acceleration over force without friction alone, as `machine_responses` has it."""
     instruments = instruments_of(runs)
     names = ("a", "linear", "r") if instruments else ("a", "linear")
     each = [spectra_of(runs, band, names) for band in cut(runs, lowest)]

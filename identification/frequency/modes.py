@@ -2,7 +2,7 @@
 
     H(s) = e^(-s tau) [ s b_0/(s + c) + sum_i b_i s^2/(s^2 + 2 z_i w_i s + w_i^2) + b_r s^2 ]
 
-is acceleration by force: a rigid body with viscous friction, elastic modes, and what modes beyond
+is acceleration over force: a rigid body with viscous friction, elastic modes, and what modes beyond
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
 projection). Modes are added one by one while each explains more than chance; reported are those
 that stand out where the logs reach, and apart from these those in a gap of the points, which what
@@ -68,7 +68,7 @@ class Modes:
         return float(self.nonlinear[0])
 
     def response(self, f: Array) -> ComplexArray:
-        """Acceleration by force at f [Hz], (k,)."""
+        """Acceleration over force at f [Hz], (k,)."""
         return np.asarray(_columns(self.nonlinear, f) @ self.linear, dtype=np.complex128)
 
     def undelayed(self, f: Array) -> ComplexArray:
@@ -78,7 +78,7 @@ class Modes:
 
 
 def fit_modes(response: Response) -> Modes | None:
-    """The modes that a response (acceleration by force) shows; None where it shows too little."""
+    """The modes that a response (acceleration over force) shows; None where it shows too little."""
     use = response.seen
     if np.count_nonzero(use) < SHARED * EVENTS_NEEDED:
         return None

@@ -167,14 +167,18 @@ def in_run(
     whole, rate, bend = (soft(np.concatenate(x)) for x in (errors, rates, bends))
     sizes = [x**2 - np.mean(x**2) for x in (rate, bend)]
     of = partial(dependence, signals=signals, up=way, block=block)
-    told = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
-    told = [one for one in told if one.depends_on] or [of(x, least=least) for x in sizes]
-    told = sorted((one for one in told if one.depends_on), key=lambda one: -one.explained)
-    if not told:
+    structures = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
+    structures = [one for one in structures if one.depends_on] or [
+        of(x, least=least) for x in sizes
+    ]
+    structures = sorted(
+        (one for one in structures if one.depends_on), key=lambda one: -one.explained
+    )
+    if not structures:
         return Dependence((), 0.0)
-    named = tuple(dict.fromkeys(name for one in told for name in one.depends_on))
+    named = tuple(dict.fromkeys(name for one in structures for name in one.depends_on))
     motor = all(one.by_motor for one in logs)
-    return replace(told[0], depends_on=_with_command(named, motor))
+    return replace(structures[0], depends_on=_with_command(named, motor))
 
 
 def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from studies.paper.document import paper_document, paper_view
+from studies.paper.document import paper_document, paper_screen
 from studies.paper.report import paper_report
 from studies.paper.study import study
 from workbench import options
@@ -46,7 +46,7 @@ def command(
         document = paper_document(found)
         folder.write_json("paper.json", document)
         folder.write("report.html", paper_report(found))
-    emit({**document, "out": folder.final}, lambda: paper_view(found, folder.final))
+    emit({**document, "out": folder.final}, lambda: paper_screen(found, folder.final))
 
 
 def main() -> int:

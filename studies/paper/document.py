@@ -114,7 +114,7 @@ def rival_servo_rows(found: Study, number: int) -> list[Row]:
     ]
 
 
-def paper_view(found: Study, folder: Path) -> Screen:
+def paper_screen(found: Study, folder: Path) -> Screen:
     """The study for a terminal: the paper's claims; the rivals' figures with --verbose."""
     return screen(
         f"seeds {', '.join(map(str, found.seeds))} judge; chosen on seed {found.tuning_seed}",

@@ -123,7 +123,7 @@ def test_the_summary_counts_what_is_right() -> None:
     assert worse(found, "trace") == (["wrong"], 2)
     text = "\n".join(summary(found))
     assert "questions right: 2 of 4" in text
-    assert "false proofs: 1 of 2 headlined (wrong (run_0.2 0.001 to 0.002))" in text
+    assert "false proofs: 1 of 2 reported (wrong (run_0.2 0.001 to 0.002))" in text
     assert "intervals that hold: 1 of 2" in text
     assert "identify refused: refused" in text
     assert "median processor seconds: 6" in text

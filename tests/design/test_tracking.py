@@ -120,7 +120,7 @@ def test_other_plants_count_and_unstable_ones_do_not() -> None:
     assert same.lag == alone.lag
 
 
-def test_where_none_keeps_the_overshoot_the_least_is_taken_and_told() -> None:
+def test_where_none_keeps_the_overshoot_the_least_is_taken_and_reported() -> None:
     c = controller()
     hasty, hastier = c.R, np.convolve(c.R, [1.5, -0.5])
     one = followed([(A, B)], c, [hastier, hasty], Demand())

@@ -48,10 +48,10 @@ def test_wear_is_followed(results: list[DayResult]) -> None:
     """With less behind than wears off between two logs: 0.6 N of F_cp."""
     for one in results:
         if not one.day.fault:
-            assert one.in_force == pytest.approx(one.true, abs=0.35), one
+            assert one.active == pytest.approx(one.true, abs=0.35), one
     moved = [one for one in results if one.outcome.reason.startswith("moved:")]
     assert len(moved) >= 4
-    assert results[-1].in_force == pytest.approx(12.54, abs=0.1)
+    assert results[-1].active == pytest.approx(12.54, abs=0.1)
 
 
 def test_the_undeclared_spring_is_named_when_it_comes_and_stays(

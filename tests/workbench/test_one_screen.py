@@ -38,21 +38,15 @@ from tests.chain import designed, identified, short_recipe
 from tests.screens import one_screen, words_of
 from tests.workbench.trace_values import trace_of, traced
 from workbench import cli
-from workbench.commands.fleet import fleet_view
-from workbench.commands.reidentify import pass_view
+from workbench.commands.fleet import fleet_screen
+from workbench.commands.reidentify import pass_screen
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
-from workbench.report.doctor import installation_view
-from workbench.report.drift import drift_view
-from workbench.report.experiment import experiment_view
-from workbench.report.first_card import proposal_view
-from workbench.report.prediction import prediction_view
-from workbench.report.reports import design_view, identified_view
-from workbench.report.response import response_view
-from workbench.report.robust import robust_view
-from workbench.report.trace import traced_view
+from workbench.report.doctor import installation_screen
+from workbench.report.first_card import proposal_screen
 from workbench.report.trace_words import words
-from workbench.report.validation import demo_view, validation_view
+from workbench.report.validation import demo_screen
+from workbench.report.view import view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.first_card.proposal import proposed
@@ -95,7 +89,7 @@ def identify() -> Iterator[Screen]:
         for adequate in (True, False):
             model = many_logs(identified().model, identifiable)
             model = replace(model, fit=replace(model.fit, adequate=adequate))
-            yield identified_view(replace(identified(), model=model, remarks=REMARKS)).screen(OUT)
+            yield view(replace(identified(), model=model, remarks=REMARKS)).screen(OUT)
 
 
 def trace() -> Iterator[Screen]:
@@ -105,7 +99,7 @@ def trace() -> Iterator[Screen]:
                           ("inseparable", every[:2])):  # fmt: skip
         found = replace(trace_of(verdict, keys), remarks=REMARKS)  # type: ignore[arg-type]
         found = replace(found, drift=drift if verdict == "drift" else found.drift)
-        yield traced_view(replace(traced(found), remarks=REMARKS)).screen(OUT)
+        yield view(replace(traced(found), remarks=REMARKS)).screen(OUT)
 
 
 def figures(n: int, *missed: str) -> LoopFigures:
@@ -134,7 +128,7 @@ def validation(passed: bool) -> Validation:
 
 
 def validate() -> Iterator[Screen]:
-    yield from (validation_view(validation(passed), {}).screen(OUT) for passed in (True, False))
+    yield from (view(validation(passed), {}).screen(OUT) for passed in (True, False))
 
 
 def design() -> Iterator[Screen]:
@@ -144,16 +138,16 @@ def design() -> Iterator[Screen]:
     pid = found.pid and replace(found.pid, missed=goals, note="slow " * 30)
     worst = replace(found, remarks=REMARKS, refused={"pid": "no gains " * 30}, rst=rst, pid=pid)
     none = Recommendation("none", False, "; ".join(LOGS))
-    yield design_view(replace(found, remarks=REMARKS)).screen(OUT)
-    yield design_view(worst).screen(OUT)
+    yield view(replace(found, remarks=REMARKS)).screen(OUT)
+    yield view(worst).screen(OUT)
     worst = replace(worst, recommended="none", recommendation=none)
-    yield design_view(worst).screen(OUT)
+    yield view(worst).screen(OUT)
     measures = {one.name: Spread(0.1, 0.2, 0.3, 0.25, 0.9) for one in MEASURES}
     promise = Promise("rst", True, measures, 0.8, Outcomes({}))
     promises = dict.fromkeys((ROBUST, NOMINAL, PRESENT), promise)
     for missed in ((), tuple(f"limit {n} is kept by too few" for n in range(9))):
         robust = Robust(found, RobustAsked(), promises, 40, 1e-3, missed, REMARKS)
-        yield robust_view(robust).screen(OUT)
+        yield view(robust).screen(OUT)
 
 
 def demo() -> Iterator[Screen]:
@@ -169,7 +163,7 @@ def demo() -> Iterator[Screen]:
         judged = "rst + compensator" if keys else "rst"
         checked = replace(validation(passed), judged=judged)
         made = Demonstration(found, chosen, checked, {}, truth)
-        yield demo_view(made, OUT)
+        yield demo_screen(made, OUT)
 
 
 def drift() -> Iterator[Screen]:
@@ -187,21 +181,22 @@ def drift() -> Iterator[Screen]:
         )  # fmt: skip
         settings: Any = SimpleNamespace(margin=0.02, run_length=1e3, variation=0.01, to_be_seen=1.0)
         found = Drifted(identified().model, "", settings, tests, state, REMARKS)
-        yield drift_view(found, "model.json").screen(OUT)
+        yield view(found, "model.json").screen(OUT)
 
 
 def experiment() -> Iterator[Screen]:
     promise = tuple(Promised(f"parameter_{n}", "N s/m", 1.0, 0.1, 0.01, 0.9) for n in range(45))
     peaks: Any = SimpleNamespace(low=-0.1, high=0.1, speed=0.3, force=90.0, command=4.0)
     limits: Any = SimpleNamespace(stroke=(-0.2, 0.2), speed=0.4, force=100.0, command=5.0)
-    found: Any = SimpleNamespace(
+    found = object.__new__(Experiment)  # with what its view reads
+    vars(found).update(
         card="a", h=1e-3, r=np.zeros(20_001), promise=promise, separation=(),
         motion="linear", limits=limits,
         safety=Safety(20, peaks, 3, 0.7), tried=(40, 9), controller="the present controller",
         segments=(1, 2), efficiency=0.9, remarks=REMARKS, command_unit="V",
     )  # fmt: skip
     assert set(vars(found)) <= set(Experiment.__dataclass_fields__)
-    yield experiment_view(found).screen(OUT)
+    yield view(found).screen(OUT)
 
 
 def predict() -> Iterator[Screen]:
@@ -209,7 +204,7 @@ def predict() -> Iterator[Screen]:
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
-    yield prediction_view(Predicted((), summary), False, LOGS[0]).screen(OUT)
+    yield view(Predicted((), summary), False, LOGS[0]).screen(OUT)
 
 
 def response() -> Iterator[Screen]:
@@ -222,7 +217,7 @@ def response() -> Iterator[Screen]:
     logs = tuple({"file": log} for log in LOGS)
     for left_in in (None, WHY):
         many = replace(found, modes=modes, logs=logs, left_in=left_in)
-        yield response_view(many).screen(OUT)
+        yield view(many).screen(OUT)
 
 
 def reidentify() -> Iterator[Screen]:
@@ -232,7 +227,7 @@ def reidentify() -> Iterator[Screen]:
     )
     done: Any = SimpleNamespace(machines=40, outcomes=outcomes, growing=3, busy=LOGS,
                                 without_model=LOGS, no_logs=LOGS)  # fmt: skip
-    yield pass_view(done)
+    yield pass_screen(done)
 
 
 def fleet() -> Iterator[Screen]:
@@ -240,12 +235,12 @@ def fleet() -> Iterator[Screen]:
            for log in LOGS * 25]  # fmt: skip
     done: Any = SimpleNamespace(logs=1000, verdicts={"refused": 1000}, before=3, later=4, bad=bad,
                                 seconds=9.0, busy=9.0, memory=1)  # fmt: skip
-    yield fleet_view(done, OUT)
+    yield fleet_screen(done, OUT)
 
 
 def doctor() -> Iterator[Screen]:
     """Alone; of a log: tests/workbench/steps/test_doctor.py."""
-    yield installation_view(check_installation(), {"where": "x" * 150, "answers": False}, LOGS)
+    yield installation_screen(check_installation(), {"where": "x" * 150, "answers": False}, LOGS)
 
 
 def axis_test() -> Iterator[Screen]:
@@ -254,7 +249,6 @@ def axis_test() -> Iterator[Screen]:
     from design.measured.axis_limits import MEANING_OF
     from tests.chain import short_recipe
     from workbench.logs.sources import Sources
-    from workbench.report.axis_test import axis_view
     from workbench.steps.axis_test import axis_test_of_sources
     from workbench.steps.simulate import record
 
@@ -264,7 +258,7 @@ def axis_test() -> Iterator[Screen]:
     limits = dict.fromkeys(MEANING_OF, (1e6, 2e6))
     for given in ({}, limits):
         found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
-        yield axis_view(axis_test_of_sources(found)).screen(OUT)
+        yield view(axis_test_of_sources(found)).screen(OUT)
 
 
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
@@ -304,11 +298,11 @@ def test_remarks_on_many_logs_are_reported_once() -> None:
     assert whole.count("uneven clock") == len(LOGS)
 
 
-def test_parameters_not_told_for_one_reason_are_reported_together() -> None:
+def test_parameters_not_identifiable_for_one_reason_are_reported_together() -> None:
     model = many_logs(identified().model)
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
-    shown = identified_view(replace(identified(), model=model, remarks=())).screen()
+    shown = view(replace(identified(), model=model, remarks=())).screen()
     assert "dv_p, dv_n - m/s not identifiable: the interval is wider than the value" in words_of(
         shown.text()
     )
@@ -355,7 +349,9 @@ def test_a_card_for_a_log_of_a_hundred_columns(
     assert "written: card.toml" in one_screen_of("init", "run.csv")
     found = proposed(Path("run.csv"), None)
     unused = {f"channel {n}": "no signal that a card needs" for n in range(100)}
-    text = one_screen(proposal_view(replace(found, unused=unused, refused=WHY), OUT / "card.toml"))
+    text = one_screen(
+        proposal_screen(replace(found, unused=unused, refused=WHY), OUT / "card.toml")
+    )
     assert "... and 95 more: --verbose" in text and text.splitlines()[-1].endswith("card.toml")
 
 

@@ -26,7 +26,7 @@ def threads() -> set[int]:
 @pytest.mark.slow
 @pytest.mark.skipif(os.cpu_count() == 1, reason="one core has one thread anyhow")
 @pytest.mark.parametrize(("set_by_user", "expected"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
-def test_a_command_has_one_thread_unless_told(set_by_user: dict[str, str], expected: int) -> None:
+def test_a_command_has_one_thread_unless_asked(set_by_user: dict[str, str], expected: int) -> None:
     bare = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
     command = [sys.executable, "-c", ASKED]
     done = subprocess.run(command, env={**bare, **set_by_user}, capture_output=True, check=False)

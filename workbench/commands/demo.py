@@ -35,9 +35,8 @@ def command(
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path
     from workbench.report.next_steps import after_demo
-    from workbench.report.reports import design_view
-    from workbench.report.trace import traced_view
-    from workbench.report.validation import demo_view, missed, validation_view
+    from workbench.report.validation import demo_screen, missed
+    from workbench.report.view import view
     from workbench.steps.demo import demonstrate
     from workbench.steps.kernels_ahead import fits_compiled_ahead
 
@@ -47,9 +46,9 @@ def command(
             found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
         rotary = traced.model.rotary
-        traced_view(traced).write(folder)
-        design_view(found.design).write(folder, "design.html")
-        validation_view(validation, found.traces, rotary).write(folder, "validation.html")
+        view(traced).write(folder)
+        view(found.design).write(folder, "design.html")
+        view(validation, found.traces, rotary).write(folder, "validation.html")
     result = {
         "recipe": RECIPE,
         "seed": seed,
@@ -62,5 +61,5 @@ def command(
         "out": folder.final,
     }
     then = after_demo(found, folder.final, seed)
-    emit(result, lambda: demo_view(found, folder.final), then)
+    emit(result, lambda: demo_screen(found, folder.final), then)
     return 0 if then is None else 1

@@ -142,16 +142,16 @@ def _velocity(given: DesignOptions) -> int:
     from design.controllers.velocity_loop import design_velocity
     from workbench.documents.velocity import read_velocity_model
     from workbench.report.next_steps import in_simulation, without_design
-    from workbench.report.velocity import velocity_view
+    from workbench.report.view import view
 
     model = read_velocity_model(given.model_file)
     with results("design", given.out, without_design(model, None)) as folder:
         found = design_velocity(
             model, given.wanted.limits, integrator=given.integrator, period=given.design_period
         )
-        view = velocity_view(found)
-        view.write(folder)
-    view.show(folder.final, in_simulation(given.model_file, folder.final))
+        shown = view(found)
+        shown.write(folder)
+    shown.show(folder.final, in_simulation(given.model_file, folder.final))
     return 0
 
 

@@ -54,7 +54,7 @@ def command(
 def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path, find_data
-    from workbench.report.doctor import doctor_picture, doctor_view
+    from workbench.report.doctor import doctor_picture, doctor_screen
     from workbench.report.next_steps import after_doctor
     from workbench.steps.doctor import doctor_document, examine
 
@@ -68,14 +68,14 @@ def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
     then = after_doctor(found, name, card_name, out)
-    emit({**document, "out": out}, lambda: doctor_view(found, out), then)
+    emit({**document, "out": out}, lambda: doctor_screen(found, out), then)
     return 1 if found.verdict in ("refused", "nothing") else 0
 
 
 def _installation(where: str | None) -> int:
     from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
-    from workbench.report.doctor import installation_view
+    from workbench.report.doctor import installation_screen
     from workbench.steps.installation import check_installation
 
     found = check_installation()
@@ -87,7 +87,7 @@ def _installation(where: str | None) -> int:
     result = {"schema": "installation/1", **vars(found), "registry": registry, "wrong": wrong}
     asked = ("--registry", shown(named)) if named else ()
     then = step("once that is put right", "doctor", *asked) if wrong else None
-    emit(result, lambda: installation_view(found, registry, wrong), then)
+    emit(result, lambda: installation_screen(found, registry, wrong), then)
     return 1 if wrong else 0
 
 

@@ -48,8 +48,8 @@ def command(
     from workbench.course import working
     from workbench.interface.models import load_model
     from workbench.logs.sources import read_sources
-    from workbench.report.drift import drift_view
     from workbench.report.next_steps import after_drift, check_of_refused
+    from workbench.report.view import view
     from workbench.steps.drift import model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
@@ -61,11 +61,11 @@ def command(
             found = drift_of(
                 model, model_key(model), sources.logs, stream=stream, settings=settings, seed=seed
             )
-        view = drift_view(found, str(model_file))
-        view.write(folder)
+        shown = view(found, str(model_file))
+        shown.write(folder)
     # After the results: a run that is ended between them is simply made again.
     if state_file:
         write_stream(state_file, found.stream)
     then = after_drift(found, logs, card)
-    view.show(folder.final, then)
+    shown.show(folder.final, then)
     return 0 if then is None else 1

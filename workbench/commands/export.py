@@ -143,7 +143,7 @@ def command(given: ExportOptions) -> int:
         "files": tuple(files),
         "out": end,
     }
-    emit(document, lambda: _view(what, targets, tuple(files), end))
+    emit(document, lambda: _screen(what, targets, tuple(files), end))
     return 0
 
 
@@ -170,7 +170,7 @@ def _tables(given: ExportOptions) -> int:
     from design.generated.tables import tables
     from workbench.documents.result_files import read_model
     from workbench.export.filled import filled
-    from workbench.export.table_targets import tables_asked, tables_document, tables_view
+    from workbench.export.table_targets import tables_asked, tables_document, tables_screen
 
     model = read_model(given.file)
     asked = tables_asked(
@@ -182,11 +182,11 @@ def _tables(given: ExportOptions) -> int:
         for one in found.files:
             folder.write(one.name, one.text)
     end = folder.final
-    emit(tables_document(what, found, end), lambda: tables_view(what, found, end))
+    emit(tables_document(what, found, end), lambda: tables_screen(what, found, end))
     return 0
 
 
-def _view(
+def _screen(
     what: "Exported", targets: Mapping[str, None], files: tuple[str, ...], folder: Path
 ) -> "Screen":
     """What was written and what to do with it, for a terminal."""

@@ -99,7 +99,7 @@ def command(given: FleetOptions) -> int:
     result = {**asdict(done), "bad": bad, "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
     then = after_fleet(done, logs, given.card, where, in_registry=not given.no_registry)
-    emit(result, lambda: fleet_view(done, out), then)
+    emit(result, lambda: fleet_screen(done, out), then)
     return 0 if then is None else 1
 
 
@@ -122,7 +122,7 @@ def after_fleet(
     return step("what the log identifies", "doctor", first.log.path, "--card", card or beside)
 
 
-def fleet_view(done: "Report", out: Path) -> "Screen":
+def fleet_screen(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
     from workbench.screen import screen, tabled
     from workbench.verdicts import counted, in_words

@@ -52,15 +52,16 @@ def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None)
     from design.identified.velocity import identify_velocity
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import check_of_refused
-    from workbench.report.velocity import after_velocity, velocity_view
+    from workbench.report.velocity import after_velocity
+    from workbench.report.view import view
 
     with results("identify", out, check_of_refused(logs, card)) as folder:
         sources = read_sources(logs, card, velocity=True)
         with running("identifying", IDENTIFY_STAGES, budget) as course:
             valve = identify_velocity(sources.logs, keep_going=course.keep_going)
-        view = velocity_view(valve)
-        view.write(folder)
-    view.show(folder.final, after_velocity(valve, logs, card, folder.final))
+        shown = view(valve)
+        shown.write(folder)
+    shown.show(folder.final, after_velocity(valve, logs, card, folder.final))
 
 
 def _refuse_force_of_motor(card: str) -> None:

@@ -41,7 +41,7 @@ def command(
     what is hardly identifiable from the log. Of several axes --axis names the one. A card that is
     there is replaced only with --force or your yes.
     """
-    from workbench.report.first_card import proposal_view
+    from workbench.report.first_card import proposal_screen
     from workbench.steps.first_card.proposal import proposed
     from workbench.steps.first_card.written import checked_proposal, written
 
@@ -62,7 +62,7 @@ def command(
     with progress("reading"):
         found = checked_proposal(found)
     write_whole(card, written(found, asked=asking), "--out")
-    emit({**found.as_json(), "out": card}, lambda: proposal_view(found, card))
+    emit({**found.as_json(), "out": card}, lambda: proposal_screen(found, card))
 
 
 def _refuse_existing(card: Path, force: bool, asking: bool) -> None:

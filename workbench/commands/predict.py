@@ -38,18 +38,16 @@ def command(
     from workbench.interface.logs import predict
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_predict
-    from workbench.report.prediction import prediction_view
 
     with results("predict", out) as folder:
         if is_velocity_model(model_file):
             options.refuse_for_velocity("drive", "effects")
-            view = _of_velocity(model_file, log, card, window)
+            shown = _of_velocity(model_file, log, card, window)
         else:
             model = load_model(model_file, effects)
-            found = predict(model, log, card, drive=drive, window=window)
-            view = prediction_view(found.found, found.rotary, log)
-        view.write(folder)
-    view.show(folder.final, after_predict(log, card))
+            shown = predict(model, log, card, drive=drive, window=window).view
+        shown.write(folder)
+    shown.show(folder.final, after_predict(log, card))
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":
@@ -58,10 +56,9 @@ def _of_velocity(model_file: Path, log: str, card: str, window: float | None) ->
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_model
     from workbench.logs.sources import read_sources
-    from workbench.report.velocity import velocity_prediction_view
+    from workbench.report.view import view
 
     valve = read_velocity_model(model_file)
     sources = read_sources([log], card, velocity=True)
     with working("predicting"):
-        runs = predict_velocity(valve, sources.logs, str(sources.card.path), window)
-    return velocity_prediction_view(runs, window, valve.rotary)
+        return view(predict_velocity(valve, sources.logs, str(sources.card.path), window))

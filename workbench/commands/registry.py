@@ -42,11 +42,11 @@ def command() -> None:
 @options.command(command, "list", epilog="Example: workbench registry list --registry fleet.db")
 def list_machines(where: str | None = options.REGISTRY_OPTION) -> None:
     """List the machines, the active version of each, and how many logs wait."""
-    from workbench.registry.views import list_view
+    from workbench.registry.views import list_screen
 
     with opened(where) as found:
         machines = found.machines()
-    emit({"machines": machines}, lambda: list_view(machines))
+    emit({"machines": machines}, lambda: list_screen(machines))
 
 
 @options.command(command, epilog="Example: workbench registry show bench-a 2 --out version2")
@@ -61,7 +61,7 @@ def show(
     NUMBER: a version whose files --out writes, by default the active one.
     """
     from workbench.registry.queue import Queue
-    from workbench.registry.views import machine_view
+    from workbench.registry.views import machine_screen
 
     with opened(where) as found:
         state, decisions = found.machine(machine), found.decisions(machine)
@@ -78,7 +78,7 @@ def show(
     number_accepted = None if accepted is None else accepted.number
     shown = {"machine": state, "decisions": decisions, "logs": outcomes,
              "accepted": number_accepted}  # fmt: skip
-    emit(shown, lambda: machine_view(state, decisions, outcomes, accepted))
+    emit(shown, lambda: machine_screen(state, decisions, outcomes, accepted))
 
 
 @options.command(command, epilog="Example: workbench registry diff bench-a 1 2")
@@ -94,7 +94,7 @@ def diff(
     """
     from workbench.registry.difference import difference
     from workbench.registry.values import BadRegistry
-    from workbench.registry.views import difference_view
+    from workbench.registry.views import difference_screen
 
     with opened(where) as found:
         after = _version(found, machine, second)
@@ -106,7 +106,7 @@ def diff(
         lines = difference(found.documents(before), found.documents(after))
     names = (f"version {before.number}", f"version {after.number}")
     result = {"machine": machine, "versions": [before, after], "parameters": lines}
-    emit(result, lambda: difference_view(lines, names))
+    emit(result, lambda: difference_screen(lines, names))
 
 
 @options.command(

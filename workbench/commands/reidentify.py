@@ -40,7 +40,7 @@ def command(given: JobOptions) -> int:
     with worker(given) as found:
         judged, alarms = found.once()
     then = after_pass(judged, given.where)
-    emit({**vars(judged), "alarms": alarms}, lambda: pass_view(judged), then)
+    emit({**vars(judged), "alarms": alarms}, lambda: pass_screen(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]
     errors += [f"{name}: not tested, {line}; run again" for name, line in judged.held.items()]
     if alarms is not None and (alarms.waiting or alarms.given_up):
@@ -75,7 +75,7 @@ def undelivered(alarms: "Delivery") -> str:
     return f"--webhook: {said}{why}; check the receiver"
 
 
-def pass_view(done: "PassReport") -> "Screen":
+def pass_screen(done: "PassReport") -> "Screen":
     """What a pass did, for a terminal: alarms first."""
     from workbench.registry.views import outcomes_table
     from workbench.screen import listed, screen

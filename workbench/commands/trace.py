@@ -46,13 +46,13 @@ def command(
         names, held_out = named_logs(logs, tests, card)
         if card_of_velocity(card):
             options.refuse_for_velocity("effects", "seed")
-            view, verdict, named = _of_velocity(names, held_out, card, budget)
+            shown, verdict, named = _of_velocity(names, held_out, card, budget)
         else:
             found = trace(names, held_out or None, card, effects=effects, budget=budget, seed=seed)
-            view, verdict, named = found.view, found.verdict, found.effects
-        view.write(folder)
+            shown, verdict, named = found.view, found.verdict, found.effects
+        shown.write(folder)
     newer = held_out or names
-    view.show(folder.final, after_trace(verdict, named, newer, card, folder.final))
+    shown.show(folder.final, after_trace(verdict, named, newer, card, folder.final))
 
 
 def _of_velocity(
@@ -61,10 +61,10 @@ def _of_velocity(
     """The same of a rig whose velocity follows the command."""
     from design.identified.velocity import trace_velocity
     from workbench.logs.sources import read_sources
-    from workbench.report.velocity import velocity_view
+    from workbench.report.view import view
 
     train = read_sources(names, card, velocity=True).logs
     test = read_sources(held_out, card, velocity=True).logs if held_out else None
     with running("trace", TRACE_STAGES, budget) as course:
         found = trace_velocity(train, test, keep_going=course.keep_going)
-        return velocity_view(found), found.left.verdict, tuple(found.model.effects)
+        return view(found), found.left.verdict, tuple(found.model.effects)

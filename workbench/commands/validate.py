@@ -61,7 +61,8 @@ def _velocity(
     from design.controllers.velocity_loop import validate_velocity
     from workbench.course import working
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
-    from workbench.report.velocity import after_velocity_validation, velocity_view
+    from workbench.report.velocity import after_velocity_validation
+    from workbench.report.view import view
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
     plant = read_velocity_model(files[2]) if files[2] else None
@@ -69,7 +70,7 @@ def _velocity(
         with working("simulating the loop"):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
-        view = velocity_view(found)
-        view.write(folder)
-    view.show(folder.final, after_velocity_validation(found, files[0]))
+        shown = view(found)
+        shown.write(folder)
+    shown.show(folder.final, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

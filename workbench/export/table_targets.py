@@ -42,7 +42,7 @@ def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str
     }
 
 
-def tables_view(what: Compensation, found: Tables, folder: Path) -> Screen:
+def tables_screen(what: Compensation, found: Tables, folder: Path) -> Screen:
     """The answer in words, what each file holds, and what none of them can."""
     rows = [
         (one.name, one.units, str(one.points),

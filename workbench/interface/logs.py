@@ -32,12 +32,7 @@ from workbench.interface.inputs import (
 from workbench.interface.models import IdentifyResult, ModelLike, Result, TraceResult, model_of
 from workbench.logs.sources import Sources, card_path
 from workbench.output import dumps
-from workbench.report.axis_test import axis_view
-from workbench.report.drift import drift_view
-from workbench.report.prediction import prediction_view
-from workbench.report.response import response_view
 from workbench.report.templating import render
-from workbench.report.view import View
 from workbench.steps.asked import IDENTIFY_STAGES
 from workbench.steps.axis_test import axis_test_of_sources
 from workbench.steps.drift import model_key, read_stream, write_stream
@@ -59,16 +54,15 @@ class PredictResult(Result):
     """What a model says of a log, and how far off it is."""
 
     _command = "predict"
+    _shown = ("found", "rotary", "log")
     found: Predicted
     rotary: bool = False
+    log: str = "LOG"  # as it was named
 
     @property
     def frame(self) -> "pd.DataFrame":
         """The columns of prediction.csv; NaN where there is no value."""
         return prediction_frame(self.found.runs)
-
-    def _made(self) -> View:
-        return prediction_view(self.found, self.rotary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -94,15 +88,13 @@ class ResponseResult(Result):
         one = curve_of(self.found, what)
         return frd(one.H[one.seen], 2.0 * np.pi * one.f[one.seen])
 
-    def _made(self) -> View:
-        return response_view(self.found)
-
 
 @dataclass(frozen=True, repr=False)
 class DriftResult(Result):
     """Whether a machine has changed since its model, log by log."""
 
     _command = "drift"
+    _shown = ("found", "model_name")
     found: Drifted
     model_name: str
 
@@ -110,9 +102,6 @@ class DriftResult(Result):
     def verdict(self) -> str:
         """ "none", "drift", "structure" or "not_judged"."""
         return self.found.verdict
-
-    def _made(self) -> View:
-        return drift_view(self.found, self.model_name)
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,9 +120,6 @@ class AxisTestResult(Result):
     def reasons(self) -> Sequence[str]:
         """Why it is not green, the worst first."""
         return self.found.reasons
-
-    def _made(self) -> View:
-        return axis_view(self.found)
 
 
 @dataclass(frozen=True, repr=False)
@@ -175,7 +161,8 @@ def predict(
     with working("predicting"):
         where = str(found.card.path)
         predicted = predict_logs(known, found.logs, where, drive=drive, window=window)
-    return PredictResult(predicted, known.rotary)
+    named = (os.fspath(log),) if isinstance(log, str | os.PathLike) else ()
+    return PredictResult(predicted, known.rotary, *named)
 
 
 def response(

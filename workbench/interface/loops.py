@@ -30,11 +30,6 @@ from workbench.documents.result_files import read_design
 from workbench.documents.rivals import read_rivals
 from workbench.interface.inputs import PathLike
 from workbench.interface.models import ModelLike, Result, TraceResult, model_of
-from workbench.report.experiment import experiment_view
-from workbench.report.reports import design_view
-from workbench.report.robust import robust_view
-from workbench.report.validation import validation_view
-from workbench.report.view import View
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -59,6 +54,7 @@ class DesignResult(Result):
     """What `design` made for a model: an RST and a PID with their margins, and the compensator."""
 
     _command = "design"
+    _shown = ("design",)
     design: Design
     model: Model
 
@@ -95,9 +91,6 @@ class DesignResult(Result):
             found = scheduled(self.model, self.design, over, asked, goals)
         return DesignResult(found, self.model)
 
-    def _made(self) -> View:
-        return design_view(self.design)
-
 
 @dataclass(frozen=True, repr=False)
 class RobustResult(Result):
@@ -124,15 +117,13 @@ class RobustResult(Result):
 
         return pd.DataFrame(dict(self.found.promises[ROBUST].found.values))
 
-    def _made(self) -> View:
-        return robust_view(self.found)
-
 
 @dataclass(frozen=True, repr=False)
 class ValidateResult(Result):
     """What `validate` saw of a design in the simulated loop."""
 
     _command = "validate"
+    _shown = ("found", "traces", "rotary")
     found: Validation
     traces: Mapping[tuple[str, str], Traces]
     rotary: bool = False
@@ -141,9 +132,6 @@ class ValidateResult(Result):
     def passed(self) -> bool:
         """Whether the tested controller keeps every limit on every plant."""
         return self.found.passed
-
-    def _made(self) -> View:
-        return validation_view(self.found, self.traces, self.rotary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -160,9 +148,6 @@ class ExperimentResult(Result):
 
         r = self.found.r
         return pd.DataFrame({"t": self.found.h * np.arange(len(r)), "r": r})
-
-    def _made(self) -> View:
-        return experiment_view(self.found)
 
 
 DesignLike: TypeAlias = DesignResult | Design | PathLike

@@ -9,7 +9,6 @@ import math
 import os
 import time
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -35,9 +34,7 @@ from workbench.interface.inputs import (
     sources,
 )
 from workbench.output import MissingLibrary, OutputFolder, dumps
-from workbench.report.reports import identified_view
-from workbench.report.trace import traced_view
-from workbench.report.view import View
+from workbench.report.view import View, view
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.trace import named_logs, trace_sources
@@ -48,19 +45,16 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Result(ABC):
+class Result:
     """What every result can: show itself as text and HTML, draw, and write the command's files."""
 
     _command: ClassVar[str]
-
-    @abstractmethod
-    def _made(self) -> View:
-        """How the result is shown."""
+    _shown: ClassVar[tuple[str, ...]] = ("found",)  # fields by which its view is made
 
     @cached_property
     def view(self) -> View:
         """The result as terminal, page, notebook and picture show it."""
-        return self._made()
+        return view(*(getattr(self, name) for name in self._shown))
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -155,9 +149,6 @@ class IdentifyResult(_OfModel):
         said = {"units": units, "verdict": of.verdict, "converged": int(of.converged)}
         return _arviz().from_dict(posterior=posterior, attrs=said)
 
-    def _made(self) -> View:
-        return identified_view(self.found)
-
 
 @dataclass(frozen=True, repr=False)
 class TraceResult(_OfModel):
@@ -190,9 +181,6 @@ class TraceResult(_OfModel):
         rest = self.found.trace.residuals[0]
         own = {"t": rest.t, "before": rest.before, "after": rest.after, "noise": rest.noise}
         return pd.DataFrame({**rest.signals, **own})
-
-    def _made(self) -> View:
-        return traced_view(self.found)
 
 
 def _arviz() -> Any:

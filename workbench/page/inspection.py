@@ -141,12 +141,12 @@ def doctor_chart(path: Path, card: Path) -> str:
 def doctor_words(path: Path, card: Path) -> DoctorFound:
     """The doctor's words; raises BadView."""
     from workbench.cards.card import load_card
-    from workbench.report.doctor import doctor_view
+    from workbench.report.doctor import doctor_screen
     from workbench.steps.doctor import examine
 
     with _without(path, card):
         found = examine(path, load_card(card, with_recipe=False))
-    lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
+    lines = without_path(doctor_screen(found, None).text(), [path, card]).splitlines()
     identifiability = tuple((one.name, one.can, _said_of(one)) for one in found.identifiability)
     return DoctorFound(found.verdict, tuple(lines), identifiability)
 
@@ -217,9 +217,9 @@ def export_files(design: str, target: str) -> dict[str, bytes]:
 
 def design_page(design: str) -> str:
     """The report of a design's document."""
-    from workbench.report.reports import design_view
+    from workbench.report.view import view
 
-    return design_view(_design(design)).page()
+    return view(_design(design)).page()
 
 
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:

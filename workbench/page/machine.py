@@ -21,7 +21,7 @@ from workbench.jobs.options import clock
 from workbench.page import inspection
 from workbench.page.asked import STATE_WORDS, Asked, download, part
 from workbench.page.inspection import EXPORTS
-from workbench.page.visitors import briefly, changing, reading
+from workbench.page.visitors import cached, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
 from workbench.registry.difference import as_read, difference
@@ -152,7 +152,7 @@ def _reports(asked: Asked) -> list[Path]:
 
 MACHINE_ROUTES = [
     Route("/audit", reading(changes)),
-    Route("/machine/{machine}", reading(briefly(machine))),
+    Route("/machine/{machine}", reading(cached(machine))),
     Route("/machine/{machine}/compare", reading(compare)),
     Route("/machine/{machine}/promote", changing(promote), methods=["POST"]),
     Route("/machine/{machine}/report/{file}", reading(stored_page)),
@@ -275,4 +275,4 @@ def asked_for(query: Mapping[str, Any], silent_days: float) -> FleetAsked:
     )
 
 
-FLEET_ROUTES = [Route("/", reading(briefly(fleet)))]
+FLEET_ROUTES = [Route("/", reading(cached(fleet)))]

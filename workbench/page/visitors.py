@@ -225,7 +225,7 @@ class Moment:
         return Response(found.body, found.status_code, kept)
 
 
-def briefly(endpoint: Endpoint) -> Endpoint:
+def cached(endpoint: Endpoint) -> Endpoint:
     """The endpoint, its answers to those who only read kept for a moment."""
 
     @wraps(endpoint)

@@ -43,9 +43,8 @@ from workbench.report.model_tables import (
     parameter_rows,
     plant_lines,
 )
-from workbench.report.reports import identified_view
-from workbench.report.trace import errors_table, logs_of_trace, traced_view
-from workbench.report.view import View, report_notes
+from workbench.report.trace import errors_table, logs_of_trace
+from workbench.report.view import View, report_notes, view
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import trace_sources
@@ -110,7 +109,7 @@ def _identified(sources: Sources, course: Course) -> Made:
     found = identify_sources(sources, on_progress=course.report)
     model = found.model
     said = (*fit_lines(model), *plant_lines(model), *found.remarks)
-    return model, identified_view(found), {"notes": _notes(said, logs_of(model)), "errors": None}
+    return model, view(found), {"notes": _notes(said, logs_of(model)), "errors": None}
 
 
 def _traced(sources: Sources, course: Course) -> Made:
@@ -120,7 +119,7 @@ def _traced(sources: Sources, course: Course) -> Made:
         "notes": _notes((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
         "errors": {"head": errors.full_head, "rows": errors.whole},
     }
-    return found.model, traced_view(found), result
+    return found.model, view(found), result
 
 
 def _notes(remarks: Sequence[str], logs: Sequence[str]) -> list[str]:

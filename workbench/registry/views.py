@@ -13,7 +13,7 @@ from workbench.verdicts import counted, in_words
 SHORT = 12  # characters of a fingerprint that are shown
 
 
-def list_view(machines: Sequence[MachineState]) -> Screen | str:
+def list_screen(machines: Sequence[MachineState]) -> Screen | str:
     """A line a machine."""
     if not machines:
         return "no machine yet; 'workbench registry add MACHINE MODEL DESIGN' makes one"
@@ -30,7 +30,7 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
     return screen(tabled(head, rows))
 
 
-def machine_view(
+def machine_screen(
     state: MachineState,
     decisions: Sequence[Decision],
     outcomes: Sequence[LogOutcome],
@@ -87,7 +87,7 @@ def outcomes_table(outcomes: Sequence[LogOutcome], *, alarms_first: bool = False
     return tabled(head, rows(first), whole=rows(outcomes))
 
 
-def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
+def difference_screen(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
     """Two versions side by side."""
     shown, said = as_read(lines, names)
     head = ("parameter", names[0], "unit", "95 %", names[1], "95 %", "change")

@@ -7,7 +7,7 @@ from design.measured.axis_test import AxisTest, Quantity
 from identification.estimation.estimates import counted
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.templating import render
-from workbench.report.view import Section, View
+from workbench.report.view import Section, View, view
 from workbench.screen import Row, listed, tabled
 from workbench.steps.axis_test import axis_document
 
@@ -48,7 +48,8 @@ def _row(one: Quantity) -> Row:
     return one.meaning, value, unit, interval, limits, LAMPS[one.light]
 
 
-def axis_view(test: AxisTest) -> View:
+@view.register
+def _(test: AxisTest) -> View:
     """The light, the numbers and the reasons; a page to be printed."""
     return View(
         f"Axis test of {test.machine}",

@@ -30,7 +30,7 @@ MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 END_IN_ADVICE = ("next", "note", "refused")  # kinds whose texts end in what to do
 
 
-def doctor_view(found: Examined, out: Path | None) -> Screen:
+def doctor_screen(found: Examined, out: Path | None) -> Screen:
     """What the log shows; of each kind a few lines, all of them with --verbose."""
     few, every = (_lines(found, out, most) for most in (MOST_OF_A_KIND, None))
     return screen(instead(few, every))
@@ -284,7 +284,7 @@ def _over_speed(found: CheckedLog, log: Log) -> list[Chart]:
     return [Chart("speed", f"{DRIVE_WORDS[name]} of {found.file} over velocity", [panel])]
 
 
-def installation_view(
+def installation_screen(
     found: Installation, registry: Mapping[str, Any] | None, wrong: Sequence[str]
 ) -> Screen:
     """Versions, kernels, data and registry, a line each, and what is wrong."""

@@ -14,7 +14,7 @@ from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel
 from workbench.report.model_tables import reasons_once
 from workbench.report.next_steps import after_drift
-from workbench.report.view import Section, View, notes, report_notes
+from workbench.report.view import Section, View, notes, report_notes, view
 from workbench.screen import Part, Row, instead, tabled
 from workbench.steps.drift import drift_document
 from workbench.verdicts import counted, in_words
@@ -39,7 +39,8 @@ DRIFT_CAPTION = (
 )
 
 
-def drift_view(found: Drifted, model_name: str) -> View:
+@view.register
+def _(found: Drifted, model_name: str) -> View:
     """Whether the machine has changed, in what, and how the logs before it looked."""
     return View(
         f"Drift test of {found.model.card}",

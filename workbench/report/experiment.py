@@ -5,7 +5,7 @@ import numpy as np
 from design.experiment.planned import Experiment, experiment_document
 from design.machine.readable import shown
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
-from workbench.report.view import Section, View, notes, table
+from workbench.report.view import Section, View, notes, table, view
 from workbench.screen import Part, Row, listed, more, tabled
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
@@ -96,7 +96,8 @@ def search_lines(found: Experiment) -> list[str]:
     return out
 
 
-def experiment_view(found: Experiment) -> View:
+@view.register
+def _(found: Experiment) -> View:
     """The run, what it promises, its pieces; how it was searched with --verbose."""
     return View(
         f"The run to make next on {found.card}",

@@ -10,7 +10,7 @@ from workbench.screen import Row, Screen, listed, screen, tabled
 MOST_LEFT_OUT = 5  # columns that one screen names
 
 
-def proposal_view(of: Proposal, card: Path) -> Screen:
+def proposal_screen(of: Proposal, card: Path) -> Screen:
     """What the card says, what is hardly identifiable from the log, what is left out, and what to
     do next."""
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]

@@ -9,7 +9,7 @@ from design.machine.readable import force, length, units_of
 from design.measured.predicted_logs import Predicted
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
-from workbench.report.view import Section, View, notes
+from workbench.report.view import Section, View, notes, view
 from workbench.steps.predict import prediction_frame
 
 if TYPE_CHECKING:
@@ -50,7 +50,8 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     return lines
 
 
-def prediction_view(found: Predicted, rotary: bool, log: str = "LOG") -> View:
+@view.register
+def _(found: Predicted, rotary: bool, log: str) -> View:
     """How far a model lies from a log."""
     first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
     remarks = found.summary["remarks"]

@@ -41,12 +41,13 @@ from workbench.report.next_steps import after_design, after_identify
 from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
-from workbench.report.view import Section, View, report_notes, table
+from workbench.report.view import Section, View, report_notes, table, view
 from workbench.screen import more
 from workbench.steps.identify_sources import Identified
 
 
-def identified_view(found: Identified) -> View:
+@view.register
+def _(found: Identified) -> View:
     """What was identified, how well it follows the log, what it leaves."""
     model, sources, friction = found.model, found.sources, found.fit.friction
 
@@ -77,7 +78,8 @@ def identified_view(found: Identified) -> View:
     )
 
 
-def design_view(found: Design) -> View:
+@view.register
+def _(found: Design) -> View:
     """The controllers, their margins, what they do to noise, how fast they are.
 
     Behind --verbose: the equations that a drive runs, which `export` writes as code.

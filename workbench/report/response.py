@@ -25,7 +25,7 @@ from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from identification.thresholds import COHERENCE_SURE
 from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
-from workbench.report.view import Section, View, notes, report_notes, table
+from workbench.report.view import Section, View, notes, report_notes, table, view
 from workbench.screen import Part, listed, tabled
 from workbench.steps.response import response_frame
 
@@ -150,7 +150,8 @@ def response_lines(found: Responded) -> list[str]:
     ]
 
 
-def response_view(found: Responded) -> View:
+@view.register
+def _(found: Responded) -> View:
     """The responses with their resonances and margins."""
     logs, lines = tuple(one["file"] for one in found.logs), response_lines(found)
     return View(
@@ -195,7 +196,7 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
 
 
 def plant_chart(found: Responded) -> Chart:
-    """Position by force: magnitude, phase and coherence."""
+    """Position over force: magnitude, phase and coherence."""
     every, units = found.found, shown(found.rotary)
     f, by_position = every.f, -1.0 / (2.0 * np.pi * every.f) ** 2 + 0j
     others = [("the model", None if found.curves is None else found.curves.plant)]

@@ -15,7 +15,7 @@ from identification.arrays import Array
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.next_steps import after_robust
 from workbench.report.reports import controllers, program_sections
-from workbench.report.view import Section, View, notes, table
+from workbench.report.view import Section, View, notes, table, view
 from workbench.screen import Part, Row, listed, tabled
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
@@ -118,7 +118,8 @@ def choice_lines(found: Robust) -> list[str]:
     ]
 
 
-def robust_view(found: Robust) -> View:
+@view.register
+def _(found: Robust) -> View:
     """The shares of the machines, the curves over them, the controllers and their equations."""
     return View(
         f"Robust design for {found.design.card}",

@@ -28,7 +28,7 @@ from workbench.report.trace_pictures import (
     signal_chart,
 )
 from workbench.report.trace_words import advice, percent, trace_sentence, words
-from workbench.report.view import Section, View, notes, report_notes
+from workbench.report.view import Section, View, notes, report_notes, view
 from workbench.screen import Part, Row, more, tabled
 from workbench.steps.trace import trace_document
 
@@ -169,7 +169,8 @@ def logs_of_trace(traced: Traced) -> tuple[str, ...]:
     return tuple(dict.fromkeys(source.log.name for source in (*traced.train, *traced.test)))
 
 
-def traced_view(traced: Traced) -> View:
+@view.register
+def _(traced: Traced) -> View:
     """What is missing, how it shows, and the errors before and after."""
     found, newer = traced.trace, [one.file for one in traced.test or traced.train]
     return View(

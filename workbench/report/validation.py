@@ -38,7 +38,7 @@ from workbench.report.model_tables import estimate_cells, not_identified
 from workbench.report.next_steps import as_code
 from workbench.report.trace import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
-from workbench.report.view import Section, View, notes
+from workbench.report.view import Section, View, notes, view
 from workbench.screen import Part, Row, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
 
@@ -54,9 +54,8 @@ STEPS_CAPTION = (
 )
 
 
-def validation_view(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False
-) -> View:
+@view.register
+def _(found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False) -> View:
     """Whether the design holds in simulation, and what the loop does."""
 
     def sections() -> Sequence[Section]:
@@ -299,7 +298,7 @@ LETTERS = (
 TRUTH_HEAD = ("parameter", "estimate", "unit", "95 % interval", "truth")
 
 
-def demo_view(found: Demonstration, folder: Path) -> Screen:
+def demo_screen(found: Demonstration, folder: Path) -> Screen:
     """The demo for a terminal; with --verbose also what `design` and `validate` say of it."""
     traced, rotary = found.traced, found.traced.model.rotary
     errors = errors_table(traced.trace, rotary)

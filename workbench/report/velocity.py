@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from design.controllers.velocity_loop import VelocityValidation, velocity_validation_document
-from design.identified.velocity import VelocityPrediction, VelocityTraced
+from design.identified.velocity import VelocityPredicted, VelocityPrediction, VelocityTraced
 from design.machine.readable import length, number
 from design.machine.velocity import VelocityDesign, VelocityModel, velocity_document
 from identification.velocity.record import RUN_IN
@@ -18,7 +18,7 @@ from workbench.output import Step, step
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells, logs_of
 from workbench.report.prediction import csv_text
 from workbench.report.templating import MEANINGS
-from workbench.report.view import Section, View, notes
+from workbench.report.view import Section, View, notes, view
 from workbench.screen import Part, Row, tabled
 from workbench.steps.velocity import prediction_summary, velocity_trace_document
 
@@ -58,9 +58,8 @@ def _valve(model: VelocityModel) -> Part:
     return replace(short, whole_head=(*MODEL_HEAD, "meaning"))
 
 
-def velocity_view(
-    found: VelocityModel | VelocityTraced | VelocityDesign | VelocityValidation,
-) -> View:
+@view.register
+def _(found: VelocityModel | VelocityTraced | VelocityDesign | VelocityValidation) -> View:
     """A model, a trace, a design or a validation: its sentence, its numbers and its remarks."""
     model = found.model if isinstance(found, VelocityTraced) else found
     parts: list[Part | str]
@@ -148,11 +147,10 @@ def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
     return csv_text(pd.DataFrame(columns), 9)
 
 
-def velocity_prediction_view(
-    runs: Sequence[VelocityPrediction], window: float | None, rotary: bool
-) -> View:
-    """How far the simulated position is from the measured one; window [s]: after which it begins
-    anew."""
+@view.register
+def _(found: VelocityPredicted) -> View:
+    """How far the simulated position is from the measured one."""
+    runs, window, rotary = found.runs, found.window, found.rotary
     summary = prediction_summary(runs, window)
     begun = f" from {RUN_IN:g} s on, since commands from before the log act until then"
     anew = f"{begun}{f', anew every {window:g} s' if window else ''}"

@@ -3,7 +3,8 @@ a notebook and a picture. Remarks are printed once for all logs that they hold f
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, singledispatch
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -178,3 +179,20 @@ class View:
     @property
     def _then(self) -> list[str]:
         return [*self.then, *([f"`{self.step.command}` ({self.step.why})"] if self.step else ())]
+
+
+# The module of this folder in which the builder of each result's view is registered.
+BUILDERS = {
+    "AxisTest": "axis_test", "Design": "reports", "Drifted": "drift", "Experiment": "experiment",
+    "Identified": "reports", "Predicted": "prediction", "Responded": "response",
+    "Robust": "robust", "Traced": "trace", "Validation": "validation", "VelocityDesign": "velocity",
+    "VelocityModel": "velocity", "VelocityPredicted": "velocity", "VelocityTraced": "velocity",
+    "VelocityValidation": "velocity",
+}  # fmt: skip
+
+
+@singledispatch
+def view(found: Any, *context: Any) -> View:
+    """The one view of a result, by its type; context: what the result does not hold itself."""
+    import_module(f"workbench.report.{BUILDERS[type(found).__name__]}")
+    return view.dispatch(type(found))(found, *context)

@@ -13,7 +13,7 @@ from design.machine.model import Model
 from design.tune import Asked, Goals
 from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.report.reports import design_view
+from workbench.report.view import view
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODELS = {name: model_of(p, ACTUATOR) for name, p in TABLES.items()}
@@ -175,7 +175,7 @@ def test_a_design_has_crossover_and_bandwidth_of_each_loop() -> None:
         assert m.crossover_hz is not None and m.bandwidth_hz is not None
         assert 0.3 < m.bandwidth_hz / m.crossover_hz < 3.0
         assert m.gain_up is not None and m.gain_db == pytest.approx(20 * np.log10(m.gain_up))
-    (head, *rows) = (line.split() for line in design_view(found).screen().text().splitlines()
+    (head, *rows) = (line.split() for line in view(found).screen().text().splitlines()
                      if "drive's" in line or ("Hz" in line and "deg" in line))  # fmt: skip
     assert "rejects to" in " ".join(head) and "follows to" in " ".join(head)
     assert head[:3] == ["in", "a", "drive's"] and len(rows) == len(found.controllers)

@@ -24,7 +24,8 @@ from tests.chain import EMPS, designed, model_of
 from workbench.output import dumps
 from workbench.report.chart import Chart
 from workbench.report.design_tables import design_sentence
-from workbench.report.validation import validation_sentence, validation_view
+from workbench.report.validation import validation_sentence
+from workbench.report.view import view
 
 H = 1e-3
 T: Array = H * np.arange(10_000, dtype=np.float64)
@@ -120,7 +121,7 @@ def test_the_recommended_loop_decides_and_is_named_with_its_compensator() -> Non
     assert validation_sentence(result).startswith("PID with the compensator passes in simulation:")
     titles = [
         panel.title
-        for section in validation_view(result, traces).sections()
+        for section in view(result, traces).sections()
         if isinstance(section.content, Chart)
         for panel in section.content.panels
     ]

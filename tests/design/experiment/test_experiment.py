@@ -25,7 +25,8 @@ from identification.progress import KeepGoing, quiet
 from tests.chain import TABLES, model_of
 from workbench.cards.controller import CardController
 from workbench.documents.rivals import read_rivals
-from workbench.report.experiment import experiment_view, reference_text
+from workbench.report.experiment import reference_text
+from workbench.report.view import view
 from workbench.steps.present import present
 
 pytestmark = pytest.mark.slow
@@ -103,7 +104,7 @@ def test_what_it_writes(planned: Experiment) -> None:
     read: Array = np.array([[float(x) for x in row.split(",")] for row in rows])
     assert read[:, 1] == pytest.approx(planned.r, abs=1e-9)
     assert np.diff(read[:, 0]) == pytest.approx(2e-3)
-    page = experiment_view(planned).page()
+    page = view(planned).page()
     assert "What it promises" in page and "&lt;t" not in page
     assert page.count('<figure class="chart"') == 2
 

@@ -47,7 +47,7 @@ ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
          SWING + noise(1e-5), 3.0 * np.gradient(SWING, T)),
     ],
 )  # fmt: skip
-def test_what_is_hardly_told_is_said(
+def test_what_is_hardly_identifiable_is_said(
     words: str, rig: Rig, t: Array, y: Array, drive: Array
 ) -> None:
     assert words in said(rig, t, y, drive)

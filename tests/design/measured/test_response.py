@@ -41,8 +41,8 @@ from workbench.report.response import (
     peak_table,
     plant_chart,
     response_sentence,
-    response_view,
 )
+from workbench.report.view import view
 from workbench.steps.response import response_frame
 
 CARD: dict[str, Any] = {
@@ -301,9 +301,9 @@ def test_several_logs_narrow_the_band() -> None:
 def test_words_and_pictures() -> None:
     found = responded(TWO)
     assert "an anti-resonance at 4" in response_sentence(found)
-    text = response_view(found).screen().text()
+    text = view(found).screen().text()
     assert "Hz" in text.splitlines()[0] and "friction: subtracted from the force" in text
-    html = response_view(found).page()
+    html = view(found).page()
     assert html.count('<figure class="chart"') == 3
     for title in ("Plant", "Resonances and margins", "Open loop", "Controller"):
         assert f">{title}<" in html

@@ -27,7 +27,8 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from tests.chain import TABLES, model_of
 from workbench.output import dumps
-from workbench.report.robust import robust_lines, robust_sentence, robust_view
+from workbench.report.robust import robust_lines, robust_sentence
+from workbench.report.view import view
 
 pytestmark = pytest.mark.slow
 
@@ -153,7 +154,7 @@ def test_the_document_is_json_and_names_every_loop() -> None:
 
 
 def test_the_report_shows_the_shares_and_the_design() -> None:
-    text = robust_view(found()).page()
+    text = view(found()).page()
     assert text.count('<figure class="chart"') == 1
     assert "&lt;t" not in text
     assert "modulus margin" in text and "nominal" in text

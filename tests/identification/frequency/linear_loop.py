@@ -16,7 +16,7 @@ GAINS = (4000.0, 120.0)  # of the loop [N/m, N s/m]
 
 
 def true_position(f: Array, two: bool = True) -> ComplexArray:
-    """Position by force [m/N] of the first of two masses, or of one of the weight of both."""
+    """Position over force [m/N] of the first of two masses, or of one of the weight of both."""
     s = 2j * np.pi * f
     link = DRAG * s + STIFFNESS
     load = link * M_2 * s**2 / (M_2 * s**2 + link) if two else M_2 * s**2

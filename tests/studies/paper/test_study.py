@@ -14,7 +14,7 @@ from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from identification.simulation.karnopp_step import F_CN, F_CP, F_SN, F_SP
 from studies.paper.claims import claims
-from studies.paper.document import paper_document, paper_view
+from studies.paper.document import paper_document, paper_screen
 from studies.paper.figures_rig import RigFigures
 from studies.paper.measures import figures_of, measure, standing
 from studies.paper.report import paper_report
@@ -97,7 +97,7 @@ def test_beyond(found: Study) -> None:
 
 
 def test_the_claims_are_one_screen(found: Study) -> None:
-    shown = paper_view(found, Path("paper"))
+    shown = paper_screen(found, Path("paper"))
     assert "written: paper/report.html" in one_screen(shown)
     assert "rivals on the plant of table 3" in shown.text(verbose=True)
 

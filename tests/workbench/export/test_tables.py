@@ -367,7 +367,7 @@ def test_what_else_a_model_lacks() -> None:
         made(replace(blind, effects={"backlash": {"width": width}}), "backlash")
 
 
-def test_a_wave_of_which_a_part_is_not_told_keeps_the_rest() -> None:
+def test_a_wave_of_which_a_part_is_not_identifiable_keeps_the_rest() -> None:
     model = linear(COGGING)
     first = {**model.effects["cogging"], "b": NOT_IDENTIFIABLE}
     found = made(replace(model, effects={**model.effects, "cogging": first}), "cogging-table")

@@ -194,7 +194,7 @@ def test_other_verdicts_are_passed_on_with_their_state(
 
 
 @pytest.mark.slow
-def test_another_structure_is_traced_and_the_effect_put_in_force(
+def test_another_structure_is_traced_and_the_effect_made_active(
     shop: Path, first: Judgement
 ) -> None:
     card = load_card(shop / "card.toml")

@@ -251,7 +251,7 @@ def test_a_marker_tells_that_a_writer_has_finished(
 
 
 @pytest.mark.slow
-def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, root: Path) -> None:
+def test_a_log_copied_late_makes_nothing_active(run: Run, registry: Registry, root: Path) -> None:
     activate(registry, "a")
     machine(root, "a", {"log5.csv": "drift 5"})
     assert verdicts(run()) == {"log5.csv": "promoted"}

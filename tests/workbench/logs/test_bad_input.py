@@ -163,7 +163,7 @@ def test_a_row_that_is_there_twice_counts_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", ""])
-def test_runs_of_nan_or_infinite_are_cut_out_and_told(tmp_path: Path, value: str) -> None:
+def test_runs_of_nan_or_infinite_are_cut_out_and_reported(tmp_path: Path, value: str) -> None:
     path = with_columns(tmp_path)
     lines = path.read_text("utf-8").splitlines()
     for row in range(99, 120):

@@ -20,7 +20,7 @@ NASTY = "<img src=x onerror=alert(1)>"
 CSV = b"t,y\n" + b"".join(b"%d,%d\n" % (k, k % 7) for k in range(300))
 
 
-def test_a_token_is_kept_as_its_hash_and_told_once(where: str) -> None:
+def test_a_token_is_kept_as_its_hash_and_shown_once(where: str) -> None:
     with Registry(where) as registry:
         access = Access(registry.database)
         secret = access.add("anna", "change", by="root", now=NOW)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from workbench.registry.difference import Number, as_read, difference
-from workbench.registry.views import difference_view
+from workbench.registry.views import difference_screen
 
 NAMES = ("version 1", "version 2")
 
@@ -31,7 +31,7 @@ def test_people_read_millimetres_and_documents_hold_metres() -> None:
 def test_an_interval_has_digits_enough_to_have_a_width() -> None:
     sharp = {"value": 300.0, "unit": "N", "low": 299.997, "high": 300.004}
     lines = difference({"model": {"friction": {"F": sharp}}}, {"model": {"friction": {"F": sharp}}})
-    row = difference_view(lines, NAMES).text().strip().splitlines()[2].split("  ")
+    row = difference_screen(lines, NAMES).text().strip().splitlines()[2].split("  ")
     assert [cell.strip() for cell in row if cell][1:] == [
         "300.000", "N", "299.997 to 300.004", "300.000", "299.997 to 300.004"
     ]  # fmt: skip
@@ -42,6 +42,6 @@ def test_a_version_without_a_design_is_said_once() -> None:
     shown, said = as_read(lines, NAMES)
     assert said == "version 2 has no design"
     assert [line.name for line in shown] == ["dv_p", "F_cp"]
-    printed = difference_view(lines, NAMES).text()
+    printed = difference_screen(lines, NAMES).text()
     assert "version 2 has no design" in printed
     assert "changed" not in printed and "+0" not in printed

@@ -158,7 +158,7 @@ COPIED = SeenLog("e" * 64, "run4.csv", 40, 900)
 
 
 @pytest.mark.slow
-def test_an_older_log_changes_nothing_in_force(queue: Queue, registry: Registry) -> None:
+def test_an_older_log_changes_nothing_active(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
     queue.announce("m", [NEWER, LATE, COPIED], now=NOW)
     assert queue.finish(claim, NEWER, DRIFT, by="w", now=NOW).verdict == "promoted"

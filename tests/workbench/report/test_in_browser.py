@@ -13,7 +13,7 @@ import pytest
 from tests.chain import identified
 from tests.workbench.report.test_chart import example
 from workbench.report.chart import chart_assets, chart_html
-from workbench.report.reports import identified_view
+from workbench.report.view import view
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -70,7 +70,7 @@ def inked(browser: Any) -> list[int]:
 
 @pytest.mark.parametrize("width", [420, 1400])
 def test_a_report_is_drawn_and_fits_the_screen(browser: Any, tmp_path: Path, width: int) -> None:
-    (tmp_path / "report.html").write_text(identified_view(identified()).page(), encoding="utf-8")
+    (tmp_path / "report.html").write_text(view(identified()).page(), encoding="utf-8")
     opened(browser, (tmp_path / "report.html").as_uri(), width)
     assert faults(browser) == []
     found = inked(browser)

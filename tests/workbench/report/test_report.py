@@ -15,13 +15,11 @@ from workbench.report.chart import Chart
 from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.friction import friction_curve
-from workbench.report.reports import design_view, identified_view
 from workbench.report.validation import (
     validation_lines,
     validation_table,
-    validation_view,
 )
-from workbench.report.view import Section, page
+from workbench.report.view import Section, page, view
 from workbench.steps.identify_sources import Identified
 
 LARGEST = 2_000_000
@@ -64,7 +62,7 @@ def checked(html: str, figures: int) -> str:
 
 
 def test_identification_report() -> None:
-    html = checked(identified_view(identified()).page(), 4)
+    html = checked(view(identified()).page(), 4)
     for text in ("position [mm]", "applied force [N]", "velocity [mm/s]", "friction force [N]",
                  "time [s]", "moving mass", "95 % interval", "short.csv", "a remark",
                  "Over frequency", "from force to position [m/N]"):  # fmt: skip
@@ -86,7 +84,7 @@ def test_a_breakaway_limit_that_is_not_identified_is_drawn_at_the_coulomb_level(
 
 def test_a_rotary_report_shows_rotary_units() -> None:
     found = turned(identified())
-    html = checked(identified_view(found).page(), 4)
+    html = checked(view(found).page(), 4)
     for text in ("position [rad]", "applied force [N m]", "velocity [rad/s]", "N m s/rad",
                  "kg m^2", "moment of inertia", "breakaway torque", "N m/(V s)"):  # fmt: skip
         assert text in html
@@ -112,7 +110,7 @@ def turned(found: Identified) -> Identified:
 def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     model = turned(identified()).model
     found = designed(model)
-    html = checked(design_view(found).page(), 2)
+    html = checked(view(found).page(), 2)
     assert "[dB, N m/rad]" in html and " V/(N m)," in html
     assert "N/m" not in html and "V/N," not in html
     result, _ = validate(model, found, np.random.default_rng(0))
@@ -121,7 +119,7 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
 
 
 def test_design_report() -> None:
-    html = checked(design_view(designed(identified().model)).page(), 2)
+    html = checked(view(designed(identified().model)).page(), 2)
     for text in (
         "frequency [rad/s]",
         "|S_yp| [dB]",
@@ -136,9 +134,9 @@ def test_design_report() -> None:
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
     result, traces = validate(model, designed(model), np.random.default_rng(0), plant=other)
-    html = checked(validation_view(result, traces, rotary=False).page(), 4)
+    html = checked(view(result, traces, False).page(), 4)
     assert "Steps on the identified plant" in html and "Steps on the other plant" in html
-    rotary = validation_view(result, traces, rotary=True).page()
+    rotary = view(result, traces, True).page()
     assert "position [rad]" in rotary and "force N m" in rotary
 
 

@@ -1,13 +1,15 @@
 """One result, one view: terminal, page, notebook and picture say the same."""
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from workbench.output import OutputFolder, step
 from workbench.report.chart import Chart, Line, Panel
-from workbench.report.view import Section, View, notes
+from workbench.report.view import BUILDERS, Section, View, notes
+from workbench.report.view import view as view_of
 from workbench.screen import instead, more, tabled
 
 TABLE = tabled(("what", "size"), [("a", "1")], whole=[("a", "1"), ("b", "2")])
@@ -73,3 +75,11 @@ def test_the_files_are_written_a_document_as_json(tmp_path: Path) -> None:
     with OutputFolder("x", tmp_path / "two", now=datetime(2026, 1, 1)) as folder:
         replace(view(), has_page=False).write(folder)
     assert not (tmp_path / "two" / "report.html").exists()
+
+
+def test_the_view_of_every_result_is_built_where_it_is_said_to_be() -> None:
+    for home in BUILDERS.values():
+        import_module(f"workbench.report.{home}")
+    built = {kind.__name__: one.__module__ for kind, one in view_of.registry.items()}
+    assert built.pop("object") == "workbench.report.view"
+    assert built == {name: f"workbench.report.{home}" for name, home in BUILDERS.items()}

@@ -17,7 +17,8 @@ from tests.chain import short_recipe
 from tests.screens import one_screen
 from workbench.cards.card_tables import CardFile, LimitsSection
 from workbench.logs.sources import Sources
-from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
+from workbench.report.axis_test import axis_charts, axis_sentence
+from workbench.report.view import view
 from workbench.steps.axis_test import axis_document, axis_test_of_sources
 from workbench.steps.simulate import record
 
@@ -116,7 +117,7 @@ def test_unequal_friction_is_not_called_a_constant_force() -> None:
     assert one.light == "red" and test.reasons[0].startswith(
         "half the difference of F_cn and F_cp (unequal friction or a constant force) is 1.5"
     )
-    assert one.meaning in axis_view(test).page()
+    assert one.meaning in view(test).page()
 
 
 def test_without_limits_it_is_yellow_and_says_what_to_give() -> None:
@@ -155,14 +156,14 @@ def test_its_document_page_and_screen(tmp_path: Path) -> None:
     assert document["quantities"]["m"]["limits"]["logs"] == 30
     assert document["quantities"]["backlash"]["value"] is None
     assert document["version"] == 3
-    html = axis_view(test).page()
+    html = view(test).page()
     assert '<div class="lamp red"' in html and "@page { size: A4" in html and ">signature<" in html
     along, past = axis_charts(test)
     assert len(along.panels) == 1 and len(past.panels) == 2
     assert list(past.panels[0].lines[0].x) == [float(k) for k in range(-30, 1)]
     assert past.panels[0].bands[0].low == 8.0
     assert len(axis_charts(axis_test_of_sources(sources()))) == 1
-    text = one_screen(axis_view(test).screen(tmp_path))
+    text = one_screen(view(test).screen(tmp_path))
     assert text.startswith("RED: ") and "written: " in text
 
 

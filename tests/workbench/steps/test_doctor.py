@@ -14,7 +14,7 @@ from tests.identification.motor_logs import K_A, H, made
 from tests.screens import one_screen
 from workbench.cards.card import Card, load_card
 from workbench.logs.sources import read_sources
-from workbench.report.doctor import doctor_picture, doctor_view
+from workbench.report.doctor import doctor_picture, doctor_screen
 from workbench.report.next_steps import after_doctor
 from workbench.steps.doctor import Examined, doctor_document, examine
 from workbench.steps.identify_sources import identify_sources
@@ -157,7 +157,7 @@ def test_a_position_ahead_of_its_reference_is_reported(
     found = examined_log(load_card(card.path), {**table, **own})
     assert found.exchanged == exchanged
     said = "the columns of r and y look exchanged; exchange them in the card"
-    text = doctor_view(found, None).text()
+    text = doctor_screen(found, None).text()
     assert any(said in one for one in found.remarks) == exchanged
     assert ("behind its reference by" in text and "(100% alike)" in text) == (not exchanged)
     assert ("exchange the columns of r and y in the card (see note)" in text) == exchanged
@@ -167,7 +167,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
     card, table = motor
     card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
     found = examined_log(load_card(card.path), table)
-    text = doctor_view(found, None).text().splitlines()
+    text = doctor_screen(found, None).text().splitlines()
     assert after_doctor(found, "run.csv", "card.toml", None) is None
     assert text[1].split(maxsplit=1) == [
         "next", "check the units in the card (see note), then ask again"
@@ -180,14 +180,14 @@ def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, 
     then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml", None)
     assert then and then.command == "workbench identify logs/run.csv --card 'my card.toml'"
     found = examined_log(card, {**table, "u": -table["u"]})
-    shown = " ".join(doctor_view(found, None).text().split())
+    shown = " ".join(doctor_screen(found, None).text().split())
     assert "give the column of y gain = -1" in shown and "..." not in shown
 
 
 def test_a_card_without_its_constant_is_filled_in_first(motor: tuple[Card, Table]) -> None:
     card, table = motor
     card.path.write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
-    text = doctor_view(examined_log(load_card(card.path), table), None).text()
+    text = doctor_screen(examined_log(load_card(card.path), table), None).text()
     assert "write force_per_command under the card's [rig]" in text
 
 
@@ -247,7 +247,7 @@ def test_one_screen_and_a_picture(rig: str, tmp_path: Path, request: pytest.Fixt
     for refused in (False, True):
         table["y"] = np.zeros(len(table["t"])) if refused else table["y"]
         found = examined_log(card, table)
-        lines = one_screen(doctor_view(found, tmp_path)).splitlines()
+        lines = one_screen(doctor_screen(found, tmp_path)).splitlines()
         assert "written: " in lines[-1] or "written: " in lines[-2]
         doctor_picture(found, tmp_path / "doctor.png")
         assert (tmp_path / "doctor.png").read_bytes().startswith(b"\x89PNG")
@@ -271,7 +271,7 @@ def test_what_a_coarse_sensor_calls_rest_is_reported_by_its_speed(
 
     def hidden(step: float) -> float:
         found = examined_log(card, {**table, "y": step * np.round(table["y"] / step)})
-        text = " ".join(doctor_view(found, None).text().split())
+        text = " ".join(doctor_screen(found, None).text().split())
         return float(text.partition("at rest (slower than ")[2].split()[0])
 
     fine, coarse = hidden(1e-6), hidden(1e-3)

@@ -82,7 +82,9 @@ def test_an_error_drives_nothing_and_names_its_reference(
     assert "c4" in (columns.get("F"), columns.get("u"))
 
 
-def test_what_is_hardly_told_stands_in_the_card(joint: dict[str, Array], tmp_path: Path) -> None:
+def test_what_is_hardly_identifiable_stands_in_the_card(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
     zoh = joint["y"][(np.arange(len(T)) // 10) * 10]
     found = checked_proposal(
         propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, zoh, joint["F"])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.report.doctor import installation_view
+from workbench.report.doctor import installation_screen
 from workbench.steps.installation import check_installation
 
 
@@ -19,7 +19,7 @@ def test_versions_kernels_and_cards_are_reported(
     cards = found.data["cards"]
     assert isinstance(cards, dict) and cards["emps"] == {"there": 1, "of": 2}
     assert found.wrong == ()
-    shown = installation_view(found, None, found.wrong).text()
+    shown = installation_screen(found, None, found.wrong).text()
     assert "emps: 1 of 2 files" in shown
     assert "none named" in shown
 

@@ -42,10 +42,10 @@ from workbench.report.trace import (
     effects_table,
     errors_table,
     rivals_table,
-    traced_view,
 )
 from workbench.report.trace_pictures import axis_of, pictures
 from workbench.report.trace_words import percent, trace_sentence
+from workbench.report.view import view
 from workbench.steps.trace import named_logs, trace_document, trace_sources
 
 CONTRACT = {
@@ -120,7 +120,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad**3",
     ]
     assert "[rad]" in str(errors_table(found.trace, True).whole) and "N m" in trace_sentence(found)
-    html = checked(traced_view(found).page(), 5)
+    html = checked(view(found).page(), 5)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
 
@@ -340,8 +340,8 @@ def test_changes_in_percent(before: float, after: float, said: str) -> None:
 
 
 def test_the_view_for_a_terminal() -> None:
-    view = traced_view(traced(trace_of("unknown"))).screen(Path("out"))
-    first, whole = (" ".join(view.text(verbose=one).split()) for one in (False, True))
+    screen = view(traced(trace_of("unknown"))).screen(Path("out"))
+    first, whole = (" ".join(screen.text(verbose=one).split()) for one in (False, True))
     for part in ("Found in part: stribeck", "What is left depends on y", "held out before",
                  "stribeck", "F_s 3.50 N", "next: record more, the same stroke at several",
                  "note: a remark of the trace", "written: out/trace.json"):  # fmt: skip
@@ -357,7 +357,7 @@ def test_the_view_for_a_terminal() -> None:
 )  # fmt: skip
 def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) -> None:
     found = traced(trace_of(verdict, keys))
-    html = checked(traced_view(found).page(), figures)
+    html = checked(view(found).page(), figures)
     assert re.sub("[<>'&]", "", trace_sentence(found))[:20] in html
     wanted = ["residual [N]", "with its 95 % band", "moving towards +", "Parameters"]
     if keys:
@@ -373,7 +373,7 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
 
 
 def test_an_effect_without_a_picture_is_named() -> None:
-    html = checked(traced_view(traced(trace_of("effect", ("rising_stiction",)))).page(), 3)
+    html = checked(view(traced(trace_of("effect", ("rising_stiction",)))).page(), 3)
     assert "rising stiction shows in neither equation" in html
     assert pictures(replace(trace_of(), residuals=(), missing_force=None)) == []
 
@@ -382,21 +382,21 @@ def test_the_free_run_is_drawn_before_and_after() -> None:
     found = trace_of("effect", ("rising_stiction",))
     t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
     run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
-    html = checked(traced_view(traced(replace(found, run=run))).page(), 4)
+    html = checked(view(traced(replace(found, run=run))).page(), 4)
     assert "rising stiction shows in neither" in html and "residual [mm]" in html
     assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
-    assert "residual [rad]" in traced_view(traced(replace(found, run=run), rotary=True)).page()
+    assert "residual [rad]" in view(traced(replace(found, run=run), rotary=True)).page()
 
 
 def test_a_law_is_drawn_beside_what_the_logs_say_without_it() -> None:
     at = np.linspace(0.01, 0.3, 12)
     curve = FreeCurve("stribeck", "mechanical", "v", at, np.exp(-at), 0.01 + 0 * at, np.exp(-at))
     found = replace(trace_of("effect", ("stribeck",)), curves=(curve,))
-    html = checked(traced_view(traced(found)).page(), 5)
+    html = checked(view(traced(found)).page(), 5)
     for text in ("Law and logs", "stribeck [N]", "by the logs alone", "velocity [mm/s]"):
         assert text in html
     found = replace(found, curves=(replace(curve, signal="y", period=0.3),))
-    assert "position within a period [mm]" in traced_view(traced(found)).page()
+    assert "position within a period [mm]" in view(traced(found)).page()
 
 
 def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:
