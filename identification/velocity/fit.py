@@ -120,7 +120,7 @@ def refined(
         spread = max(1.4826 * float(np.median(np.abs(errors(x)))), 1e-3 * record.noise, 1e-12)
         found = least_squares(
             errors, x, slopes, bounds=(low, high), loss="soft_l1", f_scale=OUTLYING * spread,
-            x_scale=1.0, max_nfev=60,
+            x_scale=1.0, max_nfev=60, gtol=None,
         )  # fmt: skip
         x = found.x
     # A time that is none is left out; a dead zone is not, which is confounded with a gain.

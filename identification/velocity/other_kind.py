@@ -108,7 +108,8 @@ def _fitted(record: Record, where: BoolArray, starts: Sequence[Array]) -> Array:
             spread = 1.4826 * float(np.median(np.abs(errors(x)))) + 1e-3 * record.noise
             x = least_squares(
                 errors, x, bounds=(low, high), loss="soft_l1", f_scale=OUTLYING * spread,
-                max_nfev=30, x_scale=np.maximum(np.abs(x), 0.1), diff_step=[STEP_OF_BODY] * 7,
+                max_nfev=30, x_scale=np.maximum(np.abs(x), 0.1), gtol=None,
+                diff_step=[STEP_OF_BODY] * 7,
             ).x  # fmt: skip
         left = float(np.mean(np.abs(errors(x))))
         if left < least:

@@ -1,7 +1,7 @@
 """The valve's numbers from logs whose truth is known."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,17 @@ def test_a_position_that_is_held_in_a_faster_log() -> None:
     log = renewed(made(44, h=0.002, zoh=10, noise=1e-4, duration=30.0)).log
     assert log.h == pytest.approx(0.02)
     near(found_in(log), log.h)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e3])
+def test_a_machine_of_another_size_is_fitted_as_exactly(size: float) -> None:
+    """On a micrometre's stage a gradient in metres had been small before the first step."""
+    log = made(40)
+    scaled = log.with_signals(y=size * log["y"])
+    one, other = (asdict(fit(recorded([each])).valve) for each in (log, scaled))
+    gains = {"g_p": size, "g_n": size}
+    for name, value in one.items():
+        assert other[name] == pytest.approx(value * gains.get(name, 1.0), rel=1e-5)
 
 
 def test_a_machine_wired_the_other_way_round() -> None:
