@@ -18,6 +18,7 @@ from design.machine.documents import design_document, model_document
 from design.machine.model import Model
 from design.machine.slip_of_scale import moved_between, no_wear
 from design.machine.source import Source
+from design.measured.drift_document import detectable_sizes
 from design.measured.drift_of_logs import Stream, drift_of
 from identification.drift.mewma import DriftState
 from identification.drift.readings import Moved, Reading, moved_by, reading_of
@@ -33,7 +34,7 @@ from workbench.output import dumps, strict
 from workbench.registry.values import Candidate, Judgement
 from workbench.report.drift import reason_sentence
 from workbench.report.trace_words import trace_sentence
-from workbench.steps.drift import detectable_sizes, model_key
+from workbench.steps.drift import model_key
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import trace_sources
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.identified.trace_document import trace_document
 from design.identified.trace_logs import Traced, effect_estimates
 from design.machine.documents import model_document
 from design.machine.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
@@ -30,7 +31,6 @@ from workbench.report.trace_pictures import (
 from workbench.report.trace_words import advice, percent, trace_sentence, words
 from workbench.report.view import Section, View, notes, report_notes
 from workbench.screen import Part, Row, more, tabled
-from workbench.steps.trace import trace_document
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
 RIVAL_HEAD = ("rival", "force left", "why not")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from design.machine.source import Source
+from design.measured.axis_document import axis_document
 from design.measured.axis_limits import Allowed, own_limits
 from design.measured.axis_test import AxisTest, Earlier, judged
 from identification.errors import BadCard
@@ -18,7 +19,7 @@ from tests.screens import one_screen
 from workbench.cards.card_tables import CardFile, LimitsSection
 from workbench.logs.sources import Sources
 from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
-from workbench.steps.axis_test import axis_document, axis_test_of_sources
+from workbench.steps.axis_test import axis_test_of_sources
 from workbench.steps.simulate import record
 
 

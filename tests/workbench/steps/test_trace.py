@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from design.identified import trace_logs as tracing
+from design.identified.trace_document import trace_document
 from design.identified.trace_logs import traced_model
 from design.machine.documents import model_document
 from design.measured.friction_curve import sliding_friction
@@ -46,7 +47,7 @@ from workbench.report.trace import (
 )
 from workbench.report.trace_pictures import axis_of, pictures
 from workbench.report.trace_words import percent, trace_sentence
-from workbench.steps.trace import named_logs, trace_document, trace_sources
+from workbench.steps.trace import named_logs, trace_sources
 
 CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
