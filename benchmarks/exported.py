@@ -46,13 +46,13 @@ from design.program import (
     parts,
 )
 from design.rst import RST
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.cards.card import load_card
 from workbench.export.filled import filled
 from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.simulate import record
 
 STEPS = 1_000_000
 DWELL = 2.0  # s between the reference's steps

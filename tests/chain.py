@@ -9,6 +9,8 @@ from design.controllers.design import design
 from design.machine.design import Design
 from design.machine.model import FitSummary, LogEntry, Model
 from design.machine.source import Source
+from design.simulated.recipe import Recipe
+from design.simulated.record import record
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -16,10 +18,8 @@ from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Actuator
 from tests.made import made_once
 from workbench.cards.card import Card, load_card
-from workbench.cards.recipe import Recipe
 from workbench.logs.sources import Sources, card_path
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.simulate import record
 
 CARD = """
 [card]

@@ -252,11 +252,11 @@ def axis_test() -> Iterator[Screen]:
     """Every number beyond its limits, of a log of many runs."""
     from design.machine.source import Source
     from design.measured.axis_limits import MEANING_OF
+    from design.simulated.record import record
     from tests.chain import short_recipe
     from workbench.logs.sources import Sources
     from workbench.report.axis_test import axis_view
     from workbench.steps.axis_test import axis_test_of_sources
-    from workbench.steps.simulate import record
 
     card, recipe = short_recipe()
     log = record("short", recipe, 7)

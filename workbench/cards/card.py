@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
@@ -15,15 +16,16 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from design.machine.controller import CardController
 from design.machine.nearest import nearest
-from identification.effects._library import Library
+from design.simulated.recipe import Recipe, RecipeSection
+from identification.effects._library import Library, built_in
 from identification.errors import BadCard, BadModel
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
-from workbench.cards.controller import CardController
-from workbench.cards.recipe import Recipe
 from workbench.cards.table_keys import keys_at
 from workbench.cards.units import si_unit
+from workbench.cards.written_effect import written_effect
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
 NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
@@ -105,7 +107,7 @@ def card_from(
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
         wanted = parsed.recipe if with_recipe else None
         rig = rigs[""]
-        recipe = wanted.value(library, rig.motion, rig.command_unit) if wanted else None
+        recipe = _recipe(wanted, library, rig) if wanted else None
     except ValidationError as error:
         raise BadCard(f"{path}: {explain(error)}") from None
     except BadModel as error:
@@ -129,6 +131,16 @@ def card_from(
         controller=_of(path, parsed.controller.value, rig) if parsed.controller else None,
         limits=MappingProxyType(_of(path, parsed.limits.value, rig) if parsed.limits else {}),
     )
+
+
+def _recipe(section: RecipeSection, library: Library | None, rig: Rig) -> Recipe:
+    """The recipe, with the effects of the library, by default all but a user's own files."""
+    if section.effects and not library:
+        from workbench.cards import own_effects  # with it comes numba
+
+        library = own_effects.library()
+    known, motion, command = library or built_in(), rig.motion, rig.command_unit
+    return section.value(partial(written_effect, library=known, motion=motion, command=command))
 
 
 def _of(path: Path, value: Callable[..., Value], *given: Any) -> Value:

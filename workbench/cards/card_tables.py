@@ -1,6 +1,6 @@
 """The tables of a card as it is written, every key said below its field.
 
-`[recipe]` is in workbench/cards/recipe.py, `[controller]` in workbench/cards/controller.py, and
+`[recipe]` is in design/simulated/recipe.py, `[controller]` in workbench/cards/controller.py, and
 what a gain means in workbench/cards/units.py. A limit of `[limits]` is a pair of numbers in SI, or
 of texts with a unit, as `["10 N", "16 N"]`.
 """
@@ -12,13 +12,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
+from design.machine.card_table import CardTable, Positive
 from design.machine.readable import shown
+from design.simulated.recipe import RecipeSection
 from identification.errors import BadCard
 from identification.log import Rig, RigKind
 from identification.model.plant import over, units_of
 from workbench.cards.controller import ControllerSection
-from workbench.cards.recipe import RecipeSection
-from workbench.cards.table import CardTable, Positive
 from workbench.cards.units import (
     LONGEST_UNIT,
     Scale,

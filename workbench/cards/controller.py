@@ -4,22 +4,22 @@ A gain is a number in SI (with the unit of the command in place of V), or a text
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from design.machine.card_table import CardTable, NotNegative, Positive
+from design.machine.controller import CardController, CardForceLoop, Kind
 from design.machine.readable import shown
+from design.simulated.recipe import Polynomials
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import over
-from workbench.cards.table import CardTable, NotNegative, Positive
 from workbench.cards.units import in_unit_of
 
 Quantity = Positive | str
 QuantityOrNone = NotNegative | str
-Kind = Literal["PD", "PID", "P-PI", "RST"]
 # Units of the gains; "stiffness" and "damping" are those of what the law gives.
 GAIN_UNITS: Mapping[Kind, Mapping[str, str]] = {
     "PD": {"k_d": "stiffness", "T_d": "s", "eps": "s"},
@@ -27,33 +27,6 @@ GAIN_UNITS: Mapping[Kind, Mapping[str, str]] = {
     "P-PI": {"k_v": "1/s", "k_p": "damping", "T_i": "s", "eps": "s", "v_ff": "1"},
     "RST": {},
 }
-
-
-@dataclass(frozen=True)
-class CardForceLoop:
-    """A force loop: k_i [command per N], T_i, period [s] (None: that of the position loop)."""
-
-    k_i: float
-    T_i: float
-    period: float | None
-
-
-@dataclass(frozen=True)
-class CardController:
-    """What `[controller]` says: gains by name in SI, polynomials of an RST, and what is around it.
-
-    period [s]: None for that of the logs; output: "command" or "force"; rate: of the reference
-    [m/s]; forget [s]: of the anti-windup, None for none.
-    """
-
-    kind: Kind
-    gains: Mapping[str, Estimate]
-    polynomials: Mapping[str, tuple[float, ...]]
-    period: float | None
-    output: Literal["command", "force"]
-    force: CardForceLoop | None
-    rate: float | None
-    forget: float | None
 
 
 class _ForceSection(CardTable):
@@ -163,17 +136,6 @@ class PresentPPI(_Common):
     """v is the difference of y behind 1/(eps s + 1)"""
     v_ff: NotNegative = 0.0
     """share of the reference's speed that is fed forward"""
-
-
-class Polynomials(CardTable):
-    """Those of an RST."""
-
-    R: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    S: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    T: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
 
 
 class PresentRST(Polynomials, _Common):

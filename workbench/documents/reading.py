@@ -11,9 +11,10 @@ from typing import Any, TypeVar
 from design.machine.codec import OF_OURS, PLACEHOLDER, UNKNOWN_KEY
 from design.machine.nearest import nearest
 from identification.errors import BadModel
+from identification.signals.check import ABSURD
 from workbench.cards.card import OFFERED_FOR_VELOCITY
 from workbench.cards.table_keys import keys_at
-from workbench.files import ABSURD, RESULT_BYTES, broken_link, refuse_larger, refuse_special
+from workbench.files import RESULT_BYTES, broken_link, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
 MOST_DIGITS = 30  # of a whole number in a result

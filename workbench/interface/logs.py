@@ -14,6 +14,7 @@ from design.measured.axis_test import AxisTest
 from design.measured.drift_of_logs import Drifted, drift_of
 from design.measured.predicted_logs import Predicted, predict_logs
 from design.measured.response import Curve, Responded, curve_of, respond
+from design.simulated.record import record, truth
 from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
 from workbench.cards.card import Card, load_card
@@ -45,7 +46,7 @@ from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import prediction_frame
 from workbench.steps.present import present_of_card
 from workbench.steps.response import response_frame
-from workbench.steps.simulate import as_columns, record, truth
+from workbench.steps.simulate import as_columns
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,15 +12,16 @@ from design.controllers.design import design
 from design.controllers.validate import Validation, validate
 from design.identified.trace_logs import Traced
 from design.machine.design import Design
+from design.simulated.recipe import Recipe
+from design.simulated.record import record, truth
 from identification.effects._library import built_in
 from identification.errors import BadCard
 from identification.model.karnopp import NAMES
 from identification.progress import Progress
 from workbench.cards.card import Card
-from workbench.cards.recipe import Recipe
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
-from workbench.steps.simulate import as_columns, record, truth
+from workbench.steps.simulate import as_columns
 from workbench.steps.trace import trace_sources
 
 HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.simulated.recipe import Recipe
+from design.simulated.record import record
 from identification.effects._library import built_in
 from identification.errors import NotIdentifiable
 from identification.estimation.axis_equation import axis_equation
 from identification.log import Log, Rig
 from tests.chain import short_recipe
-from workbench.cards.recipe import Recipe
 from workbench.cards.written_effect import written_effect
-from workbench.steps.simulate import record
 
 MADE = Rig("force")
 

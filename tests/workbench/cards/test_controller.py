@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.controller import present
 from identification.errors import BadCard
 from workbench.cards.card import Card, load_card
-from workbench.steps.present import present, present_of_card
+from workbench.steps.present import present_of_card
 
 MOTOR = """
 [card]

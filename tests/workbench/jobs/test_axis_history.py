@@ -9,6 +9,7 @@ import pytest
 
 from design.machine.documents import model_document
 from design.machine.source import Source
+from design.simulated.record import record
 from identification.drift.readings import Reading
 from identification.effects._library import built_in
 from identification.model.estimates import Estimate
@@ -21,7 +22,6 @@ from workbench.output import strict
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import BadRegistry, Candidate, Judgement, SeenLog
-from workbench.steps.simulate import record
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 LOGS = 7

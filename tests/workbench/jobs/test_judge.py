@@ -12,6 +12,7 @@ import pytest
 
 from design.challenge import Terms
 from design.machine.model import Model
+from design.simulated.record import record
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
 from identification.model.karnopp import Karnopp
@@ -25,7 +26,7 @@ from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps
 from workbench.registry.values import Judgement, SeenLog, Version
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 OLD = TABLES["paper_table1"]
 NEW = replace(OLD, F_cp=16.0, F_vp=380.0, F_sp=26.0)

@@ -11,6 +11,7 @@ from design.machine.source import Source
 from design.measured.axis_document import axis_document
 from design.measured.axis_limits import Allowed, own_limits
 from design.measured.axis_test import AxisTest, Earlier, judged
+from design.simulated.record import record
 from identification.errors import BadCard
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -20,7 +21,6 @@ from workbench.cards.card_tables import CardFile, LimitsSection
 from workbench.logs.sources import Sources
 from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
 from workbench.steps.axis_test import axis_test_of_sources
-from workbench.steps.simulate import record
 
 
 def sources(limits: Mapping[str, tuple[float, float]] | None = None, seed: int = 7) -> Sources:

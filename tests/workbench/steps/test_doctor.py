@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import Kind
@@ -18,7 +19,6 @@ from workbench.report.doctor import doctor_picture, doctor_view
 from workbench.report.next_steps import after_doctor
 from workbench.steps.doctor import Examined, doctor_document, examine
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.simulate import record
 
 Table = dict[str, Array]
 MOTOR = f"""

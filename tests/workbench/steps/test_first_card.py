@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.errors import BadLog
 from tests.bad_inputs.shop import CARDS
@@ -18,7 +19,6 @@ from workbench.logs.runs import read_log
 from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
 from workbench.steps.first_card.proposal import Proposal, proposed
 from workbench.steps.first_card.written import refusal, written
-from workbench.steps.simulate import record
 
 Table = dict[str, Array]
 NAMES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")

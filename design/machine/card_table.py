@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from workbench.files import ABSURD
+from identification.signals.check import ABSURD
 
 
 class CardTable(BaseModel):
