@@ -22,6 +22,7 @@ from typing import Any
 from benchmarks.real_cases import Case, Prepared, every_case, prepared
 from benchmarks.real_shares import model_run, model_share, window_of
 from benchmarks.yardstick import Fit, Record, fitted, own_share, record, run_errors
+from design.identified.examined import Examined
 from design.identified.identifiable_by_log import identifiability_of_runs
 from design.machine.model import Identifiable, Model
 from identification.effects._library import built_in
@@ -33,7 +34,7 @@ from identification.tracing.result import Trace
 from workbench.cards.card import Card
 from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
-from workbench.steps.doctor import Examined, examine
+from workbench.steps.doctor import examine
 from workbench.steps.first_card.proposal import proposed
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.trace import trace_sources

@@ -14,7 +14,7 @@ from identification.log import Rig
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.cards.card_tables import FileEntry
-from workbench.documents.log_remarks import log_remarks
+from workbench.cards.headers import log_remarks
 from workbench.files import CARD_FILE, broken_link, refuse_special, sha256_of, shipped_cards
 from workbench.logs.runs import read_runs, runs_of, shown_name
 from workbench.logs.table import Table

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from design.identified.examined import CheckedLog, Examined
 from design.identified.identifiable_by_log import Way
 from design.machine.readable import number
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
@@ -21,7 +22,6 @@ from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel
 from workbench.report.chart_figure import chart_figure, evenly_spread
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
-from workbench.steps.doctor import CheckedLog, Examined
 from workbench.steps.installation import OPTIONAL, Installation
 
 LABEL_WIDTH = 15

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.identified.examined import Examined, doctor_document
 from design.simulated.record import record
 from identification.arrays import Array
 from identification.model.karnopp import NAMES
@@ -17,7 +18,7 @@ from workbench.cards.card import Card, load_card
 from workbench.logs.sources import read_sources
 from workbench.report.doctor import doctor_picture, doctor_view
 from workbench.report.next_steps import after_doctor
-from workbench.steps.doctor import Examined, doctor_document, examine
+from workbench.steps.doctor import examine
 from workbench.steps.identify_sources import identify_sources
 
 Table = dict[str, Array]
