@@ -18,6 +18,7 @@ from design.closed_loop.loop_figures import COMPENSATED, PRESENT, LoopFigures
 from design.closed_loop.loop_motion import LimitCycle
 from design.controllers.validate import Validation
 from design.experiment.planned import Experiment, Promised, Safety
+from design.judgement import Candidate
 from design.machine.design import Recommendation
 from design.machine.model import Model
 from design.measured.drift_of_logs import Drifted
@@ -41,7 +42,7 @@ from workbench import cli
 from workbench.commands.fleet import fleet_view
 from workbench.commands.reidentify import pass_view
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, LogOutcome, SeenLog
+from workbench.registry.values import LogOutcome, SeenLog
 from workbench.report.doctor import installation_view
 from workbench.report.drift import drift_view
 from workbench.report.experiment import experiment_view

@@ -139,7 +139,7 @@ def trace_of(
 
 
 def traced(found: Trace, *, rotary: bool = False, tested: bool = True) -> Traced:
-    """The trace with model and runs, as `trace_sources` gives it."""
+    """The trace with model and runs, as `trace_logs` gives it."""
     train = sources()
     if rotary:
         train = replace(train, rig=replace(train.rig, motion="rotary"))

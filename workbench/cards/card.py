@@ -16,11 +16,12 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from design.machine.controller import CardController
+from design.machine.controller import CardController, present
+from design.machine.drive import Present
 from design.machine.nearest import nearest
 from design.simulated.recipe import Recipe, RecipeSection
 from identification.effects._library import Library, built_in
-from identification.errors import BadCard, BadModel
+from identification.errors import BadCard, BadModel, BadSpecification
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
 from workbench.cards.table_keys import keys_at
@@ -131,6 +132,19 @@ def card_from(
         controller=_of(path, parsed.controller.value, rig) if parsed.controller else None,
         limits=MappingProxyType(_of(path, parsed.limits.value, rig) if parsed.limits else {}),
     )
+
+
+def present_of_card(card: Card, rig: Rig, h: float) -> Present | None:
+    """What model.json holds of the card's controller; h [s]: period of the logs.
+
+    None where the card names none. Raises BadCard where it is none, or does not fit the rig.
+    """
+    if card.controller is None:
+        return None
+    try:
+        return present(card.controller, rig, h)
+    except (BadCard, BadSpecification) as error:
+        raise BadCard(f"{card.path}: controller: {error}") from None
 
 
 def _recipe(section: RecipeSection, library: Library | None, rig: Rig) -> Recipe:

@@ -67,7 +67,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
             f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
-        found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
+        found = drift_by_chart(model, sources.logs, np.random.default_rng(seed), {})
         nine = {name: one for name, one in model.friction.items() if name in MEANING_OF}
         unidentified = {n: Estimate(None, e.unit, reason=found.reason) for n, e in nine.items()}
         estimates = unidentified | by_quantity(found.parameters)

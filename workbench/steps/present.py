@@ -2,26 +2,10 @@
 
 from dataclasses import replace
 
-from design.machine.controller import present
-from design.machine.drive import Present
 from design.machine.model import Model
-from identification.errors import BadCard, BadSpecification
-from identification.log import Rig
-from workbench.cards.card import Card, load_card
+from identification.errors import BadCard
+from workbench.cards.card import load_card, present_of_card
 from workbench.logs.sources import card_path
-
-
-def present_of_card(card: Card, rig: Rig, h: float) -> Present | None:
-    """What model.json holds of the card's controller; h [s]: period of the logs.
-
-    None where the card names none. Raises BadCard where it is none, or does not fit the rig.
-    """
-    if card.controller is None:
-        return None
-    try:
-        return present(card.controller, rig, h)
-    except (BadCard, BadSpecification) as error:
-        raise BadCard(f"{card.path}: controller: {error}") from None
 
 
 def with_card(model: Model, name: str | None) -> Model:

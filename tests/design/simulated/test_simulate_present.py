@@ -17,9 +17,8 @@ from identification.model.karnopp import NAMES, UNITS
 from identification.model.plant import Motor
 from identification.signals.excitation import reference_signal
 from tests.chain import model_of
-from workbench.cards.card import Card, load_card
+from workbench.cards.card import Card, load_card, present_of_card
 from workbench.cli import main
-from workbench.steps.present import present_of_card
 
 PLANT = """
 [recipe.friction]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from design.judgement import Candidate, Judgement
 from design.machine.documents import model_document
 from design.machine.source import Source
 from design.simulated.record import record
@@ -21,7 +22,7 @@ from workbench.logs.sources import Sources
 from workbench.output import strict
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import BadRegistry, Candidate, Judgement, SeenLog
+from workbench.registry.values import BadRegistry, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 LOGS = 7

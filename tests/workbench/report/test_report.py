@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from design.controllers.validate import validate
+from design.identified.identify_logs import Identified
 from design.machine.readable import friction_units
 from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, designed, identified, model_of
@@ -22,7 +23,6 @@ from workbench.report.validation import (
     validation_view,
 )
 from workbench.report.view import Section, page
-from workbench.steps.identify_sources import Identified
 
 LARGEST = 2_000_000
 VOID = {"meta", "br", "img", "hr"}
