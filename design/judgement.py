@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 Document = Mapping[str, Any]
 LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
+ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def diff(
 
     FIRST: by default the version before SECOND; SECOND: by default the active one.
     """
-    from workbench.registry.difference import difference
+    from design.machine.difference import difference
     from workbench.registry.values import BadRegistry
     from workbench.registry.views import difference_view
 

@@ -22,7 +22,6 @@ TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
 MachineCondition = Literal[
     "in_tune", "drifting", "structure", "log_bad", "not_judged", "no_log", "silent"
 ]
-ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
 
 
 def of_row(kind: type[Value], row: object, **more: Any) -> Value:

@@ -16,11 +16,12 @@ from identification.log import Log
 from identification.remarks import MinorRemark
 from identification.signals.delays import Delay
 from identification.signals.differentiate import differentiate
+from identification.signals.envelope import evenly_spread
 from identification.signals.sensor_state import Clock, SensorState
 from workbench.cards.units import si_unit
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel
-from workbench.report.chart_figure import chart_figure, evenly_spread
+from workbench.report.chart_figure import chart_figure
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.installation import OPTIONAL, Installation
 

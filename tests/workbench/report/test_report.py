@@ -11,10 +11,10 @@ from design.controllers.validate import validate
 from design.identified.identify_logs import Identified
 from design.machine.readable import friction_units
 from identification.model.plant import Actuator, actuator_units
+from identification.signals.envelope import evenly_spread, liveliest
 from tests.chain import TABLES, designed, identified, model_of
 from workbench.report.chart import Chart
-from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
-from workbench.report.fit import liveliest
+from workbench.report.chart_figure import LINE_POINTS, thinned
 from workbench.report.friction import friction_curve
 from workbench.report.reports import design_view, identified_view
 from workbench.report.validation import (

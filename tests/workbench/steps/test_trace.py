@@ -32,6 +32,7 @@ from identification.tracing.result import (
     Residual,
     TraceVerdict,
 )
+from identification.tracing.shown_against import pictures
 from tests.told import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
@@ -45,7 +46,7 @@ from workbench.report.trace import (
     rivals_table,
     traced_view,
 )
-from workbench.report.trace_pictures import axis_of, pictures
+from workbench.report.trace_pictures import axis_of
 from workbench.report.trace_words import percent, trace_sentence
 from workbench.steps.trace import named_logs
 
