@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from design.machine.card_table import CardTable, Divisor, NotNegative, Positive
+from design.machine.controller import Polynomials
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
@@ -150,17 +151,6 @@ class RecipePID(CardTable):
     """s"""
     eps: Positive
     """s"""
-
-
-class Polynomials(CardTable):
-    """Those of an RST."""
-
-    R: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    S: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    T: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
 
 
 class RecipeRST(Polynomials):

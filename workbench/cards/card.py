@@ -12,21 +12,22 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from pydantic import ValidationError
 
+from design.machine.card_table import InUnit
 from design.machine.controller import CardController, present
 from design.machine.drive import Present
+from design.machine.effect_values import written_effect
 from design.machine.nearest import nearest
+from design.machine.table_keys import keys_at
 from design.simulated.recipe import Recipe, RecipeSection
 from identification.effects._library import Library, built_in
 from identification.errors import BadCard, BadModel, BadSpecification
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
-from workbench.cards.table_keys import keys_at
-from workbench.cards.units import si_unit
-from workbench.cards.written_effect import written_effect
+from workbench.cards.units import in_unit_of, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
 NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
@@ -38,6 +39,14 @@ NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
 OFFERED_FOR_VELOCITY = "doctor, identify, trace, predict, design and validate"
 
 Value = TypeVar("Value")
+Made = TypeVar("Made", covariant=True)
+
+
+class InUnits(Protocol[Made]):
+    """A table that is given what reads a text with its unit."""
+
+    def value(self, rig: Rig, in_unit: InUnit, /) -> Made: ...
+
 
 _OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
 
@@ -129,8 +138,8 @@ def card_from(
         split=MappingProxyType(parsed.split),
         recipe=recipe,
         rigs=MappingProxyType(rigs),
-        controller=_of(path, parsed.controller.value, rig) if parsed.controller else None,
-        limits=MappingProxyType(_of(path, parsed.limits.value, rig) if parsed.limits else {}),
+        controller=_in_si(path, parsed.controller, rig) if parsed.controller else None,
+        limits=MappingProxyType(_in_si(path, parsed.limits, rig) if parsed.limits else {}),
     )
 
 
@@ -154,7 +163,14 @@ def _recipe(section: RecipeSection, library: Library | None, rig: Rig) -> Recipe
 
         library = own_effects.library()
     known, motion, command = library or built_in(), rig.motion, rig.command_unit
-    return section.value(partial(written_effect, library=known, motion=motion, command=command))
+    return section.value(
+        partial(written_effect, library=known, read=in_unit_of, motion=motion, command=command)
+    )
+
+
+def _in_si(path: Path, table: InUnits[Value], rig: Rig) -> Value:
+    """The value of a table whose numbers may be texts with a unit; raises as `_of`."""
+    return _of(path, table.value, rig, in_unit_of)
 
 
 def _of(path: Path, value: Callable[..., Value], *given: Any) -> Value:

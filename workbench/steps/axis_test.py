@@ -1,7 +1,7 @@
 """The test of one log of an axis by its card."""
 
 from design.measured.axis_test import AxisTest, Earlier, axis_test
-from workbench.cards.card_tables import limit_units
+from design.measured.card_limits import limit_units
 from workbench.logs.sources import Sources
 
 
