@@ -30,6 +30,11 @@ def fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
+def no_controller(_h: float) -> Present | None:
+    """Of a machine whose present controller is not known."""
+    return None
+
+
 @dataclass(frozen=True)
 class MachineLogs:
     """The runs of one machine: the name of its card, its rig, the runs, what was repaired, what
@@ -42,7 +47,7 @@ class MachineLogs:
     remarks: tuple[str, ...] = ()
     bad: tuple[BadSamples, ...] = ()
     kept: tuple[str, ...] = ()
-    present: Callable[[float], Present | None] = field(default=lambda _h: None, compare=False)
+    present: Callable[[float], Present | None] = field(default=no_controller, compare=False)
 
     @property
     def logs(self) -> list[Log]:
