@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.euler_loop import closed_loop
 from benchmarks.random_plants import drawn_reference
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.fit import fit_plant
@@ -29,7 +30,6 @@ from identification.model.estimates import KarnoppFit
 from identification.signals.clean import prepare
 from workbench.cards.card import load_card
 from workbench.logs.sources import card_path
-from workbench.steps.simulate import record
 
 SPOILT_SECONDS = 12.0
 FAULT_PLACES = ("motion", "rest", "reversal")

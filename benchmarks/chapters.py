@@ -18,14 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from design.identified.trace_logs import Traced, effect_estimates
+from design.identified.trace_logs import Traced, effect_estimates, trace_logs
 from identification.effects._library import built_in
 from identification.errors import UserError
 from identification.log import Log, Rig
 from identification.tracing.result import Errors, FoundEffect, Trace
 from workbench.cards.card import load_card
 from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
-from workbench.steps.trace import trace_sources
 
 ROOT = Path(__file__).parents[1]
 HEAD = (
@@ -99,7 +98,7 @@ def traced(chapter: Chapter) -> Traced:
         train, test = (read_sources(n, card) for n in (chapter.train, chapter.test))
         if chapter.halved:
             train, test = half(train, first=True), half(test, first=False)
-        return trace_sources(train, test, built_in())
+        return trace_logs(train.logs, test.logs, built_in())
 
 
 def half(sources: Sources, *, first: bool) -> Sources:

@@ -43,6 +43,7 @@ from design.experiment.plan import experiment
 from design.experiment.planned import Experiment
 from design.identified.identify import identify
 from design.loop import Cascade, LoopNoise
+from design.machine.controller import CardController, CardForceLoop, present
 from design.machine.model import Model
 from design.machine.source import Source
 from identification.arrays import Array
@@ -55,8 +56,6 @@ from identification.model.estimates import KarnoppFit
 from identification.model.plant import Motor, Plant
 from identification.progress import quiet
 from identification.signals.excitation import Multisine, Steps, reference_signal
-from workbench.cards.controller import CardController, CardForceLoop
-from workbench.steps.present import present
 
 POOR, WORSE = 6.0, 10.0  # s of the poor log, and times its noise
 KEPT = 1.5

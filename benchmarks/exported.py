@@ -29,6 +29,7 @@ from design.controllers.design import design
 from design.drive_law import drive_law
 from design.generated.c import c_files
 from design.generated.exported import Exported, Precision, exported
+from design.identified.identify_logs import identify_logs
 from design.machine.design import Design
 from design.machine.model import Model
 from design.machine.source import Source
@@ -46,13 +47,12 @@ from design.program import (
     parts,
 )
 from design.rst import RST
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.cards.card import load_card
 from workbench.export.filled import filled
 from workbench.logs.sources import DATA_VARIABLE, Sources, card_path, read_sources
-from workbench.steps.identify_sources import identify_sources
-from workbench.steps.simulate import record
 
 STEPS = 1_000_000
 DWELL = 2.0  # s between the reference's steps
@@ -113,7 +113,7 @@ def made(cards: Sequence[str]) -> Iterator[Made]:
     """The designs of the cards' training logs; the reason is printed where there is none."""
     for card in cards:
         try:
-            model = identify_sources(sources_of(card)).model
+            model = identify_logs(sources_of(card).logs).model
             yield Made(card, model, design(model))
         except UserError as error:
             print(f"{card}: no design: {error}")

@@ -24,6 +24,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from design.simulated.record import record
 from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.card import Card, load_card
 from workbench.fleet.cluster import local_cluster
@@ -33,7 +34,7 @@ from workbench.fleet.store import ResultStore
 from workbench.fleet.values import Item
 from workbench.logs.sources import card_path
 from workbench.registry.store import Registry
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 CARD = "paper_table1_rich"
 H = 2e-3  # s

@@ -19,12 +19,12 @@ from benchmarks.outside_rig import (
     run,
     sizes_of,
 )
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.log import Log, Rig
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path, find_data
-from workbench.steps.simulate import record
 
 RECIPES = ("demo", "paper_table1_rich", "paper_table2", "paper_table3")
 PNEUMATIC = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=6e5)

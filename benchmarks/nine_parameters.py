@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.simulated.recipe import Recipe
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
@@ -23,9 +25,7 @@ from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Plant
 from identification.simulation.free_run import free_run
 from workbench.cards.card import load_card
-from workbench.cards.recipe import Recipe
 from workbench.logs.sources import card_path
-from workbench.steps.simulate import record
 
 CARDS = ("paper_table1", "paper_table1_rich", "paper_table2", "paper_table3")
 STEP = 1e-7  # relative, of a central difference; exact steps carry it

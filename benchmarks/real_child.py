@@ -22,7 +22,10 @@ from typing import Any
 from benchmarks.real_cases import Case, Prepared, every_case, prepared
 from benchmarks.real_shares import model_run, model_share, window_of
 from benchmarks.yardstick import Fit, Record, fitted, own_share, record, run_errors
+from design.identified.examined import Examined
 from design.identified.identifiable_by_log import identifiability_of_runs
+from design.identified.identify_logs import Identified, identify_logs
+from design.identified.trace_logs import trace_logs
 from design.machine.model import Identifiable, Model
 from identification.effects._library import built_in
 from identification.errors import UserError
@@ -33,10 +36,8 @@ from identification.tracing.result import Trace
 from workbench.cards.card import Card
 from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
-from workbench.steps.doctor import Examined, examine
+from workbench.steps.doctor import examine
 from workbench.steps.first_card.proposal import proposed
-from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.trace import trace_sources
 
 SEED = 0
 SHORT, LONG = 0.2, 2.0  # s, windows of the free run
@@ -184,7 +185,7 @@ def promise(answers: Answers, ready: Prepared, card: Card, part: str) -> None:
         return said_answer(found.identifiability, found.reason)
 
     def kept(asked: Sequence[str]) -> dict[str, Any]:
-        return kept_answer(identify_sources(sources_of(asked, card), seed=SEED))
+        return kept_answer(identify_logs(sources_of(asked, card).logs, seed=SEED))
 
     several = len(every) > 1
     answers.ask("said_alone", said)
@@ -223,14 +224,14 @@ def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
     def identified() -> dict[str, Any]:
         nonlocal sources
         sources = sources_of([str(path) for path in ready.train], card)
-        model = identify_sources(sources, seed=SEED).model
+        model = identify_logs(sources.logs, seed=SEED).model
         return judged_model(case, model, test, fit, read_apart())
 
     def traced() -> dict[str, Any]:
         read = sources or sources_of([str(path) for path in ready.train], card)
         held_out = sources_of([str(path) for path in ready.test], card)
-        found = trace_sources(
-            read, held_out, built_in(), SEED,
+        found = trace_logs(
+            read.logs, held_out.logs, built_in(), SEED,
             keep_going=lambda: time.process_time() < limit - ROOM,
         )  # fmt: skip
         return {

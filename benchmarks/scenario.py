@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from design.simulated.record import record
 from identification.effects._library import built_in
 from identification.log import Log
 from identification.model.karnopp import NAMES, Karnopp
@@ -31,7 +32,7 @@ from workbench.logs.sources import card_path
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import LogOutcome
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 START = datetime(2026, 3, 2, 6, 0, tzinfo=UTC)
 STEP = timedelta(days=3.5)

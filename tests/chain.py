@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 
 from design.controllers.design import design
+from design.identified.identify_logs import Identified, identify_logs
 from design.machine.design import Design
 from design.machine.model import FitSummary, LogEntry, Model
 from design.machine.source import Source
+from design.simulated.recipe import Recipe
+from design.simulated.record import record
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -16,10 +19,7 @@ from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Actuator
 from tests.made import made_once
 from workbench.cards.card import Card, load_card
-from workbench.cards.recipe import Recipe
 from workbench.logs.sources import Sources, card_path
-from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.simulate import record
 
 CARD = """
 [card]
@@ -75,7 +75,7 @@ def identified() -> Identified:
     card, recipe = short_recipe()
     log = record("short", recipe)
     source = Source(log, "short.csv", "0" * 64, len(log))
-    return identify_sources(Sources(card, card.rig(), (source,), ("a remark",)))
+    return identify_logs(Sources(card, card.rig(), (source,), ("a remark",)).logs)
 
 
 def designed(model: Model, *given: Any, **asked: Any) -> Design:

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
+from design.simulated.record import record
 from identification.estimation.fit import fit_plant
 from identification.log import Rig
 from identification.model.karnopp import NAMES, friction
 from identification.model.plant import Plant
 from identification.signals.differentiate import differentiate
+from identification.signals.envelope import evenly_spread
 from identification.simulation.free_run import free_run
 from workbench.cards.card import load_card
 from workbench.logs.sources import card_path
-from workbench.report.chart_figure import BAND, MEASURED, MODEL, evenly_spread, figure, label, style
-from workbench.steps.simulate import record
+from workbench.report.chart_figure import BAND, MEASURED, MODEL, figure, label, style
 
 # Errors printed in the paper's table 1 [%], in the order of NAMES.
 PAPER = (14.8, 12.0, 13.6, 11.7, 5.2, 35.5, 1.7, 10.8, 9.7)

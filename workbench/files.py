@@ -21,9 +21,6 @@ CARD_BYTES = 1_000_000
 RESULT_BYTES = 50_000_000
 """Size above which a file is no model, design or state; a posterior makes the largest, of 1 MB."""
 
-ABSURD = 1e30
-"""In SI, what no machine reaches: products of such values overflow."""
-
 _KINDS = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFCHR: "a device",

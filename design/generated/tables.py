@@ -4,6 +4,7 @@ and which not."""
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,9 @@ from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.plant import Motor
 
+TABLES_SCHEMA = "tables/1"
+FILE_KEYS = {"file": "name", **{key: key for key in (
+    "table", "control", "units", "where", "points", "error", "costs", "remarks")}}  # fmt: skip
 FEED_FORWARD_POINTS = 20  # of the friction curve, each way
 
 
@@ -209,3 +213,33 @@ def _for_controls(
             raise BadModel(refused[0])
         yield from made
         left += refused
+
+
+def costs_of(found: Tables) -> dict[Cost, list[str]]:
+    """Costs with the files that have them, the largest first, those without a size last."""
+    files = dict[Cost, list[str]]()
+    for one in found.files:
+        for cost in one.costs:
+            if cost.force != 0.0:
+                files.setdefault(cost, []).append(one.name)
+    ordered = sorted(files, key=lambda one: -(one.force if one.force is not None else -1.0))
+    return {cost: files[cost] for cost in ordered}
+
+
+def tables_document(what: Compensation, found: Tables) -> dict[str, Any]:
+    """The files with their units, points, error and costs, and what was not written."""
+    unit = what.force_unit
+    return {
+        "schema": TABLES_SCHEMA,
+        "card": what.model.card,
+        "name": what.name,
+        "files": [
+            {
+                **{key: getattr(one, name) for key, name in FILE_KEYS.items()},
+                "control": one.control or None,
+                "costs": [{"what": c.what, "value": c.force, "unit": unit} for c in one.costs],
+            }
+            for one in found.files
+        ],
+        "left_out": found.left_out,
+    }

@@ -40,10 +40,11 @@ def trace_logs(
     train: MachineLogs, test: MachineLogs | None, library: Library, seed: int = 0,
     on_progress: Progress = quiet, *, keep_going: KeepGoing = without_end,
 ) -> Traced:  # fmt: skip
-    """The trace of the machine that the logs are of; keep_going: whether it is to go on.
+    """The trace of the machine that the logs are of, with its present controller; keep_going:
+    whether it is to go on.
 
     Raises BadLog where a test log is a training log, has other units, or no row that could be
-    judged, NotIdentifiable where too little slides.
+    judged, NotIdentifiable where too little slides, BadCard where the controller does not fit.
     """
     seen = test.runs if test else ()
     if train.rig.kind == "motor" and not train.rig.force_per_command:
@@ -82,7 +83,7 @@ def trace_logs(
     )  # fmt: skip
     model = traced_model(found, train, library)
     bad = (*train.bad, *(test.bad if test else ()))
-    model = replace(model, bad_samples=train.bad)
+    model = replace(model, bad_samples=train.bad, controller=train.present(model.period))
     remarks = (*remarks, *unequal_friction(model.friction, model.effects), *model_remarks(model))
     return Traced(found, model, train.runs, seen, remarks, bad)
 

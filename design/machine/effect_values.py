@@ -4,11 +4,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from design.machine.card_table import InUnit
 from design.machine.nearest import nearest
 from design.machine.readable import Conversion, in_unit
 from identification.effects._base import Acting, Effect
 from identification.effects._library import Library, of_key
-from identification.errors import BadModel
+from identification.errors import BadCard, BadModel
 from identification.log import Motion
 from identification.model.estimates import Estimate
 
@@ -97,3 +98,38 @@ def _turned(unit: str) -> str:
     """The unit on a rotary machine."""
     turned = re.sub(r"\bm\b", "rad", unit)
     return re.sub(r"(/?)\bN\b", lambda found: "/(N m)" if found[1] else "N m", turned)
+
+
+def written_effect(
+    key: str,
+    written: Mapping[str, object],
+    library: Library,
+    read: InUnit,
+    motion: Motion = "linear",
+    command: str = "V",
+) -> Acting:
+    """The effect as a card writes it: numbers in SI, or texts with a unit such as "30 mm/s",
+    which `read` takes.
+
+    Raises BadModel, naming key and parameter, where one is unknown, missing, out of its bounds or
+    of another kind.
+    """
+    effect = known_effect(key, library)
+    units = effect_units(effect, motion, command)
+    check_names(key, written, effect)
+    values = dict[str, float]()
+    # Units with an exponent of their own last, when the exponent is known.
+    for name in sorted(written, key=lambda name: "**" in units[name]):
+        value, where = written[name], f"{key}.{name}"
+        unit = with_exponents(units[name], values)
+        try:
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
+                raise BadCard(f"{where} = {value!r}: a number in {unit!r} or a text with its unit")
+            number = read(value, unit, where)
+        except BadCard as error:
+            p = effect.params[effect.names.index(name)]
+            example = f"{p.typical:g}" if p.unit == "1" else f"{p.typical:g} {p.unit}"
+            raise BadModel(f'{error}; write it as "{example}"') from None
+        assert number is not None
+        values[name] = float(number)
+    return effect.acting(values)

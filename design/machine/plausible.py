@@ -21,6 +21,7 @@ from identification.model.estimates import Estimate
 LESS_USUAL = 0.2  # log-odds of a slip of unit against the next in its list
 # Times another log's clock or travel: a slip of 1000, and motions alike in part.
 _OTHER_UNIT = 200.0
+_UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
 
 def model_remarks(model: Model) -> tuple[str, ...]:
@@ -272,3 +273,39 @@ def _only_unit(where: str, written: Estimate, unit: str, why: str) -> str:
         f"{where} {_number(written):.4g} {written.unit} cannot be: {why}; if only the unit was"
         f" changed, write {unit!r} again, else correct the value"
     )
+
+
+def log_size_remarks(
+    logs: Sequence[Log], rig: Rig, units: Mapping[str, str], other: Mapping[str, str]
+) -> tuple[str, ...]:
+    """A line for each signal, and each number of the rig, whose size no machine has, or whose unit
+    is not that of its header.
+
+    units: in which each signal is read, by its name; other: the lines on units that are not those
+    of the headers.
+    """
+    named = {name: f"signals.{name}, read in {unit!r}" for name, unit in units.items()}
+
+    def peak(name: str, logged: str = "") -> float:
+        return max(float(np.max(np.abs(log.signals.get(logged, log[name])))) for log in logs)
+
+    periods = [log.h for log in logs]
+    seen = [("t", "period", h, "sampled every") for h in extremes(periods)]
+    seen += [("y", "travel", max(map(travel_of, logs)), "the position covers")]
+    if "F" in units:
+        seen += [("F", "force", peak("F", "F_logged"), "the force is at most")]
+    pressures = (name for name in ("p_p", "p_n") if name in units)
+    seen += [(name, "pressure", peak(name), "the pressure is at most") for name in pressures]
+    lines = [*other.values()] + [
+        size_remark(quantity, value, rig, named.get(name, f"signals.{name}"), said)
+        for name, quantity, value, said in seen
+        if name not in other
+    ]
+    if rig.control_limit and "u" in units and "u" not in other:
+        most = peak("u")
+        if 0 < most < _UNUSED * rig.control_limit:
+            lines += [
+                f"{named['u']}: the command reaches {most:.3g} of a control_limit_v ="
+                f" {rig.control_limit:g}; check both units"
+            ]
+    return tuple(dict.fromkeys(line for line in (*lines, *rig_remarks(rig)) if line))

@@ -1,9 +1,10 @@
 """A log and the file that it is of, as a result names it; and the logs of one machine."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from design.machine.drive import Present
 from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples
@@ -29,10 +30,16 @@ def fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
+def no_controller(_h: float) -> Present | None:
+    """Of a machine whose present controller is not known."""
+    return None
+
+
 @dataclass(frozen=True)
 class MachineLogs:
     """The runs of one machine: the name of its card, its rig, the runs, what was repaired, what
-    excluded; kept: files that are kept for tests."""
+    excluded; kept: files that are kept for tests; present: the law of the controller that the
+    machine has now, at a period [s], None where it is not known."""
 
     card: str
     rig: Rig
@@ -40,6 +47,7 @@ class MachineLogs:
     remarks: tuple[str, ...] = ()
     bad: tuple[BadSamples, ...] = ()
     kept: tuple[str, ...] = ()
+    present: Callable[[float], Present | None] = field(default=no_controller, compare=False)
 
     @property
     def logs(self) -> list[Log]:

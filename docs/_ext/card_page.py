@@ -10,8 +10,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from sphinx.errors import ExtensionError
 
+from design.machine.card_table import CardTable
 from workbench.cards.card_tables import CardFile
-from workbench.cards.table import CardTable
 
 HEAD = """# The card, key by key
 

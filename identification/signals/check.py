@@ -15,6 +15,8 @@ from identification.signals.jumps import Jumps, jumps
 
 SHORTEST_LOG = 100
 """Samples that a run needs at least; below that no parameter of nine is better than a guess."""
+ABSURD = 1e30
+"""In SI, what no machine reaches: products of such values overflow."""
 
 # Share of the exchanged work below which F is refused. The shipped sets and simulated loops lie
 # above +0.4; sensor delays in motion that springs or inertia rule stay within 0.15.

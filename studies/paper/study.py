@@ -7,6 +7,7 @@ import numpy as np
 
 from design.polynomial import multiply, second_order
 from design.rst import RST, design_rst
+from design.simulated.record import record
 from design.specification import RSTSpecification
 from identification.estimation.fit import fit_plant
 from identification.model.karnopp import NAMES
@@ -18,7 +19,6 @@ from studies.paper.sensitivity import Sensitivity, sensitivity
 from studies.paper.settings import DOMINANT, PRINTED_A, PRINTED_B, TABLE_1_ESTIMATED, friction_of
 from workbench.cards.card import load_card
 from workbench.logs.sources import card_path
-from workbench.steps.simulate import record
 
 ZEROS = ((100.0, 0.1), (200.0, 0.05), (314.0, 0.05))  # (w [rad/s], zeta) of H_R, worked out
 TUNING = 100  # added to the first seed for what is chosen

@@ -20,7 +20,7 @@ MEMORY = 6_000_000_000
 
 HEAVY = (
     "workbench.cli",
-    "workbench.steps.identify_sources",
+    "design.identified.identify_logs",
     "workbench.steps.trace",
     "tests.bad_inputs.cases",
 )

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from design.machine.documents import model_document
+from design.simulated.record import record
 from identification.arrays import Array
 from tests.chain import identified
 from tests.workbench.log_files import WRITERS
 from workbench.cards.card import load_card
 from workbench.cli import main
 from workbench.output import dumps
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 _RECIPE = """
 [recipe]

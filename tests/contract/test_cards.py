@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.simulated.record import record
 from identification.signals.differentiate import differentiate
 from workbench.cards.card import Card, load_card
 from workbench.files import shipped_cards
 from workbench.logs.runs import read_runs
 from workbench.logs.sources import DATA_VARIABLE, card_path, find_data
-from workbench.steps.simulate import record
 
 CARDS = {name: load_card(path) for name, path in shipped_cards().items()}
 DATA = [name for name, card in CARDS.items() if card.files]

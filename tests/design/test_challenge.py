@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from design.challenge import Contender, Contest, Terms, challenge
+from design.simulated.record import record
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of, short_recipe
-from workbench.steps.simulate import record
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 OLD = TABLES["paper_table1"]

@@ -10,12 +10,11 @@ import pytest
 
 from design.asked import Limits
 from design.controllers.validate import validate
-from design.identified.trace_logs import Traced
+from design.identified.trace_logs import Traced, trace_logs
 from identification.effects import spring as spring_module
 from tests.chain import CARD
 from workbench.cli import COMMANDS, main
 from workbench.steps import demo as demonstration
-from workbench.steps.trace import trace_sources
 
 WITHOUT_FILES = (
     "reidentify",
@@ -516,10 +515,10 @@ def test_demo_runs_the_chain(
     traced: list[Traced],
 ) -> None:  # fmt: skip
     def kept(*args: Any) -> Traced:
-        traced.append(trace_sources(*args))
+        traced.append(trace_logs(*args))
         return traced[0]
 
-    monkeypatch.setattr(demonstration, "trace_sources", kept)
+    monkeypatch.setattr(demonstration, "trace_logs", kept)
     found = as_json(capsys, ["demo", "--out", str(tmp_path / "demo")])
     assert found["passed"] is True
     assert found["worst_error"] < 5e-3
@@ -534,12 +533,12 @@ def test_a_demo_that_fails_says_so_by_its_status(
     traced: list[Traced],
 ) -> None:  # fmt: skip
     def found(*args: Any) -> Traced:
-        return traced[0] if traced else trace_sources(*args)
+        return traced[0] if traced else trace_logs(*args)
 
     def strict(*args: Any, **more: Any) -> Any:
         return validate(*args, **more, limits=Limits(standstill=1e-9))
 
-    monkeypatch.setattr(demonstration, "trace_sources", found)  # the same log is not traced twice
+    monkeypatch.setattr(demonstration, "trace_logs", found)  # the same log is not traced twice
     monkeypatch.setattr(demonstration, "validate", strict)
     shown = as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)
     assert shown["passed"] is False

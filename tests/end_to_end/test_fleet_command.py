@@ -7,10 +7,11 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from design.simulated.record import record
 from tests.workbench.fleet.values import card_text
 from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 
 @pytest.fixture

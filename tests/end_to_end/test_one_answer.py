@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.simulated.record import record
 from identification.effects._library import Library, built_in
 from identification.estimation.fit import fit_plant
 from identification.estimation.surroundings import surrounding_estimates
@@ -16,7 +17,6 @@ from identification.tracing.trace import trace
 from tests.reported import broken
 from workbench.cards.card import load_card
 from workbench.logs.sources import card_path, read_sources
-from workbench.steps.simulate import record
 
 LONG = pytest.mark.method
 RECIPES = (

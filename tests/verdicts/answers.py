@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.identified.trace_logs import Traced
+from design.identified.trace_logs import Traced, trace_logs
 from identification.errors import UserError
 from tests.verdicts.entries import Entry, Right, Within, with_amplitudes
 from tests.verdicts.logs import sources
 from workbench.cards.own_effects import library
-from workbench.steps.trace import trace_sources
 
 NOT_NAMED, FALSE_POSITIVE, NOT_IDENTIFIABLE = "not named", "false positive", "not identifiable"
 DIGITS = 4
@@ -55,7 +54,9 @@ def answer(entry: Entry, data: Path | None, folder: Path) -> Answer:
     evaluations, begun = EvaluationLimit(entry.evaluations), time.process_time()
     try:
         train, test = sources(entry, data, folder)
-        traced = trace_sources(train, test, library(), keep_going=evaluations)
+        traced = trace_logs(
+            train.logs, test.logs if test else None, library(), keep_going=evaluations
+        )
     except UserError as error:
         seconds = time.process_time() - begun
         return Answer("refused", {}, {}, (), False, False, evaluations.count, seconds, str(error))

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 
 from design.machine.source import Source
+from design.simulated.record import record
 from identification.arrays import Array
 from tests.verdicts.entries import Entry, Tables, merged
 from tests.verdicts.rough_machine import Rough, columns
 from workbench.cards.card import Card, card_from, load_card
 from workbench.logs.sources import Sources, card_path, sources_of
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 
 class Absent(Exception):

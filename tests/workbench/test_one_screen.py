@@ -18,6 +18,7 @@ from design.closed_loop.loop_figures import COMPENSATED, PRESENT, LoopFigures
 from design.closed_loop.loop_motion import LimitCycle
 from design.controllers.validate import Validation
 from design.experiment.planned import Experiment, Promised, Safety
+from design.judgement import Candidate
 from design.machine.design import Recommendation
 from design.machine.model import Model
 from design.measured.drift_of_logs import Drifted
@@ -41,7 +42,7 @@ from workbench import cli
 from workbench.commands.fleet import fleet_screen
 from workbench.commands.reidentify import pass_screen
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, LogOutcome, SeenLog
+from workbench.registry.values import LogOutcome, SeenLog
 from workbench.report.doctor import installation_screen
 from workbench.report.first_card import proposal_screen
 from workbench.report.trace_words import words
@@ -247,10 +248,10 @@ def axis_test() -> Iterator[Screen]:
     """Every number beyond its limits, of a log of many runs."""
     from design.machine.source import Source
     from design.measured.axis_limits import MEANING_OF
+    from design.simulated.record import record
     from tests.chain import short_recipe
     from workbench.logs.sources import Sources
     from workbench.steps.axis_test import axis_test_of_sources
-    from workbench.steps.simulate import record
 
     card, recipe = short_recipe()
     log = record("short", recipe, 7)

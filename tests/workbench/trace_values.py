@@ -8,6 +8,7 @@ import numpy as np
 
 from design.identified.trace_logs import Traced, traced_model
 from design.machine.source import Source
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.estimates import of_effect
@@ -28,7 +29,6 @@ from identification.tracing.result import (
 )
 from tests.chain import TABLES, short_recipe
 from workbench.logs.sources import Sources
-from workbench.steps.simulate import record
 
 ROWS = 400
 NINE = TABLES["paper_table1"]
@@ -139,7 +139,7 @@ def trace_of(
 
 
 def traced(found: Trace, *, rotary: bool = False, tested: bool = True) -> Traced:
-    """The trace with model and runs, as `trace_sources` gives it."""
+    """The trace with model and runs, as `trace_logs` gives it."""
     train = sources()
     if rotary:
         train = replace(train, rig=replace(train.rig, motion="rotary"))

@@ -8,22 +8,26 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from pydantic import ValidationError
 
+from design.machine.card_table import InUnit
+from design.machine.controller import CardController, present
+from design.machine.drive import Present
+from design.machine.effect_values import written_effect
 from design.machine.nearest import nearest
-from identification.effects._library import Library
-from identification.errors import BadCard, BadModel
+from design.machine.table_keys import keys_at
+from design.simulated.recipe import Recipe, RecipeSection
+from identification.effects._library import Library, built_in
+from identification.errors import BadCard, BadModel, BadSpecification
 from identification.log import Rig
 from workbench.cards.card_tables import About, CardFile, FileEntry, FileSpec, RigSection, SignalSpec
-from workbench.cards.controller import CardController
-from workbench.cards.recipe import Recipe
-from workbench.cards.table_keys import keys_at
-from workbench.cards.units import si_unit
+from workbench.cards.units import in_unit_of, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
 NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
@@ -35,6 +39,14 @@ NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
 OFFERED_FOR_VELOCITY = "doctor, identify, trace, predict, design and validate"
 
 Value = TypeVar("Value")
+Made = TypeVar("Made", covariant=True)
+
+
+class InUnits(Protocol[Made]):
+    """A table that is given what reads a text with its unit."""
+
+    def value(self, rig: Rig, in_unit: InUnit, /) -> Made: ...
+
 
 _OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
 
@@ -105,7 +117,7 @@ def card_from(
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
         wanted = parsed.recipe if with_recipe else None
         rig = rigs[""]
-        recipe = wanted.value(library, rig.motion, rig.command_unit) if wanted else None
+        recipe = _recipe(wanted, library, rig) if wanted else None
     except ValidationError as error:
         raise BadCard(f"{path}: {explain(error)}") from None
     except BadModel as error:
@@ -126,9 +138,39 @@ def card_from(
         split=MappingProxyType(parsed.split),
         recipe=recipe,
         rigs=MappingProxyType(rigs),
-        controller=_of(path, parsed.controller.value, rig) if parsed.controller else None,
-        limits=MappingProxyType(_of(path, parsed.limits.value, rig) if parsed.limits else {}),
+        controller=_in_si(path, parsed.controller, rig) if parsed.controller else None,
+        limits=MappingProxyType(_in_si(path, parsed.limits, rig) if parsed.limits else {}),
     )
+
+
+def present_of_card(card: Card, rig: Rig, h: float) -> Present | None:
+    """What model.json holds of the card's controller; h [s]: period of the logs.
+
+    None where the card names none. Raises BadCard where it is none, or does not fit the rig.
+    """
+    if card.controller is None:
+        return None
+    try:
+        return present(card.controller, rig, h)
+    except (BadCard, BadSpecification) as error:
+        raise BadCard(f"{card.path}: controller: {error}") from None
+
+
+def _recipe(section: RecipeSection, library: Library | None, rig: Rig) -> Recipe:
+    """The recipe, with the effects of the library, by default all but a user's own files."""
+    if section.effects and not library:
+        from workbench.cards import own_effects  # with it comes numba
+
+        library = own_effects.library()
+    known, motion, command = library or built_in(), rig.motion, rig.command_unit
+    return section.value(
+        partial(written_effect, library=known, read=in_unit_of, motion=motion, command=command)
+    )
+
+
+def _in_si(path: Path, table: InUnits[Value], rig: Rig) -> Value:
+    """The value of a table whose numbers may be texts with a unit; raises as `_of`."""
+    return _of(path, table.value, rig, in_unit_of)
 
 
 def _of(path: Path, value: Callable[..., Value], *given: Any) -> Value:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from design.machine.plausible import log_size_remarks
 from identification.columns.header import (
     SAYS_WHAT_IT_IS,
     Header,
@@ -22,7 +23,7 @@ from identification.columns.header import (
     words_of,
 )
 from identification.errors import BadCard
-from identification.log import Rig
+from identification.log import Log, Rig
 from workbench.cards.card_tables import SignalSpec
 from workbench.cards.units import scale_or_none
 from workbench.cards.written_units import LOG_WORDS, written_unit
@@ -250,6 +251,15 @@ def contradicted_units(signals: Mapping[str, SignalSpec], rig: Rig) -> dict[str,
     """
     found = {name: _contradicted(name, spec, rig) for name, spec in signals.items()}
     return {name: line for name, line in found.items() if line}
+
+
+def log_remarks(
+    logs: Sequence[Log], rig: Rig, signals: Mapping[str, SignalSpec]
+) -> tuple[str, ...]:
+    """What is said of the logs' sizes and units, by how the card reads their signals: a remark
+    changes nothing, it names what to look at."""
+    units = {name: spec.unit for name, spec in signals.items()}
+    return log_size_remarks(logs, rig, units, contradicted_units(signals, rig))
 
 
 def _contradicted(name: str, spec: SignalSpec, rig: Rig) -> str:

@@ -12,7 +12,7 @@ from workbench.output import emit, progress, results, step
 from workbench.signature import argument, option
 
 if TYPE_CHECKING:
-    from workbench.steps.doctor import Examined
+    from design.identified.examined import Examined
 
 
 @options.command(
@@ -52,11 +52,12 @@ def command(
 
 
 def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
+    from design.identified.examined import doctor_document
     from workbench.cards.card import load_card
     from workbench.logs.sources import card_path, find_data
     from workbench.report.doctor import doctor_picture, doctor_screen
     from workbench.report.next_steps import after_doctor
-    from workbench.steps.doctor import doctor_document, examine
+    from workbench.steps.doctor import examine
 
     card = load_card(card_path(card_name), with_recipe=False)
     path = find_data(name, card)

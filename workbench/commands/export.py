@@ -167,10 +167,10 @@ def _is_of_model(file: Path, targets: tuple[str, ...]) -> bool:
 
 def _tables(given: ExportOptions) -> int:
     from design.generated.compensation import Compensation
-    from design.generated.tables import tables
+    from design.generated.tables import tables, tables_document
     from workbench.documents.result_files import read_model
     from workbench.export.filled import filled
-    from workbench.export.table_targets import tables_asked, tables_document, tables_screen
+    from workbench.export.table_targets import tables_asked, tables_screen
 
     model = read_model(given.file)
     asked = tables_asked(
@@ -182,7 +182,7 @@ def _tables(given: ExportOptions) -> int:
         for one in found.files:
             folder.write(one.name, one.text)
     end = folder.final
-    emit(tables_document(what, found, end), lambda: tables_screen(what, found, end))
+    emit({**tables_document(what, found), "out": end}, lambda: tables_screen(what, found, end))
     return 0
 
 

@@ -92,7 +92,7 @@ def diff(
 
     FIRST: by default the version before SECOND; SECOND: by default the active one.
     """
-    from workbench.registry.difference import difference
+    from design.machine.difference import difference
     from workbench.registry.values import BadRegistry
     from workbench.registry.views import difference_screen
 
@@ -130,10 +130,10 @@ def add(
     The active version stays active unless --promote is given. The same files again are the same
     version.
     """
+    from design.judgement import Candidate
     from workbench.cards.own_effects import library
     from workbench.documents.reading import read_document, read_raw
     from workbench.documents.result_files import read_design, read_model
-    from workbench.registry.values import Candidate
 
     remarks = list(read_model(model_file, library(effects)).read)
     if design_file is not None:

@@ -54,8 +54,8 @@ def command(given: JobOptions) -> int:
 
 def after_pass(done: "PassReport", where: str | None) -> Step | None:
     """Check the first machine with an alarm."""
+    from design.judgement import ALARMING
     from workbench.addresses import shown
-    from workbench.registry.values import ALARMING
 
     alarmed = [one for one in done.outcomes if one.verdict in ALARMING]
     if not alarmed:

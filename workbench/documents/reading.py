@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from design.machine.codec import OF_OURS, PLACEHOLDER, UNKNOWN_KEY
-from design.machine.nearest import nearest
+from design.machine.validated import brief, validated
 from identification.errors import BadModel
+from identification.signals.check import ABSURD
 from workbench.cards.card import OFFERED_FOR_VELOCITY
-from workbench.cards.table_keys import keys_at
-from workbench.files import ABSURD, RESULT_BYTES, broken_link, refuse_larger, refuse_special
+from workbench.files import RESULT_BYTES, broken_link, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
 MOST_DIGITS = 30  # of a whole number in a result
@@ -32,7 +31,7 @@ class Stored:
 
 def read_result(path: Path, kind: type[Value], schema: str) -> Value:
     """The result of dataclass `kind` in the JSON file; raises as `read_raw` and `validated`."""
-    return validated(read_raw(path, schema), path, kind)
+    return validated(read_raw(path, schema), str(path), kind)
 
 
 def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
@@ -46,39 +45,16 @@ def read_raw(path: Path | Stored, schema: str) -> Mapping[str, Any]:
             f'{path}: of a rig of kind = "velocity", for which this is not offered; there are'
             f" {OFFERED_FOR_VELOCITY}"
         )
-    said = "no 'schema'" if found is None else f"schema {_shown(found)}"
+    said = "no 'schema'" if found is None else f"schema {brief(found)}"
     kind = re.sub("[-_]", " ", schema.partition("/")[0])
     raise BadModel(f"{path}: {said}, {schema!r} needed; give the {kind} that this version writes")
-
-
-def validated(
-    raw: Mapping[str, Any], path: Path | Stored, kind: type[Value], around: Any = None
-) -> Value:
-    """The value that a JSON object holds; around: what units of its numbers hang on.
-
-    Raises BadModel, one line: file, key, what was found and needed; an unknown key comes with the
-    nearest right one.
-    """
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        return TypeAdapter(kind).validate_json(
-            json.dumps(raw), strict=True, extra="forbid", context=around
-        )
-    except ValidationError as error:
-        every = [dict(one) for one in error.errors(include_url=False)]
-        # What is no such file at all comes before a number that is refused.
-        first = min(every, key=lambda one: (one["type"] != UNKNOWN_KEY, one["type"] == OF_OURS))
-        raise BadModel(f"{path}: {_explained(first, kind)}") from None
-    except BadModel as error:
-        raise BadModel(f"{path}: {error}") from None
 
 
 def read_document(path: Path | Stored) -> dict[str, Any]:
     """The JSON object in the file, or stored, unchecked; raises BadModel in one line."""
     raw = _read_json(path)
     if not isinstance(raw, dict):
-        raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a result's file")
+        raise BadModel(f"{path}: holds {brief(raw)}, a JSON object needed; give a result's file")
     return raw
 
 
@@ -134,21 +110,3 @@ def _whole(text: str) -> int:
     if len(text) > MOST_DIGITS:
         raise ValueError(f"holds {text[:MOST_DIGITS]}..., which no machine reaches; correct it")
     return int(text)
-
-
-def _explained(first: Mapping[str, Any], kind: Any) -> str:
-    loc = [str(part) for part in first["loc"]]
-    table = f"[{'.'.join(loc[:-1])}] " if loc[:-1] else ""
-    if first["type"] == OF_OURS:
-        return str(first["msg"]).replace(PLACEHOLDER, ".".join(loc))
-    if first["type"] == UNKNOWN_KEY:
-        return f"{table}unknown key {loc[-1]!r}{nearest(loc[-1], keys_at(kind, first['loc'][:-1]))}"
-    if first["type"] in ("missing", "missing_argument"):
-        return f"{table}has no {loc[-1]!r}; add it, or run the command again"
-    where = f"[{'.'.join(loc)}] " if loc else ""
-    message = " ".join(str(first["msg"]).removeprefix("Value error, ").split())
-    return f"{where}{_shown(first.get('input'))}: {message[:1].lower()}{message[1:]}"
-
-
-def _shown(value: object) -> str:
-    return " ".join(repr(value).split())[:60]

@@ -4,12 +4,11 @@ terminal and as a document."""
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from design.generated.compensation import Compensation, Cost, Encoder, TablesAsked
-from design.generated.tables import Tables
+from design.generated.compensation import Compensation, Encoder, TablesAsked
+from design.generated.tables import Tables, costs_of
 from design.machine.readable import number
 from identification.errors import BadModel
 from workbench.cards.units import in_unit_of
@@ -17,29 +16,6 @@ from workbench.output import written
 from workbench.screen import Screen, instead, listed, more, screen, tabled
 
 FILES_HEAD = ("file", "units", "points", "off the model by")
-TABLES_SCHEMA = "tables/1"
-FILE_KEYS = {"file": "name", **{key: key for key in (
-    "table", "control", "units", "where", "points", "error", "costs", "remarks")}}  # fmt: skip
-
-
-def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str, Any]:
-    """The files with their units, points, error and costs, and what was not written."""
-    unit = what.force_unit
-    return {
-        "schema": TABLES_SCHEMA,
-        "card": what.model.card,
-        "name": what.name,
-        "files": [
-            {
-                **{key: getattr(one, name) for key, name in FILE_KEYS.items()},
-                "control": one.control or None,
-                "costs": [{"what": c.what, "value": c.force, "unit": unit} for c in one.costs],
-            }
-            for one in found.files
-        ],
-        "left_out": found.left_out,
-        "out": folder,
-    }
 
 
 def tables_screen(what: Compensation, found: Tables, folder: Path) -> Screen:
@@ -85,13 +61,7 @@ def _sentence(what: Compensation, found: Tables) -> str:
 
 def _left_out(what: Compensation, found: Tables) -> Iterator[str]:
     """Costs with the files that have them, the largest first, those without a size last."""
-    files = dict[Cost, list[str]]()
-    for one in found.files:
-        for cost in one.costs:
-            if cost.force != 0.0:
-                files.setdefault(cost, []).append(one.name)
-    for cost in sorted(files, key=lambda one: -(one.force if one.force is not None else -1.0)):
-        names = files[cost]
+    for cost, names in costs_of(found).items():
         whose = names[0] if len(names) == 1 else f"{len(names)} of the files"
         yield f"not in {whose}: {cost.in_words(what.force_unit)}"
 

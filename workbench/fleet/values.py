@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from design.judgement import Candidate, Judgement
+from design.judgement import LogVerdict as Judged
 from identification.errors import UserError
-from workbench.registry.values import Candidate, Judgement, Version
-from workbench.registry.values import LogVerdict as Judged
+from workbench.registry.values import Version
 
 FleetVerdict = Literal[
     "identified", "inadequate",  # without an active model

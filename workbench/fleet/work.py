@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from design.identified.identify_logs import identify_logs
+from design.judgement import Candidate
 from design.machine.documents import model_document
 from design.machine.versions import versions
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
@@ -17,8 +19,7 @@ from workbench.fleet.values import BadLogs, Item, Result
 from workbench.jobs.judge import Chain
 from workbench.jobs.passes import Task
 from workbench.logs.sources import read_sources
-from workbench.registry.values import Candidate, SeenLog
-from workbench.steps.identify_sources import identify_sources
+from workbench.registry.values import SeenLog
 
 KIB = 1024
 
@@ -67,7 +68,7 @@ def _result(item: Item, path: Path, card: Path) -> Result:
 
 def _identified(item: Item, path: Path, card: Path, blank: Result) -> Result:
     """The first model of a machine."""
-    found = identify_sources(read_sources([str(path)], str(card)), seed=item.seed)
+    found = identify_logs(read_sources([str(path)], str(card)).logs, seed=item.seed)
     document = model_document(found.model)
     out = replace(blank, model=document, made=Candidate(document))
     if found.model.fit.adequate:

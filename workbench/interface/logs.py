@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from design.identified.identify_logs import identify_logs
 from design.machine.model import Model
 from design.measured.axis_test import AxisTest
 from design.measured.drift_of_logs import Drifted, drift_of
 from design.measured.predicted_logs import Predicted, predict_logs
 from design.measured.response import Curve, Responded, curve_of, respond
+from design.simulated.record import record, truth
 from identification.errors import BadCard, NotIdentifiable
 from identification.log import Log
-from workbench.cards.card import Card, load_card
+from workbench.cards.card import Card, load_card, present_of_card
 from workbench.course import running, working
 from workbench.interface.inputs import (
     CardLike,
@@ -36,11 +38,9 @@ from workbench.report.templating import render
 from workbench.steps.asked import IDENTIFY_STAGES
 from workbench.steps.axis_test import axis_test_of_sources
 from workbench.steps.drift import model_key, read_stream, write_stream
-from workbench.steps.identify_sources import identify_sources
 from workbench.steps.predict import prediction_frame
-from workbench.steps.present import present_of_card
 from workbench.steps.response import response_frame
-from workbench.steps.simulate import as_columns, record, truth
+from workbench.steps.simulate import as_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -191,8 +191,8 @@ def responded(
     if known is None and left_in is None:
         with running("identifying", IDENTIFY_STAGES, budget) as course:
             try:
-                known = identify_sources(
-                    of, seed=seed, on_progress=course.report, keep_going=course.keep_going
+                known = identify_logs(
+                    of.logs, seed=seed, on_progress=course.report, keep_going=course.keep_going
                 ).model
             except NotIdentifiable as error:
                 left_in = f"not identifiable from the logs ({error})"

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from design.asked import Options
-from design.identified.trace_logs import Traced
+from design.identified.identify_logs import Identified, identify_logs
+from design.identified.trace_logs import Traced, trace_logs
 from design.machine.model import Model
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
@@ -36,8 +37,7 @@ from workbench.interface.inputs import (
 from workbench.output import MissingLibrary, OutputFolder, dumps
 from workbench.report.view import View, view
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
-from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.trace import named_logs, trace_sources
+from workbench.steps.trace import named_logs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -210,8 +210,8 @@ def identify(
     begun = time.monotonic()
     found = sources(logs, card, rig, signals)
     with running("identifying", IDENTIFY_STAGES, left_of(budget, begun)) as course:
-        known = identify_sources(
-            found, options, seed, posterior=posterior, on_progress=course.report,
+        known = identify_logs(
+            found.logs, options, seed, posterior=posterior, on_progress=course.report,
             keep_going=course.keep_going,
         )  # fmt: skip
     return IdentifyResult(found.card, known)
@@ -240,8 +240,9 @@ def trace(
     seen = None if test is None else sources(test, learnt.card, None, None)
     left = left_of(math.inf if budget is None else budget, begun)
     with running("trace", TRACE_STAGES, left) as course:
-        found = trace_sources(
-            learnt, seen, known, seed, course.report, keep_going=course.keep_going
+        held = None if seen is None else seen.logs
+        found = trace_logs(
+            learnt.logs, held, known, seed, course.report, keep_going=course.keep_going
         )
     return TraceResult(learnt.card, found)
 

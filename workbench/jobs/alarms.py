@@ -17,10 +17,11 @@ from urllib.parse import quote
 import httpx
 from tenacity import Retrying, retry_if_exception_type, stop_after_attempt, wait_random_exponential
 
+from design.judgement import ALARMING
 from identification.errors import UserError
 from workbench.jobs.passes import Clock, Report
 from workbench.registry.outbox import Outbox
-from workbench.registry.values import ALARMING, Alarm
+from workbench.registry.values import Alarm
 from workbench.verdicts import counted
 
 GIVEN_UP_AFTER = timedelta(days=1)  # an alarm older than this is given up

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from design.measured import axis_lights
+from design.measured.axis_lights import LAST_ON_PAGE, few_sound_logs, history, left_out
 from design.measured.axis_limits import FEWEST_EARLIER, MEANING_OF
 from design.measured.axis_test import Earlier
 from identification.drift.readings import Reading
@@ -13,15 +15,7 @@ from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_model
 from workbench.jobs.judge import drift_by_chart
 from workbench.logs.sources import Sources
-from workbench.registry import results
-from workbench.registry.results import (
-    LAST_ON_PAGE,
-    TestedLog,
-    few_sound_logs,
-    history,
-    last_logs,
-    left_out,
-)
+from workbench.registry.results import TestedLog, last_logs
 from workbench.registry.store import Registry
 
 LAST_LOGS_READ = 120  # of a machine's last logs, among which those are that identify its parameters
@@ -67,7 +61,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
             f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
-        found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
+        found = drift_by_chart(model, sources.logs, np.random.default_rng(seed), {})
         nine = {name: one for name, one in model.friction.items() if name in MEANING_OF}
         unidentified = {n: Estimate(None, e.unit, reason=found.reason) for n, e in nine.items()}
         estimates = unidentified | by_quantity(found.parameters)
@@ -81,7 +75,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
 
 def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
     """This log's parameters as the drift test has them, by quantity."""
-    found = results.by_quantity(vars(one) for one in readings)
+    found = axis_lights.by_quantity(vars(one) for one in readings)
     return {
         name: Estimate(value, unit, None, low, high)
         for name, (unit, value, low, high) in found.items()

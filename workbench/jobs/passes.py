@@ -17,21 +17,14 @@ from typing import Any, ParamSpec, TypeVar
 
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
 
+from design.judgement import Judgement
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.options import JobOptions, is_gone
 from workbench.jobs.scan import BadRoot, MachineFolder, Scan, machine_folders, scan, unchanged
 from workbench.registry.database import Database
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import (
-    Claim,
-    Judgement,
-    LogOutcome,
-    LostClaim,
-    RegistryAway,
-    SeenLog,
-    Version,
-)
+from workbench.registry.values import Claim, LogOutcome, LostClaim, RegistryAway, SeenLog, Version
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -15,6 +15,7 @@ from identification.arrays import Array, frozen
 from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.bad_samples import BadSamples
+from identification.signals.check import ABSURD
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.signals.one_clock import on_one_clock
 from identification.signals.renewal import renewed, zoh_remarks
@@ -29,7 +30,6 @@ from identification.signals.summed import summed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
-from workbench.files import ABSURD
 from workbench.logs.table import Table, number_of, text_of
 from workbench.logs.tables import read_table
 from workbench.logs.times import numbers_in, seconds

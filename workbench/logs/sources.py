@@ -5,6 +5,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from design.machine.nearest import nearest
@@ -12,9 +13,9 @@ from design.machine.source import MachineLogs, Source
 from identification.errors import BadCard, BadLog
 from identification.log import Rig
 from identification.signals.bad_samples import BadSamples
-from workbench.cards.card import Card, load_card
+from workbench.cards.card import Card, load_card, present_of_card
 from workbench.cards.card_tables import FileEntry
-from workbench.documents.log_remarks import log_remarks
+from workbench.cards.headers import log_remarks
 from workbench.files import CARD_FILE, broken_link, refuse_special, sha256_of, shipped_cards
 from workbench.logs.runs import read_runs, runs_of, shown_name
 from workbench.logs.table import Table
@@ -34,7 +35,10 @@ class Sources:
     def logs(self) -> MachineLogs:
         """The same but for the card, of which they have the name and the logs kept for tests."""
         kept = tuple(self.card.split.get("test", ()))
-        return MachineLogs(self.card.name, self.rig, self.runs, self.remarks, self.bad, kept)
+        present = partial(present_of_card, self.card, self.rig)
+        return MachineLogs(
+            self.card.name, self.rig, self.runs, self.remarks, self.bad, kept, present
+        )
 
 
 @dataclass(frozen=True)

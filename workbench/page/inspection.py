@@ -86,7 +86,8 @@ def refuse_no_log(path: Path) -> None:
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
     """Every column of the file over its clock, as HTML, and how many rows it has."""
-    from workbench.report.chart import Chart, Line, Panel, chart_html, thinned_together
+    from identification.signals.envelope import thinned_together
+    from workbench.report.chart import Chart, Line, Panel, chart_html
 
     found = _unknown(path)
     rows = max(len(one.values) for one in found.columns)

@@ -14,7 +14,10 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Route
 
+from design.judgement import ALARMING
+from design.machine.difference import as_read, difference
 from design.machine.readable import shown_unit
+from design.measured.axis_lights import newest_lights
 from identification.arrays import Array
 from identification.errors import UserError
 from workbench.jobs.options import clock
@@ -24,10 +27,9 @@ from workbench.page.inspection import EXPORTS
 from workbench.page.visitors import cached, changing, reading
 from workbench.page.work import report_response
 from workbench.registry.access import Access
-from workbench.registry.difference import as_read, difference
 from workbench.registry.overview import FLEET_ORDERS, INTERVAL_DEVIATIONS, FleetAsked, fleet_page
-from workbench.registry.results import TestedLog, condition, last_logs, newest_lights
-from workbench.registry.values import ALARMING, Kind, Version
+from workbench.registry.results import TestedLog, condition, last_logs
+from workbench.registry.values import Kind, Version
 from workbench.report.chart import Area, Chart, Line, Panel, chart_html
 
 LAST_LOGS, MORE_LOGS = 60, 1000

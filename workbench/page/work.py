@@ -13,13 +13,14 @@ from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
+from design.judgement import Candidate
 from workbench.files import REPORT_FILE
 from workbench.jobs.options import clock
 from workbench.page.asked import Asked, part
 from workbench.page.dropped import CHARTS_FILE, RESULT_FILE, refuse_machine, store_files
 from workbench.page.visitors import changing, reading
 from workbench.registry.tables import TaskRow
-from workbench.registry.values import Candidate, TaskKind
+from workbench.registry.values import TaskKind
 
 GIVEN_OUT = ("model.json", "trace.json", "design.json", "validation.json")
 NO_SOURCE = "'none'"

@@ -21,6 +21,8 @@ import numpy as np
 
 from design.controllers.design import design
 from design.controllers.validate import validate, validation_document
+from design.identified.identify_logs import identify_logs
+from design.identified.trace_logs import trace_logs
 from design.machine.documents import design_document
 from design.machine.model import Model
 from identification.errors import BadModel, BadSpecification, NotIdentifiable, UserError
@@ -46,8 +48,6 @@ from workbench.report.model_tables import (
 from workbench.report.trace import errors_table, logs_of_trace
 from workbench.report.view import View, report_notes, view
 from workbench.steps.asked import IDENTIFY_STAGES, TRACE_STAGES
-from workbench.steps.identify_sources import identify_sources
-from workbench.steps.trace import trace_sources
 
 MODEL_SHARE = 0.9  # of the bar, for the model; the rest for its design
 LAST_STAGES = {"designing": (MODEL_SHARE, 0.95), "validating": (0.95, 1.0)}
@@ -106,14 +106,14 @@ Made = tuple[Model, View, Mapping[str, object]]
 
 
 def _identified(sources: Sources, course: Course) -> Made:
-    found = identify_sources(sources, on_progress=course.report)
+    found = identify_logs(sources.logs, on_progress=course.report)
     model = found.model
     said = (*fit_lines(model), *plant_lines(model), *found.remarks)
     return model, view(found), {"notes": _notes(said, logs_of(model)), "errors": None}
 
 
 def _traced(sources: Sources, course: Course) -> Made:
-    found = trace_sources(sources, None, library(()), 0, course.report)
+    found = trace_logs(sources.logs, None, library(()), 0, course.report)
     errors = errors_table(found.trace, found.model.rotary, tested=False)
     result = {
         "notes": _notes((*found.remarks, *found.trace.remarks), logs_of_trace(found)),

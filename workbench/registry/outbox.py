@@ -7,10 +7,11 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Select, and_, case, delete, func, literal, select
 
+from design.judgement import LogVerdict
 from workbench.registry.database import Database, changed, insert_missing
 from workbench.registry.rows import lock_machine
 from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
-from workbench.registry.values import Alarm, LogVerdict
+from workbench.registry.values import Alarm
 
 FIRST_DELAY = timedelta(minutes=1)  # after an alarm's first refusal; each further one doubles it
 LONGEST_DELAY = timedelta(hours=4)

@@ -14,6 +14,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, and_, delete, func, select
 from sqlalchemy.orm import Session
 
+from design.judgement import Candidate, Document, Judgement
 from workbench.registry import rows
 from workbench.registry.database import Database, changed
 from workbench.registry.overview import summary_tested
@@ -28,11 +29,8 @@ from workbench.registry.tables import (
 )
 from workbench.registry.values import (
     BadRegistry,
-    Candidate,
     Claim,
     DecisionKind,
-    Document,
-    Judgement,
     LogOutcome,
     LostClaim,
     Order,

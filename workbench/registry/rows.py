@@ -8,6 +8,7 @@ from typing import get_args
 from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
+from design.judgement import Candidate, Document
 from design.machine.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.database import insert_missing
@@ -27,10 +28,8 @@ from workbench.registry.tables import (
 from workbench.registry.values import (
     MOVES,
     BadRegistry,
-    Candidate,
     Decision,
     DecisionKind,
-    Document,
     Kind,
     SeenLog,
     Version,

@@ -9,6 +9,7 @@ from typing import Any, get_args
 from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
+from design.judgement import Candidate
 from workbench.registry import rows
 from workbench.registry.database import Database
 from workbench.registry.tables import (
@@ -20,15 +21,7 @@ from workbench.registry.tables import (
     RecordRow,
     VersionRow,
 )
-from workbench.registry.values import (
-    MOVES,
-    BadRegistry,
-    Candidate,
-    Decision,
-    Kind,
-    MachineState,
-    Version,
-)
+from workbench.registry.values import MOVES, BadRegistry, Decision, Kind, MachineState, Version
 
 _NAME = re.compile(r"[^/\\\x00-\x1f\x7f]+")
 

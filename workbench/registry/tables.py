@@ -25,9 +25,9 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
 
+from design.judgement import Document, LogVerdict
 from workbench.output import dumps
 from workbench.registry import values
-from workbench.registry.values import Document
 
 APPEND_ONLY = ("machine", "log", "record", "version", "decision", "attempt", "outcome", "notice",
                "reopening")  # fmt: skip
@@ -88,7 +88,7 @@ class JsonText(TypeDecorator[Any]):
 
 
 WORDS: tuple[Any, ...] = (
-    values.DecisionKind, values.Kind, values.LogVerdict, values.MachineCondition, values.Role,
+    values.DecisionKind, values.Kind, LogVerdict, values.MachineCondition, values.Role,
     values.TaskKind, values.TaskState,
 )  # fmt: skip
 COLUMN_TYPES: dict[Any, Any] = {
@@ -237,12 +237,12 @@ class OutcomeRow(Base):
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     version_id: Mapped[int | None] = mapped_column(ForeignKey("version.id"))
-    verdict: Mapped[values.LogVerdict]
+    verdict: Mapped[LogVerdict]
     reason: Mapped[str]
     evidence: Mapped[Document]
     token: Mapped[str]
     at: Mapped[datetime]
-    __table_args__ = (one_of("verdict", values.LogVerdict),)
+    __table_args__ = (one_of("verdict", LogVerdict),)
 
 
 class NoticeRow(Base):

@@ -2,28 +2,26 @@
 wrong with a registry."""
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from datetime import datetime
 from pathlib import PurePath
 from typing import Any, Literal, TypeVar
 
+from design.judgement import Document, LogVerdict
 from identification.errors import UserError
 
 Value = TypeVar("Value")
 
-Document = Mapping[str, Any]
 Kind = Literal["model", "design", "validation"]
 DecisionKind = Literal["added", "promoted", "rolled_back", "refused"]
 MOVES: tuple[DecisionKind, ...] = ("promoted", "rolled_back")  # what moves the pointer
-LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
 Role = Literal["read", "change"]
 TaskKind = Literal["identify", "trace"]
 TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
 MachineCondition = Literal[
     "in_tune", "drifting", "structure", "log_bad", "not_judged", "no_log", "silent"
 ]
-ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
 
 
 def of_row(kind: type[Value], row: object, **more: Any) -> Value:
@@ -122,29 +120,6 @@ class Alarm:
     reason: str
     version: int | None
     at: datetime
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A model with its design and validation, as documents, that a log has led to."""
-
-    model: Document
-    design: Document | None = None
-    validation: Document | None = None
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What a worker makes of one log; a candidate is activated where it is "promoted".
-
-    rival: one that was made too and is refused, with its reason.
-    """
-
-    verdict: LogVerdict
-    reason: str
-    candidate: Candidate | None = None
-    evidence: Document = field(default_factory=dict)
-    rival: tuple[Candidate, str] | None = None
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from datetime import datetime
 
+from design.judgement import ALARMING
+from design.machine.difference import Line, Number, as_read
 from design.machine.readable import in_digits, number
 from identification.model.estimates import NORMAL_95
-from workbench.registry.difference import Line, Number, as_read
-from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState, Version
+from workbench.registry.values import Decision, LogOutcome, MachineState, Version
 from workbench.screen import Part, Screen, screen, tabled
 from workbench.verdicts import counted, in_words
 

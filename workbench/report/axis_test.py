@@ -3,13 +3,13 @@
 import numpy as np
 
 from design.machine.readable import in_digits, number, shown_unit, units_of
+from design.measured.axis_document import axis_document
 from design.measured.axis_test import AxisTest, Quantity
 from identification.estimation.estimates import counted
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.templating import render
 from workbench.report.view import Section, View, view
 from workbench.screen import Row, listed, tabled
-from workbench.steps.axis_test import axis_document
 
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
 LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}

@@ -6,7 +6,7 @@ once: uPlot, the script that draws, and their style, to be inlined or served as 
 
 import base64
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from identification.arrays import Array
+from identification.signals.envelope import thinned_together
 from workbench.report.templating import render, safe
 
 Colour = Literal["measured", "model", "reference", "other", "before", "band", "quiet"]
@@ -214,37 +215,6 @@ def _table(group: list[_Column], points: int) -> dict[str, Any]:
     else:
         x, values = thinned_together(x, values, points)
     return {"x": coded_x(x), "y": [coded(y, "f4") for y in values]}
-
-
-def thinned_together(x: Array, values: Iterable[Array], points: int) -> tuple[Array, list[Array]]:
-    """At most `points` places of x, shared by all lines, each of which keeps every peak.
-
-    Every block of samples becomes two places, at which a line has its lowest and highest value in
-    the order in which it takes them.
-    """
-    values, n = [np.asarray(y, dtype=np.float64) for y in values], len(x)
-    if n <= points:
-        return x, values
-    size = -(-2 * n // points)
-    starts = np.arange(0, n, size)
-    # Spread from the first sample to the last, so that an even clock stays even.
-    places = np.interp(np.linspace(0, n - 1, 2 * len(starts)), np.arange(n), x)
-    return places, [_low_and_high(y, starts, size) for y in values]
-
-
-def _low_and_high(y: Array, starts: Any, size: int) -> Array:
-    filled = np.full(len(starts) * size, np.nan)
-    filled[: len(y)] = y
-    blocks = filled.reshape(len(starts), size)
-    known = np.isfinite(blocks)
-    low = np.where(known, blocks, np.inf)
-    high = np.where(known, blocks, -np.inf)
-    at = np.sort(np.stack([low.argmin(axis=1), high.argmax(axis=1)]), axis=0).T
-    # A block that holds a gap shows one: a line across it would join what is apart.
-    whole = known.all(axis=1) | (np.arange(len(starts)) == len(starts) - 1)
-    out = np.take_along_axis(blocks, at, axis=1)
-    out[~whole, 1] = np.nan
-    return np.asarray(out.ravel())
 
 
 def coded_x(x: Array) -> dict[str, Any]:

@@ -6,10 +6,9 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from identification.arrays import Array, IntArray
-from workbench.report.chart import Chart, Colour, Line, Panel, thinned_together
+from identification.arrays import Array
+from identification.signals.envelope import evenly_spread, thinned_together
+from workbench.report.chart import Chart, Colour, Line, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,9 +20,7 @@ BAND = "#e69f00"
 GREY = "#7a7a7a"
 BEFORE = "#8a8a8a"
 LINE_POINTS = 1200  # of a line; more than a screen shows
-SCATTER = 6000
 FEW_DOTS = 200  # that are drawn larger
-SHOWN_SHARE = 0.995  # of the points that axes hold; the rarest would flatten the rest
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.size": 9.0,
@@ -77,12 +74,6 @@ def thinned(x: Array, y: Array, points: int = LINE_POINTS) -> tuple[Array, Array
     """Lowest and highest sample of equal blocks, in the order of time."""
     places, (found,) = thinned_together(x, [y], points)
     return places, found
-
-
-def evenly_spread(count: int, most: int = SCATTER) -> IntArray:
-    """Indices of at most `most` of `count` points, evenly spread."""
-    step = max(1, -(-count // most))
-    return np.arange(0, count, step, dtype=np.int64)
 
 
 def label(axes: "Axes", x: str, y: str, title: str = "") -> None:

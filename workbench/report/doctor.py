@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from design.identified.examined import CheckedLog, Examined
 from design.identified.identifiable_by_log import Way
 from design.machine.readable import number
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
@@ -15,13 +16,13 @@ from identification.log import Log
 from identification.remarks import MinorRemark
 from identification.signals.delays import Delay
 from identification.signals.differentiate import differentiate
+from identification.signals.envelope import evenly_spread
 from identification.signals.sensor_state import Clock, SensorState
 from workbench.cards.units import si_unit
 from workbench.remarks import printed_once
 from workbench.report.chart import Band, Chart, Line, Panel
-from workbench.report.chart_figure import chart_figure, evenly_spread
+from workbench.report.chart_figure import chart_figure
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
-from workbench.steps.doctor import CheckedLog, Examined
 from workbench.steps.installation import OPTIONAL, Installation
 
 LABEL_WIDTH = 15

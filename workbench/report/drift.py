@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from design.machine.readable import number, shown_unit
+from design.measured.drift_document import drift_document
 from design.measured.drift_of_logs import Drifted, Tested
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest, Shift, Statistic
@@ -16,7 +17,6 @@ from workbench.report.model_tables import reasons_once
 from workbench.report.next_steps import after_drift
 from workbench.report.view import Section, View, notes, report_notes, view
 from workbench.screen import Part, Row, instead, tabled
-from workbench.steps.drift import drift_document
 from workbench.verdicts import counted, in_words
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]

@@ -16,10 +16,10 @@ from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import NORMAL_95
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
+from identification.signals.envelope import SHOWN_SHARE, liveliest
 from identification.simulation.free_run import FreeRun
 from identification.tracing.result import Trace
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, parts_of
-from workbench.report.chart_figure import SHOWN_SHARE
 from workbench.report.model_tables import left_of, run_coupling
 from workbench.report.view import Section
 
@@ -64,21 +64,6 @@ def in_a_row(sources: Sequence[Source]) -> InARow:
         if number + 1 < len(sources):
             times.append(np.array([float(t[-1]) + source.log.h]))
     return InARow(np.concatenate(times), tuple(parts))
-
-
-def liveliest(y: Array, share: float = 0.12) -> slice:
-    """The stretch of a log, that share of it, in which the position moves most."""
-    size = max(50, round(share * len(y)))
-    if len(y) <= size:
-        return slice(0, len(y))
-    # Blocks keep the noise of a fast log from counting as motion.
-    block = max(1, size // 50)
-    coarse = y[::block]
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(coarse)))])
-    wide = max(2, size // block)
-    gain = way[wide:] - way[:-wide]
-    start = int(np.argmax(gain)) * block if gain.size else 0
-    return slice(start, min(start + size, len(y)))
 
 
 def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Chart:

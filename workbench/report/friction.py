@@ -21,8 +21,8 @@ from design.measured.friction_curve import (
 from identification.effects._base import Acting
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
+from identification.signals.envelope import evenly_spread
 from workbench.report.chart import Area, Band, Chart, Colour, Line, Panel
-from workbench.report.chart_figure import evenly_spread
 from workbench.report.trace_words import words
 from workbench.report.view import Section
 

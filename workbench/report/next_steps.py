@@ -10,13 +10,13 @@ from workbench.output import Step, step
 
 if TYPE_CHECKING:
     from design.controllers.validate import Validation
+    from design.identified.examined import Examined
     from design.machine.design import Controller, Design
     from design.machine.model import Model
     from design.machine.velocity import VelocityModel
     from design.measured.drift_of_logs import Drifted
     from design.robust.robust import Robust
     from workbench.steps.demo import Demonstration
-    from workbench.steps.doctor import Examined
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0

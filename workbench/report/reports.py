@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from design.controllers.cascade import filter_words
+from design.identified.identify_logs import Identified
 from design.loop_frequencies import open_loop_response
 from design.machine.design import Controller, Design
 from design.machine.documents import design_document, model_document
@@ -43,7 +44,6 @@ from workbench.report.templating import render
 from workbench.report.validation import LOOP_COLOURS
 from workbench.report.view import Section, View, report_notes, table, view
 from workbench.screen import more
-from workbench.steps.identify_sources import Identified
 
 
 @view.register

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from design.identified.trace_document import trace_document
 from design.identified.trace_logs import Traced, effect_estimates
 from design.machine.documents import model_document
 from design.machine.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
@@ -14,23 +15,17 @@ from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
 from identification.tracing.residual_rows import in_equation
 from identification.tracing.result import FoundEffect, Trace
+from identification.tracing.shown_against import pictures
 from workbench.report.chart import Chart
 from workbench.report.fit import Which, missing_chart
 from workbench.report.friction import trace_friction_chart
 from workbench.report.model_tables import estimate_cells, is_left_out, reasons_once
 from workbench.report.next_steps import after_trace
 from workbench.report.response import over_frequency
-from workbench.report.trace_pictures import (
-    against_signal,
-    free_curves,
-    over_time,
-    pictures,
-    signal_chart,
-)
+from workbench.report.trace_pictures import against_signal, free_curves, over_time, signal_chart
 from workbench.report.trace_words import advice, percent, trace_sentence, words
 from workbench.report.view import Section, View, notes, report_notes, view
 from workbench.screen import Part, Row, more, tabled
-from workbench.steps.trace import trace_document
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
 RIVAL_HEAD = ("rival", "force left", "why not")

@@ -10,6 +10,7 @@ import numpy as np
 
 from design.controllers.velocity_loop import VelocityValidation, velocity_validation_document
 from design.identified.velocity import VelocityPredicted, VelocityPrediction, VelocityTraced
+from design.identified.velocity_documents import prediction_summary, velocity_trace_document
 from design.machine.readable import length, number
 from design.machine.velocity import VelocityDesign, VelocityModel, velocity_document
 from identification.velocity.record import RUN_IN
@@ -20,7 +21,6 @@ from workbench.report.prediction import csv_text
 from workbench.report.templating import MEANINGS
 from workbench.report.view import Section, View, notes, view
 from workbench.screen import Part, Row, tabled
-from workbench.steps.velocity import prediction_summary, velocity_trace_document
 
 WHAT_LAW = (
     "law: v = k_p e + k_i int(e) + dr/dt, e = r - y; u = v/g_p + d_p min(|v|/smooth, 1) where"

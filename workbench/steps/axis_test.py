@@ -1,13 +1,8 @@
-"""The test of one log of an axis by its card, and axis_test.json."""
+"""The test of one log of an axis by its card."""
 
-from typing import Any
-
-from design.machine.plain import plain
-from design.measured.axis_test import AxisTest, Earlier, Quantity, axis_test
-from workbench.cards.card_tables import limit_units
+from design.measured.axis_test import AxisTest, Earlier, axis_test
+from design.measured.card_limits import limit_units
 from workbench.logs.sources import Sources
-
-AXIS_SCHEMA = "axis_test/1"
 
 
 def axis_test_of_sources(
@@ -19,30 +14,3 @@ def axis_test_of_sources(
     """
     units = limit_units(sources.rig)
     return axis_test(sources.logs, sources.card.limits, units, earlier, machine)
-
-
-def axis_document(test: AxisTest) -> dict[str, Any]:
-    """The test for a PLC or SCADA: the light first, then every number with its limits."""
-    return {
-        "schema": AXIS_SCHEMA,
-        "light": test.light,
-        "machine": test.machine,
-        "log": {"file": test.source.file, "sha256": test.source.sha256, "rows": test.source.rows,
-                "duration": test.source.log.duration, "h": test.source.log.h},
-        "reasons": test.reasons,
-        "quantities": {one.name: _number(one) for one in test.quantities},
-        "breakaways": test.breakaways,
-        "travel": {way: getattr(test.travel, way) for way in ("place", "positive", "negative")},
-        "version": test.earlier.version if test.earlier else None,
-        "remarks": test.remarks,
-    }  # fmt: skip
-
-
-def _number(one: Quantity) -> dict[str, Any]:
-    keys = ("value", "unit", "sd", "low", "high", "reason")
-    shown = keys if one.estimate.value is None else keys[:-1]
-    return {
-        **{key: getattr(one.estimate, key) for key in shown},
-        "light": one.light or None,
-        "limits": plain(one.allowed),
-    }

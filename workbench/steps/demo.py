@@ -10,18 +10,18 @@ import numpy as np
 from design.closed_loop.loop_figures import Traces
 from design.controllers.design import design
 from design.controllers.validate import Validation, validate
-from design.identified.trace_logs import Traced
+from design.identified.trace_logs import Traced, trace_logs
 from design.machine.design import Design
+from design.simulated.recipe import Recipe
+from design.simulated.record import record, truth
 from identification.effects._library import built_in
 from identification.errors import BadCard
 from identification.model.karnopp import NAMES
 from identification.progress import Progress
 from workbench.cards.card import Card
-from workbench.cards.recipe import Recipe
 from workbench.logs.sources import read_sources
 from workbench.output import dumps
-from workbench.steps.simulate import as_columns, record, truth
-from workbench.steps.trace import trace_sources
+from workbench.steps.simulate import as_columns
 
 HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees
 
@@ -60,7 +60,7 @@ def demonstrate(card: Card, folder: Path, seed: int, on_progress: Progress) -> D
     known = truth(card.name, recipe_of(card), rig=card.rig())
     (folder / "truth.json").write_text(dumps(known) + "\n", encoding="utf-8")
     train, test = (read_sources([str(one.absolute())], str(card.path)) for one in (path, other))
-    traced = trace_sources(train, test, built_in(), seed, on_progress)
+    traced = trace_logs(train.logs, test.logs, built_in(), seed, on_progress)
     on_progress("designing", 0.0)
     found = design(traced.model)
     on_progress("designing", 0.5)

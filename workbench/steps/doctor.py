@@ -1,91 +1,21 @@
-"""A log checked before any fit: clock, sensors, bad samples, what moves, and what that identifies.
+"""A log checked before any fit, read by its card.
 
-Nothing here has rules of its own: a log is repaired, refused and resampled as for `identify`, and
-whether a parameter can be identified is asked of the same thresholds, with the events that the
-measured motion shows in place of those of a fitted run.
+A log is repaired, refused and resampled as for `identify`.
 """
 
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
-from design.identified.hardly_identifiable import hardly_identifiable
-from design.identified.identifiable_by_log import RunsIdentifiability, identifiability_of_runs
-from design.machine.model import Identifiable
+from design.identified.examined import CheckedLog, Examined, examined, with_limits
 from identification.errors import BadLog
-from identification.log import Log, Rig
-from identification.model.karnopp import NAMES
-from identification.signals.bad_samples import BadSamples
+from identification.log import Log
 from identification.signals.check import check_time
-from identification.signals.clean import limits
-from identification.signals.delays import Delay, delays_of, exchanged_columns
+from identification.signals.clean import Prepared
 from identification.signals.even_clock import even_clock
-from identification.signals.sensor_state import Clock, SensorState, clock_of, sensor_state
+from identification.signals.sensor_state import clock_of
 from workbench.cards.card import Card
-from workbench.cards.headers import contradicted_units
+from workbench.cards.headers import contradicted_units, log_remarks
 from workbench.cards.units import conversion
-from workbench.documents.log_remarks import log_remarks
 from workbench.logs.runs import longest_run, runs_of, table_of, with_force
-
-DOCTOR_SCHEMA = "doctor/1"
-LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CheckedLog:
-    """A log as far as it is known without identifiability: the first and quick part of a check.
-
-    raw: signals as recorded; log: the longest run, None where there is none.
-    """
-
-    file: str
-    rig: Rig
-    clock: Clock
-    bad: tuple[BadSamples, ...]
-    refused: str
-    remarks: tuple[str, ...]
-    command_unit: str
-    raw: Log = field(repr=False)
-    runs: tuple[Log, ...] = field(repr=False)
-
-    @property
-    def log(self) -> Log | None:
-        """The longest run."""
-        return max(self.runs, key=len) if self.runs else None
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Examined(CheckedLog, RunsIdentifiability):
-    """What a log shows before any fit, and what it identifies.
-
-    refused: why `identify` would not take the log, empty where it would. exchanged: whether
-    position and reference look like each other's columns; other_units: whether a unit of the card
-    is that of no machine, or not its header's. motion: None where the log is refused before.
-    """
-
-    sensors: tuple[SensorState, ...]
-    delays: tuple[Delay, ...]
-    exchanged: bool
-    other_units: bool
-
-    @property
-    def add(self) -> tuple[str, ...]:
-        """Runs that would identify the rest."""
-        return tuple(dict.fromkeys(one.add for one in self.identifiability if one.add))
-
-    @property
-    def main(self) -> tuple[Identifiable, ...]:
-        """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
-        of_valve = self.rig.kind == "velocity"
-        return tuple(one for one in self.identifiability if of_valve or one.name in NAMES)
-
-    @property
-    def verdict(self) -> str:
-        """ "refused", "ready" (all nine can be identified), "in part", or "nothing" (none can)."""
-        if self.refused:
-            return "refused"
-        can = [one.can for one in self.main]
-        return "ready" if all(can) else "in part" if any(can) else "nothing"
 
 
 def checked_log(path: Path, card: Card) -> CheckedLog:
@@ -96,72 +26,37 @@ def checked_log(path: Path, card: Card) -> CheckedLog:
     """
     table = table_of(path, card)
     raw, _ = longest_run(table, path, card)
-    rig = card.rig(path.name)
-    clock, refused = clock_of(raw["t"]), ""
-    bad, remarks = list[BadSamples](), list[str]()
-    runs: tuple[Log, ...]
-    try:
-        made = runs_of(table, path, card)
-        bad += made.bad
-        runs = made.runs
-        remarks += made.remarks
-    except BadLog as error:
-        refused = str(error)
-        runs = _as_far_as_it_goes(raw, path, card)
-    reported = {one.signal for one in bad if one.kind == "saturated"}
-    bad += [
-        one for name in LIMITED if name in raw and name not in reported for one in limits(raw, name)
-    ]
+    clock = clock_of(raw["t"])
     spec = card.signals.get("u")
     units = [unit for unit in ("V", "A") if spec is not None and conversion(spec.unit, unit)]
-    return CheckedLog(
+    try:
+        made, refused = runs_of(table, path, card), ""
+    except BadLog as error:
+        made, refused = Prepared(_as_far_as_it_goes(raw, path, card), ()), str(error)
+    found = CheckedLog(
         file=path.name,
-        rig=rig,
+        rig=card.rig(path.name),
         clock=clock,
-        bad=tuple(dict.fromkeys(bad)),
+        bad=tuple(made.bad),
         refused=refused,
-        remarks=tuple(remarks),
+        remarks=tuple(made.remarks),
         command_unit=units[0] if units else "",  # nothing for a share, or where none is logged
         raw=raw,
-        runs=runs,
+        runs=made.runs,
     )
+    return with_limits(found)
 
 
 def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     """What the log in the file shows, read by its card; effects: also which effects it could show.
 
-    Raises as `looked` does.
+    Raises as `checked_log` does.
     """
     found = checked_log(path, card)
-    log, runs = found.log, found.runs
-    seen = (
-        identifiability_of_runs(runs, found.rig, effects=effects)
-        if runs and not found.refused
-        else RunsIdentifiability(reason=found.refused)
-    )
     units = list(contradicted_units(card.signals, found.rig).values())
-    remarks = list(found.remarks)
-    late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else None
-    if log is not None and not found.refused:
-        units += log_remarks(runs, found.rig, card.signals)
-        remarks += hardly_identifiable(runs, found.rig)
-    sensors = tuple(sensor_state(name, x) for name, x in found.raw.signals.items() if name != "t")
-    delays = delays_of(log, seen.motion, late) if log is not None and seen.motion else ()
-    exchanged = "" if log is None else exchanged_columns(delays, sensors, log.h)
-    remarks = [*([exchanged] if exchanged else []), *units, *remarks]
-    known = {
-        **vars(seen),
-        **vars(found),
-        "refused": found.refused or seen.reason,
-        "remarks": tuple(dict.fromkeys([*remarks, *seen.remarks])),
-    }
-    return Examined(
-        **known,
-        sensors=sensors,
-        delays=delays,
-        exchanged=bool(exchanged),
-        other_units=bool(units),
-    )
+    if found.log is not None and not found.refused:
+        units += log_remarks(found.runs, found.rig, card.signals)
+    return examined(found, units, effects=effects)
 
 
 def _as_far_as_it_goes(raw: Log, path: Path, card: Card) -> tuple[Log, ...]:
@@ -171,26 +66,3 @@ def _as_far_as_it_goes(raw: Log, path: Path, card: Card) -> tuple[Log, ...]:
         return even_clock(with_force(raw, path, card))
     except (BadLog, ValueError):
         return ()
-
-
-def doctor_document(found: Examined, card: str) -> dict[str, Any]:
-    """What was seen, as doctor.json holds it; in SI."""
-    return {
-        "schema": DOCTOR_SCHEMA,
-        "card": card,
-        "file": found.file,
-        "verdict": found.verdict,
-        "refused": found.refused or None,
-        "clock": asdict(found.clock),
-        "signals": {one.name: {k: v for k, v in asdict(one).items() if k != "name"}
-                    for one in found.sensors},
-        "bad_samples": [one.as_json() for one in found.bad],
-        "delays": [asdict(one) for one in found.delays],
-        "motion": None if found.ways is None else asdict(found.ways),
-        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None,
-                            "within": one.within, "only_if": one.only_if or None}
-                 for one in found.identifiability},
-        "effects": found.effects,
-        "add": found.add,
-        "remarks": found.remarks,
-    }  # fmt: skip

@@ -13,16 +13,15 @@ from design.controllers import recommend
 from design.controllers.design import with_choice
 from design.controllers.recommend import recommended
 from design.controllers.validate import validate
+from design.machine.controller import CardController, present
 from design.machine.design import Design, Recommendation
 from design.machine.model import Model
 from design.tune import Asked
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
-from workbench.cards.controller import CardController
 from workbench.report.design_tables import margins_table
 from workbench.report.validation import validation_table
-from workbench.steps.present import present
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 

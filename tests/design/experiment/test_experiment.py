@@ -13,6 +13,7 @@ from design.experiment.limits import MotionLimits
 from design.experiment.plan import _remarks, bench_of, experiment, made_safe
 from design.experiment.planned import Experiment, experiment_document, limits_of
 from design.loop import LoopNoise
+from design.machine.controller import CardController, present
 from design.machine.model import Model
 from design.pid import pid_to_rst
 from identification.arrays import Array
@@ -23,11 +24,9 @@ from identification.log import Log
 from identification.model.karnopp import NAMES
 from identification.progress import KeepGoing, quiet
 from tests.chain import TABLES, model_of
-from workbench.cards.controller import CardController
 from workbench.documents.rivals import read_rivals
 from workbench.report.experiment import reference_text
 from workbench.report.view import view
-from workbench.steps.present import present
 
 pytestmark = pytest.mark.slow
 

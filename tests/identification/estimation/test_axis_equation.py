@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.machine.effect_values import written_effect
+from design.simulated.recipe import Recipe
+from design.simulated.record import record
 from identification.effects._library import built_in
 from identification.errors import NotIdentifiable
 from identification.estimation.axis_equation import axis_equation
 from identification.log import Log, Rig
 from tests.chain import short_recipe
-from workbench.cards.recipe import Recipe
-from workbench.cards.written_effect import written_effect
-from workbench.steps.simulate import record
+from workbench.cards.units import in_unit_of
 
 MADE = Rig("force")
 
@@ -21,7 +22,8 @@ def recipe_with(effects: dict[str, dict[str, float]] | None = None) -> Recipe:
     """The rig of table 1, twice as long, with these effects in it."""
     _, recipe = short_recipe(12.0)
     found = tuple(
-        written_effect(key, values, built_in()) for key, values in (effects or {}).items()
+        written_effect(key, values, built_in(), in_unit_of)
+        for key, values in (effects or {}).items()
     )
     return replace(recipe, plant=replace(recipe.plant, effects=found))
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from design.machine.controller import present
 from identification.errors import BadCard
-from workbench.cards.card import Card, load_card
-from workbench.steps.present import present, present_of_card
+from workbench.cards.card import Card, load_card, present_of_card
 
 MOTOR = """
 [card]

@@ -18,8 +18,8 @@ from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cards.card import load_card
 from workbench.cards.card_tables import SignalSpec
+from workbench.cards.headers import log_remarks
 from workbench.cli import main
-from workbench.documents.log_remarks import log_remarks
 from workbench.logs.sources import card_path, read_sources
 from workbench.output import dumps
 

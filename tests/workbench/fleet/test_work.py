@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.simulated.record import record
 from tests.chain import TABLES
 from tests.workbench.fleet.values import card_text
 from workbench.cards.card import load_card
@@ -18,7 +19,7 @@ from workbench.fleet.finding import find_logs
 from workbench.fleet.values import Item, Result
 from workbench.fleet.work import work
 from workbench.registry.values import Version
-from workbench.steps.simulate import as_columns, record
+from workbench.steps.simulate import as_columns
 
 URL = "memory://bench"
 VERSION = Version("a", 3, "m", None, None, datetime(2026, 3, 1, tzinfo=UTC))

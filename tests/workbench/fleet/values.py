@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
+from design.judgement import Candidate
 from tests.chain import CARD
 from workbench.fleet.values import Item, LogFile, Result
-from workbench.registry.values import Candidate
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
 DEADLY = "deadly"

@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
+from design.judgement import Candidate
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 

@@ -12,6 +12,7 @@ import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from design.judgement import ALARMING
 from tests.workbench.jobs.listener import Listener
 from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import ignore, judge, short_pass
@@ -29,7 +30,7 @@ from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.passes import Report
 from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox
 from workbench.registry.store import Registry
-from workbench.registry.values import ALARMING, Alarm
+from workbench.registry.values import Alarm
 
 MINUTE = timedelta(minutes=1)
 

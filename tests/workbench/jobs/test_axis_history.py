@@ -7,21 +7,23 @@ from pathlib import Path
 
 import pytest
 
+from design.judgement import Candidate, Judgement
 from design.machine.documents import model_document
+from design.machine.effect_values import written_effect
 from design.machine.source import Source
+from design.simulated.record import record
 from identification.drift.readings import Reading
 from identification.effects._library import built_in
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
-from workbench.cards.written_effect import written_effect
+from workbench.cards.units import in_unit_of
 from workbench.jobs.axis_history import by_quantity, earlier_of
 from workbench.logs.sources import Sources
 from workbench.output import strict
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import BadRegistry, Candidate, Judgement, SeenLog
-from workbench.steps.simulate import record
+from workbench.registry.values import BadRegistry, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 LOGS = 7
@@ -135,7 +137,7 @@ def test_readings_of_the_drift_test_by_quantity() -> None:
 def test_a_model_with_further_effects_tells_this_log_by_its_fit(tmp_path: Path) -> None:
     values = {"F_s": 5.0, "v_s": 0.03}
     model = model_of(TABLES["paper_table1"], Actuator(19530.0, 10405.0))
-    whole = written_effect("stribeck", values, built_in())
+    whole = written_effect("stribeck", values, built_in(), in_unit_of)
     units = {"F_s": "N", "v_s": "m/s"}
     known = {
         name: Estimate(value, units.get(name, "1"), 0.01 * value if name in units else None)

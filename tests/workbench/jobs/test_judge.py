@@ -10,22 +10,26 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design import retuned
 from design.challenge import Terms
+from design.identified.identify_logs import Identified, identify_logs
+from design.judgement import Judgement
 from design.machine.model import Model
+from design.machine.source import MachineLogs
+from design.retuned import Drift, divided
+from design.simulated.record import record
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
 from identification.model.karnopp import Karnopp
 from tests.chain import CARD, TABLES, designed
 from workbench.cards.card import Card, load_card
 from workbench.documents.result_files import read_model
-from workbench.jobs import judge
-from workbench.jobs.judge import Chain, Drift, divided, drift_by_chart
+from workbench.jobs.judge import Chain, drift_by_chart
 from workbench.jobs.passes import Task
-from workbench.logs.sources import Sources, read_sources
+from workbench.logs.sources import read_sources
 from workbench.output import dumps
-from workbench.registry.values import Judgement, SeenLog, Version
-from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.simulate import as_columns, record
+from workbench.registry.values import SeenLog, Version
+from workbench.steps.simulate import as_columns
 
 OLD = TABLES["paper_table1"]
 NEW = replace(OLD, F_cp=16.0, F_vp=380.0, F_sp=26.0)
@@ -57,15 +61,15 @@ def once() -> Iterator[None]:
     """The same runs are fitted once and the same model is designed for once, whoever asks."""
     fits: dict[str, Identified] = {}
 
-    def identified_once(sources: Sources, seed: int) -> Identified:
-        key = repr([(one.sha256, one.rows, seed) for one in sources.runs])
+    def identified_once(logs: MachineLogs, seed: int) -> Identified:
+        key = repr([(one.sha256, one.rows, seed) for one in logs.runs])
         if key not in fits:
-            fits[key] = identify_sources(sources, seed=seed)
+            fits[key] = identify_logs(logs, seed=seed)
         return fits[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "identify_sources", identified_once)
-        patch.setattr(judge, "design", designed)
+        patch.setattr(retuned, "identify_logs", identified_once)
+        patch.setattr(retuned, "design", designed)
         yield
 
 
@@ -102,7 +106,7 @@ def says(verdict: Any, **more: Any) -> Any:
     """A drift test that always says the same, and keeps what it was given."""
 
     def test(
-        model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
+        model: Model, logs: MachineLogs, rng: np.random.Generator, state: Mapping[str, Any]
     ) -> Drift:
         return Drift(verdict, "said", state={"given": dict(state)}, **more)
 
@@ -123,14 +127,14 @@ def test_the_chart_goes_on_from_log_to_log(shop: Path, first: Judgement, tmp_pat
     state: Mapping[str, Any] = {}
     for name, verdict in (("same", "none"), ("drifted", "drift")):
         sources = read_sources([str(shop / f"{name}.csv")], str(shop / "card.toml"))
-        found = drift_by_chart(model, sources, rng, state)
+        found = drift_by_chart(model, sources.logs, rng, state)
         state = found.state
         assert found.verdict == verdict, found.reason
         assert state["logs"] >= 1
     assert {"F_cp", "F_sp"} <= {one.name for one in found.moved}
     assert found.reason.startswith("moved: ")
     with pytest.raises(BadModel, match="stored drift state"):
-        drift_by_chart(model, sources, rng, {"logs": "many"})
+        drift_by_chart(model, sources.logs, rng, {"logs": "many"})
 
 
 @pytest.mark.slow
@@ -243,7 +247,7 @@ def test_what_cannot_be_judged_says_why(shop: Path, first: Judgement, tmp_path: 
 
 def test_a_run_is_divided_in_time(shop: Path) -> None:
     sources = read_sources([str(shop / "same.csv")], str(shop / "card.toml"))
-    train, (rest,) = divided(sources)
+    train, (rest,) = divided(sources.logs)
     whole, (part,) = sources.runs[0].log, train.runs
     assert len(part.log) + len(rest) == len(whole)
     assert part.rows == len(part.log) == round(0.65 * len(whole))

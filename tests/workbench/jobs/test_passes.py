@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from design.judgement import Judgement
 from identification.errors import BadCard, BadLog, NotIdentifiable
 from tests.workbench.jobs.machines import activate, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, short_pass
@@ -20,7 +21,7 @@ from workbench.jobs.passes import Judge, PassReport, Task, shared_clock
 from workbench.jobs.scan import BadRoot, open_for_writing
 from workbench.registry.queue import OFTEN, Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Judgement, RegistryAway
+from workbench.registry.values import RegistryAway
 
 Run = Callable[..., PassReport]
 

@@ -5,11 +5,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from design.judgement import Candidate, Judgement
 from identification.errors import BadLog
 from workbench.jobs.options import JobOptions
 from workbench.jobs.passes import Judge, Pass, PassReport, Report, Task
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Judgement
 
 LEASE = 0.4  # s
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from design.judgement import Candidate, Judgement, LogVerdict
 from tests.workbench.page.conftest import NOW, Page
 from workbench.page.machine import asked_for, parameter_charts
 from workbench.registry import results
@@ -19,7 +20,7 @@ from workbench.registry.overview import (
 from workbench.registry.queue import Queue
 from workbench.registry.results import condition, last_logs
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Judgement, LogVerdict, SeenLog
+from workbench.registry.values import SeenLog
 
 HOUR = timedelta(hours=1)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from design.judgement import Candidate
 from tests.workbench.page.conftest import NOW, Page
 from workbench.page.asked import spark
 from workbench.page.dropped import ENDINGS, Drop, file_name
@@ -14,7 +15,7 @@ from workbench.page.visitors import CHANGES, TOKEN_COOKIE, WRONG_TRIES, Limiter,
 from workbench.registry.access import Access, hashed
 from workbench.registry.store import Registry
 from workbench.registry.tables import AccessTokenRow
-from workbench.registry.values import BadRegistry, Candidate
+from workbench.registry.values import BadRegistry
 
 NASTY = "<img src=x onerror=alert(1)>"
 CSV = b"t,y\n" + b"".join(b"%d,%d\n" % (k, k % 7) for k in range(300))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from design.judgement import Candidate, Judgement
 from tests.chain import CARD
 from tests.workbench.jobs.worker import short_pass
 from tests.workbench.page.browser import CHROMIUM, DRIVER, NARROW, NO_BROWSER, Person
@@ -18,7 +19,6 @@ from tests.workbench.page.test_fleet import evidence, parameter_moved
 from workbench.jobs.passes import Task
 from workbench.registry.access import Access
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Judgement
 
 pytestmark = [
     pytest.mark.slow,

@@ -12,6 +12,7 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
+from design.judgement import Candidate, Judgement
 from tests.workbench.registry.postgres import Server
 from workbench.registry.database import location
 from workbench.registry.migrate import HEAD, config
@@ -19,7 +20,7 @@ from workbench.registry.overview import FleetAsked, fleet_page
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import Base
-from workbench.registry.values import BadRegistry, Candidate, Judgement, RegistryAway, SeenLog
+from workbench.registry.values import BadRegistry, RegistryAway, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 PROCESSES, EACH = 6, 15

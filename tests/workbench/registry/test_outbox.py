@@ -4,10 +4,11 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from design.judgement import Candidate, Judgement
 from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox, wait
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Candidate, Judgement, SeenLog
+from workbench.registry.values import SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 MINUTE = timedelta(minutes=1)

@@ -5,9 +5,10 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from design.judgement import Candidate, Judgement
 from workbench.registry.queue import OFTEN, OLDER, Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import BadRegistry, Candidate, Claim, Judgement, LostClaim, SeenLog
+from workbench.registry.values import BadRegistry, Claim, LostClaim, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 LEASE = timedelta(minutes=1)

@@ -6,11 +6,12 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
+from design.judgement import Candidate, Judgement
 from workbench.registry.outbox import Outbox
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import APPEND_ONLY, Base
-from workbench.registry.values import BadRegistry, Candidate, Judgement, SeenLog
+from workbench.registry.values import BadRegistry, SeenLog
 
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
 WHO = {"reason": "a test", "by": "tester"}

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.signals.envelope import thinned_together
 from workbench.report.chart import (
     ALL_POINTS,
     FINEST_POINTS,
@@ -24,7 +25,6 @@ from workbench.report.chart import (
     chart_data,
     chart_html,
     coded_x,
-    thinned_together,
 )
 from workbench.report.chart_figure import chart_figure
 

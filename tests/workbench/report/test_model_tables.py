@@ -8,6 +8,7 @@ import pytest
 
 from design.machine.model import Model
 from design.machine.source import Source
+from design.simulated.record import record
 from identification.estimation.converged_fit import STOP_TURNS_ON_LESS
 from identification.model.karnopp import Karnopp
 from identification.simulation.free_run import FreeRun
@@ -17,7 +18,6 @@ from workbench.report.chart import Chart
 from workbench.report.fit import fit_chart, residual
 from workbench.report.model_tables import fit_lines, summary
 from workbench.report.next_steps import after_identify
-from workbench.steps.simulate import record
 
 
 def by_equation(left: float, friction: Karnopp = EMPS) -> Model:

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from design.controllers.validate import validate
+from design.identified.identify_logs import Identified
 from design.machine.readable import friction_units
 from identification.model.plant import Actuator, actuator_units
+from identification.signals.envelope import evenly_spread, liveliest
 from tests.chain import TABLES, designed, identified, model_of
 from workbench.report.chart import Chart
-from workbench.report.chart_figure import LINE_POINTS, evenly_spread, thinned
-from workbench.report.fit import liveliest
+from workbench.report.chart_figure import LINE_POINTS, thinned
 from workbench.report.friction import friction_curve
 from workbench.report.validation import (
     validation_lines,
     validation_table,
 )
 from workbench.report.view import Section, page, view
-from workbench.steps.identify_sources import Identified
 
 LARGEST = 2_000_000
 VOID = {"meta", "br", "img", "hr"}

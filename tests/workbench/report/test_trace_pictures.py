@@ -7,9 +7,9 @@ import pytest
 
 from identification.tracing.residual_rows import folded_at
 from identification.tracing.result import Residual
+from identification.tracing.shown_against import pictures
 from tests.workbench.trace_values import trace_of
 from workbench.report.fit import missing_chart
-from workbench.report.trace_pictures import pictures
 
 
 def test_a_swing_is_drawn_over_its_period_in_the_first_log() -> None:

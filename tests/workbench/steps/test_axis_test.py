@@ -8,19 +8,22 @@ import numpy as np
 import pytest
 
 from design.machine.source import Source
+from design.measured.axis_document import axis_document
 from design.measured.axis_limits import Allowed, own_limits
 from design.measured.axis_test import AxisTest, Earlier, judged
+from design.measured.card_limits import LimitsSection
+from design.simulated.record import record
 from identification.errors import BadCard
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from tests.chain import short_recipe
 from tests.screens import one_screen
-from workbench.cards.card_tables import CardFile, LimitsSection
+from workbench.cards.card_tables import CardFile
+from workbench.cards.units import in_unit_of
 from workbench.logs.sources import Sources
 from workbench.report.axis_test import axis_charts, axis_sentence
 from workbench.report.view import view
-from workbench.steps.axis_test import axis_document, axis_test_of_sources
-from workbench.steps.simulate import record
+from workbench.steps.axis_test import axis_test_of_sources
 
 
 def sources(limits: Mapping[str, tuple[float, float]] | None = None, seed: int = 7) -> Sources:
@@ -171,10 +174,10 @@ def test_limits_of_a_card_with_units() -> None:
     section = LimitsSection.model_validate(
         {"F_cp": [10, "0.013 kN"], "backlash": ["0 mm", "0.2 mm"]}
     )
-    found = section.value(Rig("force"))
+    found = section.value(Rig("force"), in_unit_of)
     assert found["F_cp"] == (10.0, 13.0) and found["backlash"] == pytest.approx((0.0, 2e-4))
     turned = LimitsSection.model_validate({"F_cp": ["100 N mm", 1.0]}).value(
-        Rig("force", motion="rotary")
+        Rig("force", motion="rotary"), in_unit_of
     )
     assert turned["F_cp"] == pytest.approx((0.1, 1.0))
     for wrong, said in (
@@ -183,7 +186,7 @@ def test_limits_of_a_card_with_units() -> None:
         ({"F_cp": ["much", 13]}, "a number needed"),
     ):
         with pytest.raises(BadCard, match=said):
-            LimitsSection.model_validate(wrong).value(Rig("force"))
+            LimitsSection.model_validate(wrong).value(Rig("force"), in_unit_of)
     with pytest.raises(ValueError, match="unknown_key"):
         LimitsSection.model_validate({"F_c": [1, 2]})
     assert "limits" in CardFile.model_fields

@@ -20,6 +20,8 @@ from design.loop import LoopRun
 from design.machine.documents import design_document
 from design.machine.model import Model
 from design.measured.predict import predict
+from design.simulated.recipe import RecipePID
+from design.simulated.record import record, truth
 from design.tune import Asked, Goals
 from identification.arx.design_period import common_period, decimated, decimation
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
@@ -31,12 +33,10 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, identified, model_of, short_recipe
 from tests.identification.plants import made_log, table
-from workbench.cards.recipe import RecipePID
 from workbench.documents.result_files import read_design
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps.predict import PREDICTION_COLUMNS, prediction_frame
-from workbench.steps.simulate import record, truth
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 

@@ -6,6 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from design.identified.examined import Examined, doctor_document
+from design.identified.identify_logs import identify_logs
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import Kind
@@ -16,9 +19,7 @@ from workbench.cards.card import Card, load_card
 from workbench.logs.sources import read_sources
 from workbench.report.doctor import doctor_picture, doctor_screen
 from workbench.report.next_steps import after_doctor
-from workbench.steps.doctor import Examined, doctor_document, examine
-from workbench.steps.identify_sources import identify_sources
-from workbench.steps.simulate import record
+from workbench.steps.doctor import examine
 
 Table = dict[str, Array]
 MOTOR = f"""
@@ -63,7 +64,7 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
     card, table = motor
     found = examined_log(card, table)
     path = card.path.parent / "run.csv"
-    model = identify_sources(read_sources([str(path)], str(card.path))).model
+    model = identify_logs(read_sources([str(path)], str(card.path)).logs).model
     can = {one.name: one.can for one in found.identifiability}
     assert {n for n in NAMES if can[n]} == {n for n in NAMES if model.friction[n].value is not None}
     assert found.verdict == "ready"
@@ -75,7 +76,7 @@ def test_identify_says_that_a_voltage_brakes(motor: tuple[Card, Table]) -> None:
     voltage = table["u"] + 40.0 * np.gradient(table["y"], table["t"])  # the motor's own, 40 V s/m
     examined_log(card, {**table, "u": voltage})
     path = card.path.parent / "run.csv"
-    remarks = identify_sources(read_sources([str(path)], str(card.path))).remarks
+    remarks = identify_logs(read_sources([str(path)], str(card.path)).logs).remarks
     assert any("if it is the motor's voltage, F_vp and F_vn hold" in one for one in remarks)
 
 

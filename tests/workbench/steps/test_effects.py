@@ -11,6 +11,15 @@ from design.closed_loop.driven_loop import driven_loop, effects_left_out, in_the
 from design.machine.effect_values import exact
 from design.machine.model import Model
 from design.measured.predict import Prediction, predict
+from design.simulated.recipe import (
+    FrictionSection,
+    LoopSpec,
+    Recipe,
+    RecipeCompensator,
+    RecipeForcePI,
+    RecipePD,
+)
+from design.simulated.record import record, truth
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog
@@ -20,18 +29,9 @@ from identification.signals.excitation import Steps
 from identification.simulation.inverse_dynamics import of_body
 from tests.chain import EMPS, designed, model_of, short_recipe
 from workbench.cards.card import load_card
-from workbench.cards.recipe import (
-    FrictionSection,
-    LoopSpec,
-    Recipe,
-    RecipeCompensator,
-    RecipeForcePI,
-    RecipePD,
-)
 from workbench.logs.runs import read_log
 from workbench.logs.sources import card_path
 from workbench.steps.demo import recipe_of, simulated_log
-from workbench.steps.simulate import record, truth
 
 PRESSURES = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=5e5)
 CARD, RECIPE = short_recipe()

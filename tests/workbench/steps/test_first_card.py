@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from design.first_card.answers import BadAnswer, with_rig
 from design.first_card.proposal import Proposal
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.errors import BadLog
 from tests.bad_inputs.shop import CARDS
@@ -19,7 +20,6 @@ from workbench.cards.card import load_card
 from workbench.logs.runs import read_log
 from workbench.steps.first_card.proposal import proposed, with_signal
 from workbench.steps.first_card.written import refusal, written
-from workbench.steps.simulate import record
 
 Table = dict[str, Array]
 NAMES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")

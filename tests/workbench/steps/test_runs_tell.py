@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from design.identified.broken_promises import BROKEN, broken_promises
+from design.identified.identify_logs import Identified, identify_logs
 from design.machine.documents import model_document
 from design.machine.model import Model
 from identification.model.karnopp import NAMES
@@ -17,7 +18,6 @@ from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines, runs_to_add
 from workbench.steps.doctor import examine
-from workbench.steps.identify_sources import Identified, identify_sources
 
 CARD = f"""
 [card]
@@ -36,7 +36,7 @@ def identified(folder: Path, columns: dict[str, np.ndarray]) -> Identified:
     """What identify makes of the columns, read by the card; both lie in the folder."""
     (folder / "card.toml").write_text(CARD, "utf-8")
     pd.DataFrame(columns).to_csv(folder / "run.csv", index=False)
-    return identify_sources(read_sources([str(folder / "run.csv")], str(folder / "card.toml")))
+    return identify_logs(read_sources([str(folder / "run.csv")], str(folder / "card.toml")).logs)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from design.identified import trace_logs as tracing
-from design.identified.trace_logs import traced_model
+from design.identified.trace_document import trace_document
+from design.identified.trace_logs import trace_logs, traced_model
 from design.machine.documents import model_document
 from design.measured.friction_curve import sliding_friction
 from identification.effects._library import built_in
@@ -31,6 +32,7 @@ from identification.tracing.result import (
     Residual,
     TraceVerdict,
 )
+from identification.tracing.shown_against import pictures
 from tests.reported import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
@@ -43,10 +45,10 @@ from workbench.report.trace import (
     errors_table,
     rivals_table,
 )
-from workbench.report.trace_pictures import axis_of, pictures
+from workbench.report.trace_pictures import axis_of
 from workbench.report.trace_words import percent, trace_sentence
 from workbench.report.view import view
-from workbench.steps.trace import named_logs, trace_document, trace_sources
+from workbench.steps.trace import named_logs
 
 CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
@@ -126,7 +128,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
 
 def test_a_test_log_that_is_a_training_log_is_refused() -> None:
     with pytest.raises(BadLog, match=r"--test b\.csv: the same bytes as the training log a\.csv"):
-        trace_sources(sources(), sources("b.csv", "a"), built_in())
+        trace_logs(sources().logs, sources("b.csv", "a").logs, built_in())
 
 
 @pytest.mark.parametrize(("signal", "factor", "said"), [
@@ -141,7 +143,7 @@ def test_a_test_log_in_other_units_is_refused_by_its_name(
     signals = {**log.signals, signal: factor * log[signal]}
     run = replace(other.runs[0], log=replace(log, name="b.csv", signals=signals))
     with pytest.raises(BadLog, match=said):
-        trace_sources(sources(), replace(other, runs=(run,)), built_in())
+        trace_logs(sources().logs, replace(other, runs=(run,)).logs, built_in())
 
 
 def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,17 +152,17 @@ def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> Non
     assert trace_sentence(traced(found, tested=False)).startswith("Open: no row was held out")
     monkeypatch.setattr(tracing, "trace", lambda *_, **__: found)
     with pytest.raises(BadLog, match=r"b\.csv: no row of it could be judged"):
-        trace_sources(sources(), sources("b.csv", "b"), built_in())
+        trace_logs(sources().logs, sources("b.csv", "b").logs, built_in())
 
 
 def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
     other = sources("b.csv", "b")
     turned = replace(other, rig=replace(other.rig, motion="rotary"))
     with pytest.raises(BadLog, match="another rig"):
-        trace_sources(sources(), turned, built_in())
+        trace_logs(sources().logs, turned.logs, built_in())
     motor = replace(other, rig=replace(other.rig, kind="motor", force_per_command=0.0))
     with pytest.raises(BadLog, match="needs its force_per_command"):
-        trace_sources(motor, None, built_in())
+        trace_logs(motor.logs, None, built_in())
 
 
 def test_the_trace_gets_logs_seed_and_library(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,11 +175,11 @@ def test_the_trace_gets_logs_seed_and_library(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(tracing, "trace", trace)
     split = sources()
     split = replace(split, card=replace(split.card, split={"test": ("a.csv",)}))
-    found = trace_sources(split, sources("b.csv", "b"), built_in(), seed=7)
+    found = trace_logs(split.logs, sources("b.csv", "b").logs, built_in(), seed=7)
     expected = np.random.default_rng(7).integers(1000)
     assert given == [(1, 1, split.rig.kind, sorted(built_in()), expected)]
     assert "a.csv: trained on, though the card's [split] keeps it for tests" in found.remarks
-    assert trace_sources(sources(), None, built_in()).test == ()
+    assert trace_logs(sources().logs, None, built_in()).test == ()
 
 
 def test_logs_that_are_not_named_are_the_cards() -> None:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from design.simulated.record import record
 from identification.arrays import Array
 from identification.estimation.prescribed_motion import fit_prescribed
 from identification.estimation.recorded_logs import recorded_logs
@@ -21,7 +22,6 @@ from identification.estimation.regression.weighted_rows import solve_rows
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from tests.chain import short_recipe
-from workbench.steps.simulate import record
 
 H = 1e-3
 NONE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])

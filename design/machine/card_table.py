@@ -4,13 +4,13 @@ The text below a field says what it is; the card's page of the documentation is 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from workbench.files import ABSURD
+from identification.signals.check import ABSURD
 
 
 class CardTable(BaseModel):
@@ -51,6 +51,10 @@ def _more_than_nothing(value: float) -> float:
         raise ValueError(f"is nothing, {1.0 / ABSURD:.0e} or more needed")
     return value
 
+
+InUnit = Callable[[float | str | None, str, str], float | None]
+"""The number in a unit, of a number which is in it or a text with its own; raises BadCard, by the
+name of the place, where it is of another kind."""
 
 Divisor = Annotated[float, AfterValidator(_more_than_nothing)]
 Positive = Annotated[Divisor, Field(gt=0)]

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from workbench.registry.difference import Number, as_read, difference
+from design.machine.difference import Number, as_read, difference
 from workbench.registry.views import difference_screen
 
 NAMES = ("version 1", "version 2")

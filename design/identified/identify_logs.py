@@ -1,4 +1,4 @@
-"""The chain, each link callable alone: runs -> model -> design -> validation."""
+"""Runs -> model, with what is to be said of both."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -14,13 +14,11 @@ from design.identified.sampled_posterior import posterior_document, posterior_of
 from design.identified.velocity import looks_like_velocity
 from design.machine.model import Model
 from design.machine.plausible import model_remarks
-from design.machine.source import Source
+from design.machine.source import MachineLogs, Source
 from design.machine.surrounding_lines import surrounding_lines, unequal_friction
 from identification.errors import NotIdentifiable
 from identification.model.estimates import KarnoppFit
 from identification.progress import KeepGoing, Progress, quiet, without_end
-from workbench.logs.sources import Sources
-from workbench.steps.present import present_of_card
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
@@ -38,8 +36,8 @@ class Identified:
     posterior_samples: "Posterior | None" = None
 
 
-def identify_sources(
-    sources: Sources,
+def identify_logs(
+    logs: MachineLogs,
     options: Options | None = None,
     seed: int = 0,
     *,
@@ -47,38 +45,39 @@ def identify_sources(
     on_progress: Progress = quiet,
     keep_going: KeepGoing = without_end,
 ) -> Identified:
-    """The model of the machine that the sources are of.
+    """The model of the machine that the logs are of, with its present controller.
 
     keep_going: whether it is to go on, else the best so far is the model.
-    Raises NotIdentifiable where nothing is identifiable, BadLog where a signal is missing.
+    Raises NotIdentifiable where nothing is identifiable, BadLog where a signal is missing, BadCard
+    where the controller does not fit.
     """
     options = options or Options()
-    logs = sources.logs.logs
+    runs, rig = logs.logs, logs.rig
     try:
         model, fit = identify(
-            sources.runs,
+            logs.runs,
             np.random.default_rng(seed),
-            card=sources.card.name,
-            rig=sources.rig,
+            card=logs.card,
+            rig=rig,
             options=options,
             on_progress=on_progress,
             keep_going=keep_going,
         )
     except NotIdentifiable as error:
-        said = looks_like_velocity(logs, sources.rig)
+        said = looks_like_velocity(runs, rig)
         raise NotIdentifiable("; ".join([str(error), *said])) from error
-    gate = identifiability_of_runs(logs, sources.rig, options.drive, fit=fit)
-    now = present_of_card(sources.card, sources.rig, model.period)
+    gate = identifiability_of_runs(runs, rig, options.drive, fit=fit)
+    now = logs.present(model.period)
     model = replace(
-        model, bad_samples=sources.bad, controller=now, identifiability=gate.identifiability
+        model, bad_samples=logs.bad, controller=now, identifiability=gate.identifiability
     )
-    posterior_samples = posterior_of(sources.logs, fit, seed, on_progress) if posterior else None
+    posterior_samples = posterior_of(logs, fit, seed, on_progress) if posterior else None
     if posterior_samples is not None:
         model = replace(model, posterior=posterior_document(posterior_samples, fit))
     remarks = (
-        *looks_like_velocity(logs, sources.rig, model), *braked_by_its_voltage(logs, sources.rig),
-        *surrounding_lines(fit.surroundings, sources.rig),
+        *looks_like_velocity(runs, rig, model), *braked_by_its_voltage(runs, rig),
+        *surrounding_lines(fit.surroundings, rig),
         *unequal_friction(model.friction, model.effects),
-        *sources.remarks, *model_remarks(model), *broken_promises(model),
+        *logs.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip
-    return Identified(model, fit, sources.runs, remarks, posterior_samples)
+    return Identified(model, fit, logs.runs, remarks, posterior_samples)

@@ -5,11 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.errors import BadCard
-from identification.model.plant import Actuator, Motor
-from identification.signals.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
-from workbench.cards.card import load_card
-from workbench.cards.recipe import (
+from design.simulated.recipe import (
     Recipe,
     RecipeCompensator,
     RecipeForcePI,
@@ -17,6 +13,10 @@ from workbench.cards.recipe import (
     RecipePID,
     RecipeRST,
 )
+from identification.errors import BadCard
+from identification.model.plant import Actuator, Motor
+from identification.signals.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
+from workbench.cards.card import load_card
 
 HEAD = '[card]\nname = "a"\n[rig]\nkind = "force"\n'
 RECIPE = """

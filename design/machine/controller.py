@@ -1,31 +1,33 @@
-"""The controller that a machine has now, as its card names it under `[controller]`.
+"""The controller that a machine has now, as its card names it under `[controller]`, and the law
+that its drive runs.
 
 A gain is a number in SI (with the unit of the command in place of V), or a text with a unit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from design.drive_law import drive_law
+from design.machine.card_table import CardTable, InUnit, NotNegative, Positive
+from design.machine.drive import ForceLoop, Present
 from design.machine.readable import shown
+from design.pid import pd_to_rst, pid_to_rst
+from design.present import cascade_to_rst
+from design.rst import RST
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import over
-from workbench.cards.table import CardTable, NotNegative, Positive
-from workbench.cards.units import in_unit_of
 
-Quantity = Positive | str
-QuantityOrNone = NotNegative | str
 Kind = Literal["PD", "PID", "P-PI", "RST"]
-# Units of the gains; "stiffness" and "damping" are those of what the law gives.
-GAIN_UNITS: Mapping[Kind, Mapping[str, str]] = {
-    "PD": {"k_d": "stiffness", "T_d": "s", "eps": "s"},
-    "PID": {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
-    "P-PI": {"k_v": "1/s", "k_p": "damping", "T_i": "s", "eps": "s", "v_ff": "1"},
-    "RST": {},
+LAWS: Mapping[Kind, Callable[..., RST]] = {
+    "PD": pd_to_rst,
+    "PID": pid_to_rst,
+    "P-PI": cascade_to_rst,
 }
 
 
@@ -56,6 +58,48 @@ class CardController:
     forget: float | None
 
 
+def present(given: CardController, rig: Rig, h: float) -> Present:
+    """The controller as the law that the drive runs every h [s], or at its own period.
+
+    One that gives a motor's force is the law of its command. Raises BadSpecification where it is no
+    controller, BadCard where it gives a force that the card does not make of a command.
+    """
+    h = given.period or h
+    output, per = given.output, 1.0
+    if output == "force" and rig.kind == "motor":
+        if not rig.force_per_command:
+            raise BadCard('output = "force" needs the force_per_command of the motor')
+        output, per = "command", rig.force_per_command
+    gains = {name: one.value or 0.0 for name, one in given.gains.items()}
+    law = drive_law(rst_of(given.kind, {**gains, **given.polynomials}, h), given.forget, per)
+    force = None
+    if given.force is not None:
+        fast = given.force.period or h
+        if abs(round(h / fast) * fast - h) > 1e-6 * h or fast > h:
+            raise BadCard(f"force.period_s = {fast:g} s must divide the period of {h:g} s")
+        force = ForceLoop(given.force.k_i, given.force.T_i, h / round(h / fast))
+    return Present(given.kind, given.gains, output, law, force, given.rate)
+
+
+def rst_of(kind: Kind, numbers: Mapping[str, Any], h: float) -> RST:
+    """The law of a kind every h [s], by its gains in SI, or by an RST's coefficients."""
+    if kind == "RST":
+        R, S, T = (np.array(numbers[key]) for key in "RST")
+        return RST(R, S, T, h)
+    return LAWS[kind](**numbers, h=h)
+
+
+Quantity = Positive | str
+QuantityOrNone = NotNegative | str
+# Units of the gains; "stiffness" and "damping" are those of what the law gives.
+GAIN_UNITS: Mapping[Kind, Mapping[str, str]] = {
+    "PD": {"k_d": "stiffness", "T_d": "s", "eps": "s"},
+    "PID": {"k_R": "stiffness", "T_i": "s", "T_d": "s", "eps": "s", "b": "1", "c": "1"},
+    "P-PI": {"k_v": "1/s", "k_p": "damping", "T_i": "s", "eps": "s", "v_ff": "1"},
+    "RST": {},
+}
+
+
 class _ForceSection(CardTable):
     k_i: Quantity
     """command for each N"""
@@ -79,8 +123,9 @@ class _Common(CardTable):
     anti_windup_s: NotNegative | Literal["none"] | None = None
     """time in which its sum forgets what a limit cut off; without it T_i"""
 
-    def value(self, rig: Rig) -> CardController:
-        """The controller; raises BadCard where a gain's unit is of another kind."""
+    def value(self, rig: Rig, in_unit: InUnit) -> CardController:
+        """The controller; in_unit: what reads a text with its unit. Raises BadCard where a
+        gain's unit is of another kind."""
         units = shown(rig.motion == "rotary", rig.command_unit)
         output = self.output or ("command" if self.force is None else "force")
         if self.force is not None and (rig.kind == "motor" or output == "command"):
@@ -94,16 +139,18 @@ class _Common(CardTable):
         gains = dict[str, Estimate]()
         for name, of in GAIN_UNITS[self.kind].items():
             unit = of_law.get(of, of)
-            gains[name] = Estimate(_quantity(getattr(self, name), unit, name), unit)
+            gains[name] = Estimate(_quantity(in_unit, getattr(self, name), unit, name), unit)
         loop = None
         if self.force is not None:
-            k_i = _quantity(self.force.k_i, units.force_gain, "force.k_i")
-            T_i = _quantity(self.force.T_i, "s", "force.T_i")
+            k_i = _quantity(in_unit, self.force.k_i, units.force_gain, "force.k_i")
+            T_i = _quantity(in_unit, self.force.T_i, "s", "force.T_i")
             loop = CardForceLoop(k_i, T_i, self.force.period_s)
         forget = self.anti_windup_s
         if forget is None and "T_i" in gains:
             forget = gains["T_i"].value
-        rate = self.reference_rate
+        rate: float | None = None
+        if self.reference_rate is not None:
+            rate = _quantity(in_unit, self.reference_rate, units.velocity, "reference_rate")
         return CardController(
             kind=self.kind,
             gains=gains,
@@ -111,7 +158,7 @@ class _Common(CardTable):
             period=self.period_s,
             output=output,
             force=loop,
-            rate=None if rate is None else _quantity(rate, units.velocity, "reference_rate"),
+            rate=rate,
             forget=None if isinstance(forget, str) else forget,
         )
 
@@ -194,9 +241,9 @@ def _times_second(stiffness: str) -> str:
     return f"s/{length}" if above in ("", "1") else f"{above} s/{length}"
 
 
-def _quantity(written: float | str, unit: str, name: str) -> float:
+def _quantity(in_unit: InUnit, written: float | str, unit: str, name: str) -> float:
     """The number in `unit`; raises BadCard where it is none, or below 0."""
-    value = in_unit_of(written, unit, f"controller.{name}")
+    value = in_unit(written, unit, f"controller.{name}")
     assert value is not None
     if value < 0.0:
         raise BadCard(f"controller.{name} = {written!r}: must be >= 0")

@@ -9,6 +9,7 @@ import pytest
 
 from design.closed_loop.driven_loop import present_loop, run_driven
 from design.machine.model import Model
+from design.simulated.record import record
 from identification.errors import BadCard
 from identification.log import Log
 from identification.model.estimates import Estimate
@@ -16,10 +17,8 @@ from identification.model.karnopp import NAMES, UNITS
 from identification.model.plant import Motor
 from identification.signals.excitation import reference_signal
 from tests.chain import model_of
-from workbench.cards.card import Card, load_card
+from workbench.cards.card import Card, load_card, present_of_card
 from workbench.cli import main
-from workbench.steps.present import present_of_card
-from workbench.steps.simulate import record
 
 PLANT = """
 [recipe.friction]

@@ -5,16 +5,18 @@ loop is closed and in V where `drive = "command"`; noise is a standard deviation
 of an effect is a number in SI or a text with its unit; one that has a default may be left out.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from design.machine.card_table import CardTable, Divisor, NotNegative, Positive
+from design.machine.controller import Polynomials
 from identification.arrays import Array
-from identification.effects._library import Library, built_in
+from identification.effects._base import Acting
 from identification.errors import BadModel
-from identification.log import Motion
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.check import SHORTEST_LOG
@@ -26,9 +28,6 @@ from identification.signals.excitation import (
     Steps,
     Sum,
 )
-from workbench.cards.controller import Polynomials
-from workbench.cards.table import CardTable, Divisor, NotNegative, Positive
-from workbench.cards.written_effect import written_effect
 
 
 class StepsSection(CardTable):
@@ -329,13 +328,10 @@ class RecipeSection(CardTable):
                 )
         return self
 
-    def value(
-        self, library: Library | None = None, motion: Motion = "linear", command: str = "V"
-    ) -> Recipe:
+    def value(self, effect: Callable[[str, Mapping[str, Any]], Acting]) -> Recipe:
         """The recipe; raises BadModel where a parameter has the wrong sign or an effect is unknown.
 
-        library: the effects that it may name, by default all but a user's own files; command: the
-        unit of the command.
+        effect: what a key and its written parameters make.
         """
         drive = (
             Actuator(self.actuator.k1, self.actuator.k2)
@@ -345,15 +341,8 @@ class RecipeSection(CardTable):
         beside = self.loop.compensator if self.loop else None
         if beside and beside.friction:
             _ = beside.friction.value  # refused here, not in the simulation
-        if self.effects and not library:
-            from workbench.cards import own_effects  # with it comes numba
-
-            library = own_effects.library()
         try:
-            effects = tuple(
-                written_effect(key, written, library or built_in(), motion, command)
-                for key, written in self.effects.items()
-            )
+            effects = tuple(effect(key, written) for key, written in self.effects.items())
         except BadModel as error:
             raise BadModel(f"effects: {error}") from None
         return Recipe(
