@@ -337,6 +337,8 @@ def _reasons(best: _Choice) -> dict[str, str]:
         )
     if "u" in best.others:
         out["u"] = "the force's change follows it"
+    if "F" in best.others:
+        out["F"] = "the force of the two pressures goes with it"
     if "v" in best.others:
         out["v"] = "is the derivative of the position"
     return out

@@ -127,6 +127,17 @@ def test_two_pressures_are_the_right_way_round(logs: dict[str, Table], tmp_path:
     assert card["rig"]["supply_pressure_pa"] == 1e5  # around the rod, of absolute pressures
 
 
+def test_a_force_beside_two_pressures_without_a_word_has_a_reason_of_its_own(
+    logs: dict[str, Table], tmp_path: Path
+) -> None:
+    """It had been "the header says so"."""
+    true = logs["pneumatic"]
+    force = 1.256e-3 * true["p_p"] - 1e-3 * true["p_n"]
+    columns = (true["t"], true["y"], true["p_p"] / 1e5, true["p_n"] / 1e5, 1.0 * force)
+    one = propose(tmp_path, dict(zip(NAMES, columns, strict=False))).signal("F")
+    assert one is not None and "header says so" not in one.why
+
+
 def test_counts_get_their_gain_from_the_reference(logs: dict[str, Table], tmp_path: Path) -> None:
     true = logs["force"]
     table = {"t": true["t"], "setpoint [mm]": 1e3 * true["r"], "F": true["F"],
