@@ -17,7 +17,7 @@ Antriebssystemen, 4th ed., chapter 19; variable projection, Golub, Pereyra, SIAM
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,7 +35,8 @@ from identification.estimation.regression.weighted_rows import (
     spread_of_left_out,
 )
 from identification.log import Log, Rig
-from identification.model.estimates import Estimate, KarnoppFit
+from identification.model.estimates import Estimate
+from identification.model.karnopp import Karnopp
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
@@ -136,19 +137,19 @@ def are_two(one_body: float, left: float) -> bool:
     return left <= FAR_LESS * one_body
 
 
-def of_two_masses(fit: KarnoppFit, found: Resonance) -> KarnoppFit:
-    """The fit with the mass and the friction of sliding that two masses show, which one body's
-    motion bends."""
+def of_two_masses(
+    found: Resonance, friction: Karnopp, estimates: Mapping[str, Estimate]
+) -> tuple[Karnopp, dict[str, Estimate]]:
+    """Friction and estimates of one body with the mass and the friction of sliding that two masses
+    show, which one body's motion bends."""
     sizes = {"m": found.mass, "F_cp": found.F_cp, "F_cn": found.F_cn, "F_vp": found.F_vp}
     sizes["F_vn"] = found.F_vn
     values = {name: max(one.value, 0.0) for name, one in sizes.items()}
     reported = {
-        name: reported_estimate(one.value, fit.estimates[name].unit, one.sd, bounds=(0.0, np.inf))
+        name: reported_estimate(one.value, estimates[name].unit, one.sd, bounds=(0.0, np.inf))
         for name, one in sizes.items()
     }
-    return replace(
-        fit, friction=replace(fit.friction, **values), estimates={**fit.estimates, **reported}
-    )  # fmt: skip
+    return replace(friction, **values), {**estimates, **reported}
 
 
 def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
@@ -164,10 +165,12 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
 def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
     """The nearest minimum of what two masses leave (Levenberg 1944, Marquardt 1963)."""
     size = np.sqrt(np.mean(_left_of(p, cut, h) ** 2))  # in m or rad a gradient is soon "small"
-    return optimize.least_squares(
-        lambda tried: _left_of(tried, cut, h) / size, p, method="lm", max_nfev=runs,
-        diff_step=DIFFERENCE,
-    )  # fmt: skip
+
+    def left(tried: Array) -> Array:
+        return np.asarray(_left_of(tried, cut, h) / size)
+
+    apart = np.full(len(p), DIFFERENCE)
+    return optimize.least_squares(left, p, method="lm", max_nfev=runs, diff_step=apart)
 
 
 def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
