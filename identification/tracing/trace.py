@@ -116,6 +116,7 @@ def trace(
         plant=replace(plant, friction=friction),
         parameters_after=sizes,
         missing_force=None,  # which is of one body
+        next_experiment="",
     )
 
 

@@ -14,7 +14,7 @@ from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.remarks import printed_once
 from workbench.report.templating import MEANINGS
-from workbench.report.trace_words import share_of_friction
+from workbench.report.trace_words import share_of_friction, two_masses_sentence
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, more, tabled
 
@@ -148,8 +148,8 @@ def _found(model: Model, missing: float | None) -> str:
         who, more = ("free run", ", the equation of motion more") if shows else ("model", "")
         return f"{text} The {who} leaves nothing but {_noise_of(model)}{more}."
     if model.resonance is not None:
-        hertz = number(used(model.resonance["frequency"]), 4)
-        return f"{text} Two masses with a spring between them swing at {hertz} Hz."
+        said = two_masses_sentence(model.resonance)
+        return f"{text} {said[0].upper()}{said[1:]}"
     if model.by_equation and missing is not None and missing <= MATERIAL:
         times_noise = times(model.fit.chi_square**0.5)
         return f"{text} The equation of motion leaves {times_noise} the sensors' noise."
