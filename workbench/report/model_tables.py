@@ -131,7 +131,7 @@ def summary(model: Model, missing: LatentForces | None) -> str:
     if missing is None or share is None or model.coulomb_unknown:
         return _found(model, None)
     said = share_of_friction(share, missing)
-    known = None if missing.is_a_bound else share
+    known = None if missing.is_a_bound and share > MATERIAL else share
     return f"{_found(model, known)} Force missing: {said} of friction."
 
 
@@ -156,6 +156,11 @@ def _found(model: Model, missing: float | None) -> str:
     if to_the_noise_by_equation(model):
         leaves = "little more than noise, but a force is missing" if shows else "nothing but noise"
         return f"{text} The equation of motion leaves {leaves}; no free run follows."
+    if missing is not None and missing <= MATERIAL:
+        return (
+            f"{text} No force is missing while it slides; what the run leaves, {left_of(model)}, is"
+            " of stops and breakaways."
+        )
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 
