@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.arrays import Array
 
-DT = 2e-4  # s, of the simulation
+DT = 2.5e-5  # s, of the simulation: its integrator errs by the share of a step
 SECONDS = 20.0
 HARD = 'solimpfriction="0.9999 0.9999 0.001" solreffriction="0.0005 1"'
 Extra = Callable[[float, float], float]  # force against the motion by position and speed

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Mapping
 
-from design.machine.readable import number
+from design.machine.readable import in_digits, number
 from identification.log import Rig
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.plant import units_of
@@ -78,14 +78,21 @@ def unequal_friction(friction: Mapping[str, Estimate], effects: Collection[str])
 
 def _resonance(found: Resonance, unit: str) -> str:
     hertz, behind = (number(one.value, 4) for one in (found.frequency, found.anti_resonance))
+    first, second = (
+        in_digits((one.value, *_limits(one)), one.value, one.sd) for one in (found.m_1, found.m_2)
+    )
     return (
         f"two masses: a resonance at {hertz} Hz, damping {number(found.damping.value, 2)}, behind"
-        f" an anti-resonance at {behind} Hz; {number(found.m_1.value)} {unit}"
-        f" ({_interval(found.m_1)}) are measured and {number(found.m_2.value)}"
-        f" ({_interval(found.m_2)}) hang on a spring; m is both together"
+        f" an anti-resonance at {behind} Hz; {first[0]} {unit} ({first[1]} to {first[2]}) are"
+        f" measured and {second[0]} ({second[1]} to {second[2]}) hang on a spring; m is both"
+        " together"
     )
 
 
 def _interval(of: Size) -> str:
-    low, high = (of.value + sign * NORMAL_95 * of.sd for sign in (-1.0, 1.0))
+    low, high = _limits(of)
     return f"{number(low)} to {number(high)}"
+
+
+def _limits(of: Size) -> tuple[float, float]:
+    return of.value - NORMAL_95 * of.sd, of.value + NORMAL_95 * of.sd

@@ -133,7 +133,9 @@ def fit_beside(
     if shows and not (fit.adequate or beside.orders or halt.reached()):
         resonance = two_masses(alone, rig) if acts_directly(alone, rig, drive) else None
         if resonance is not None:
-            beside, fit = replace(beside, resonance=resonance), of_two_masses(fit, resonance)
+            beside = replace(beside, resonance=resonance)
+            friction, estimates = of_two_masses(resonance, fit.friction, fit.estimates)
+            fit = replace(fit, friction=friction, estimates=estimates)
     if halt.reached():
         fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
     if beside.none:

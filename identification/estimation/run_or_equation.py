@@ -65,6 +65,10 @@ LIKELIEST_WHY = MinorRemark(
     "mass and sliding friction are those that make the position measured while sliding likeliest,"
     " since the force or command is noisy; stick limits and bands those of the run"
 )
+LOST_STOPS_WHY = MinorRemark(
+    "mass and sliding friction are those that make the position measured while sliding likeliest,"
+    " since the run loses stops; stick limits and bands those of the run"
+)
 LESS_ERROR_WHY = (
     "the equation of motion gives mass and friction with less error than the free run, because of"
     " a noisy clock or command; stick limits and band are not identifiable"
@@ -164,14 +168,16 @@ def shown_sliding(plant: Plant) -> list[str]:
 
 
 def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
-    """A fit that is adequate with mass, sliding friction and effects of largest likelihood, where
-    its own are significantly less likely: a run that a noisy force or command drives begins and
-    ends its stops by that noise, and is bent by those that it loses. Stick limits and bands stay
-    the run's.
+    """A fit with mass, sliding friction and effects of largest likelihood, where its own are
+    significantly less likely: a run that a noisy force or command drives begins and ends its stops
+    by that noise, and one that follows the sliding alone loses them; either is bent by what it
+    loses. Stick limits and bands stay the run's.
 
     Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
-    if not (fit.adequate and any(one.has_random_walk(recorded.drive) for one in recorded.logs)):
+    noisy = any(one.has_random_walk(recorded.drive) for one in recorded.logs)
+    loses_stops = recorded.drive == "command" and not fit.adequate
+    if not (loses_stops or (noisy and fit.adequate)):
         return fit
     rows = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]
     if MECHANICAL not in rows:  # too little slides
@@ -200,7 +206,7 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         estimates={**fit.estimates, **{name: reported[name] for name in found.names}},
         free=(*found.names, *stops),
         covariance=block_diag(covariance, fit.covariance[np.ix_(at, at)]),
-        remarks=(*fit.remarks, LIKELIEST_WHY),
+        remarks=(*fit.remarks, LIKELIEST_WHY if fit.adequate else LOST_STOPS_WHY),
     )
 
 

@@ -5,15 +5,19 @@ acts on it along the measured motion:
     y = G(s) [F - (+-)F_c - F_v v] / (m_1 + m_2) + free motion,
     G(s) = (w_r/w_a)^2 (s^2 + 2 z_a w_a s + w_a^2) / (s^2 (s^2 + 2 z w_r s + w_r^2)),
     w_a^2 = k/m_2 (the motor stands still), w_r^2 = k (1/m_1 + 1/m_2), z_a w_r = z w_a.
-All but the two frequencies and the damping are linear and solved within (variable projection), so
-these three alone are searched. One body in the same windows is what it has to beat. Windows that
-leave three times the median square, in which the body stops, are left out of both.
+F comes late by what a log puts between its columns, which an anti-resonance is not to take up. All
+but the two frequencies, the damping and this lag are linear and solved within (variable
+projection), so these four alone are searched. One body in the same windows, at its own lag, is
+what it has to beat. In every window
+the body goes one way: at a reversal or a stop the friction is none that the motion prescribes.
+Windows that leave three times the median square, in which it stopped unseen, are left out of both.
 Sources: drives with an elastic shaft, Schroeder, Elektrische Antriebe - Regelung von
 Antriebssystemen, 4th ed., chapter 19; variable projection, Golub, Pereyra, SIAM J. Numer. Anal. 10
 (1973) 413.
 """
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,31 +35,44 @@ from identification.estimation.regression.weighted_rows import (
     spread_of_left_out,
 )
 from identification.log import Log, Rig
-from identification.model.estimates import Estimate, KarnoppFit
+from identification.model.estimates import Estimate
+from identification.model.karnopp import Karnopp
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
 from identification.thresholds import ASTRAY, BEYOND_CHANCE, FAR_LESS, WORSE
 
-RUN_SECONDS = 0.5  # s
-LEAST_CYCLES = 2.0  # of the resonance in a window
+RUN_SECONDS, SHORTEST_RUN = 0.5, 0.1  # s
+LEAST_CYCLES = 2.0  # of the resonance in a window of full length
 HIGHEST_SHARE = 0.25  # of the sampling rate
 SAMPLES_TAKEN = 12_000
 HERTZ_TRIED = 24  # tried, on a scale of ratios
 APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
+DIFFERENCE = 1e-5  # of the logarithms, for the gradient: recursions round off at 1e-10
 FEWEST_RUNS = 8
+MOST_LAG = 4  # samples between force and position, to either side
 ONE_BODY = (np.ones(1), np.array([1.0, 0.0, 0.0]))  # y = F / (m s^2), for a unit mass
 
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """Position [m] from its first sample on, (n,), and inputs in columns (n, 5): force, Coulomb
-    friction each way, viscous friction each way, of unit size."""
+    """Position [m] from its first sample on, (n,), force [N] from MOST_LAG samples before it to as
+    many after its last, and friction of unit size in columns (n, 4): Coulomb each way, viscous each
+    way."""
 
     y: Array
-    inputs: Array
+    force: Array
+    friction: Array
+
+    def inputs(self, lag: float) -> Array:
+        """Force, late by so many samples, and friction, (n, 5)."""
+        whole = int(np.floor(lag))
+        first = MOST_LAG - whole
+        now, before = (self.force[at : at + len(self.y)] for at in (first, first - 1))
+        late = now + (lag - whole) * (before - now)
+        return np.column_stack([late, self.friction])
 
 
 def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
@@ -67,29 +84,41 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     """
     h = logs[0].h
     try:
-        cut = _windows(logs, zoh=rig.kind == "motor", length=round(RUN_SECONDS / h))
+        cut = _windows(logs, zoh=rig.kind == "motor")
     except UserError:
         return None
     lowest, highest = LEAST_CYCLES / RUN_SECONDS, HIGHEST_SHARE / h
     if len(cut) < FEWEST_RUNS or not lowest < highest:
         return None
     tried = [
-        np.log([2.0 * np.pi * f / ratio, 2.0 * np.pi * f, BEGUN])
+        np.append(np.log([2.0 * np.pi * f / ratio, 2.0 * np.pi * f, BEGUN]), 0.0)
         for f in np.geomspace(lowest, highest, HERTZ_TRIED)
         for ratio in APART_TRIED
     ]
     starts = sorted(tried, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))[:SEARCHES_RUN]
-    every = [_nearest(p, cut, h, 4 * EACH_SEARCH) for p in starts]
-    found = min(every, key=lambda one: float(one.cost))
-    each = _of_windows(found.fun, cut)
+    every = [_nearest(p, cut, h, 4 * EACH_SEARCH).x for p in starts]
+    found = min(every, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))
+    each = _of_windows(_left_of(found, cut, h), cut)
     cut = [one for one, left in zip(cut, each, strict=True) if left <= ASTRAY * np.median(each)]
-    found = _nearest(found.x, cut, h, 4 * EACH_SEARCH)
-    one_body = _left(cut, ONE_BODY, h, _drift)[0]
-    w_a, w_r, damping = (float(x) for x in np.exp(found.x))
+    found = _nearest(found, cut, h, 4 * EACH_SEARCH).x
+    one_body = _one_body(cut, h)
+    two = _left_of(found, cut, h)
+    w_a, w_r, damping = (float(x) for x in np.exp(found[:3]))
     inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
-    if not inside or not are_two(float(one_body @ one_body), float(found.fun @ found.fun)):
+    if not inside or not are_two(one_body, float(two @ two)):
         return None
-    return _resonance(found.x, cut, h, damping)
+    return _resonance(found, cut, h, damping)
+
+
+def _one_body(cut: Sequence[_Window], h: float) -> float:
+    """The square that one body leaves of all windows, at its best lag."""
+
+    def square(lag: float) -> float:
+        left = _left(cut, ONE_BODY, lag, h, _drift)[0]
+        return float(left @ left)
+
+    most = MOST_LAG - 1.0
+    return float(optimize.minimize_scalar(square, bounds=(-most, most), method="bounded").fun)
 
 
 def _of_windows(left: Array, cut: Sequence[_Window]) -> Array:
@@ -108,19 +137,19 @@ def are_two(one_body: float, left: float) -> bool:
     return left <= FAR_LESS * one_body
 
 
-def of_two_masses(fit: KarnoppFit, found: Resonance) -> KarnoppFit:
-    """The fit with the mass and the friction of sliding that two masses show, which one body's
-    motion bends."""
+def of_two_masses(
+    found: Resonance, friction: Karnopp, estimates: Mapping[str, Estimate]
+) -> tuple[Karnopp, dict[str, Estimate]]:
+    """Friction and estimates of one body with the mass and the friction of sliding that two masses
+    show, which one body's motion bends."""
     sizes = {"m": found.mass, "F_cp": found.F_cp, "F_cn": found.F_cn, "F_vp": found.F_vp}
     sizes["F_vn"] = found.F_vn
     values = {name: max(one.value, 0.0) for name, one in sizes.items()}
     reported = {
-        name: reported_estimate(one.value, fit.estimates[name].unit, one.sd, bounds=(0.0, np.inf))
+        name: reported_estimate(one.value, estimates[name].unit, one.sd, bounds=(0.0, np.inf))
         for name, one in sizes.items()
     }
-    return replace(
-        fit, friction=replace(fit.friction, **values), estimates={**fit.estimates, **reported}
-    )  # fmt: skip
+    return replace(friction, **values), {**estimates, **reported}
 
 
 def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
@@ -135,7 +164,13 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
 
 def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
     """The nearest minimum of what two masses leave (Levenberg 1944, Marquardt 1963)."""
-    return optimize.least_squares(_left_of, p, method="lm", max_nfev=runs, args=(cut, h))
+    size = np.sqrt(np.mean(_left_of(p, cut, h) ** 2))  # in m or rad a gradient is soon "small"
+
+    def left(tried: Array) -> Array:
+        return np.asarray(_left_of(tried, cut, h) / size)
+
+    apart = np.full(len(p), DIFFERENCE)
+    return optimize.least_squares(left, p, method="lm", max_nfev=runs, diff_step=apart)
 
 
 def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
@@ -156,7 +191,7 @@ def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Re
 def _numbers(p: Array, cut: Sequence[_Window], h: float) -> Array:
     """Resonance and anti-resonance [Hz], damping, both masses [kg], and the friction (4,) [N]."""
     _, theta = _two_bodies(p, cut, h)
-    w_a, w_r, damping = np.exp(p)
+    w_a, w_r, damping = np.exp(p[:3])
     mass = 1.0 / theta[0]
     first = mass * (w_a / w_r) ** 2
     own = [w_r / (2.0 * np.pi), w_a / (2.0 * np.pi), damping, first, mass - first]
@@ -169,7 +204,8 @@ def _left_of(p: Array, cut: Sequence[_Window], h: float) -> Array:
 
 def _two_bodies(p: Array, cut: Sequence[_Window], h: float) -> tuple[Array, Array]:
     """What two masses leave of every window, and the linear parameters (5,) over the mass."""
-    w_a, w_r, damping = (float(x) for x in np.exp(np.clip(p, -10.0, 11.0)))
+    w_a, w_r, damping = (float(x) for x in np.exp(np.clip(p[:3], -10.0, 11.0)))
+    lag = float(np.clip(p[3], 1.0 - MOST_LAG, MOST_LAG - 1.0))
     top = np.array([1.0, 2.0 * damping * w_a**2 / w_r, w_a**2]) * (w_r / w_a) ** 2
     below = np.array([1.0, 2.0 * damping * w_r, w_r**2, 0.0, 0.0])
     decay, turn = damping * w_r, w_r * np.sqrt(max(1.0 - min(damping, 0.99) ** 2, 1e-4))
@@ -180,7 +216,7 @@ def _two_bodies(p: Array, cut: Sequence[_Window], h: float) -> tuple[Array, Arra
             [_drift(t), decaying * np.cos(turn * t), decaying * np.sin(turn * t)]
         )
 
-    return _left(cut, (top, below), h, free)
+    return _left(cut, (top, below), lag, h, free)
 
 
 def _drift(t: Array) -> Array:
@@ -189,10 +225,11 @@ def _drift(t: Array) -> Array:
 
 
 def _left(
-    cut: Sequence[_Window], system: tuple[Array, Array], h: float, free: Callable[[Array], Array]
-) -> tuple[Array, Array]:
-    """What a linear system, as its polynomials in s, leaves of all windows beside its free motion,
-    and its inputs' sizes."""
+    cut: Sequence[_Window], system: tuple[Array, Array], lag: float, h: float,
+    free: Callable[[Array], Array],
+) -> tuple[Array, Array]:  # fmt: skip
+    """What a linear system, as its polynomials in s, leaves of all windows beside its free motion
+    under a force late by `lag` samples, and its inputs' sizes."""
     sampled: Any = cont2discrete(system, h, "zoh")
     top, below = np.ravel(sampled[0]), sampled[1]
     columns, y = [], []
@@ -202,7 +239,7 @@ def _left(
         if n not in bases:
             bases[n] = np.linalg.qr(free(np.asarray(h * np.arange(n), dtype=np.float64)))[0]
         q = bases[n]
-        x = lfilter(top, below, one.inputs, axis=0)
+        x = lfilter(top, below, one.inputs(lag), axis=0)
         columns.append(x - q @ (q.T @ x))
         y.append(one.y - q @ (q.T @ one.y))
     X, b = np.vstack(columns), np.concatenate(y)
@@ -210,16 +247,27 @@ def _left(
     return np.asarray(b - X @ theta), theta
 
 
-def _windows(logs: Sequence[Log], *, zoh: bool, length: int) -> list[_Window]:
-    """Windows of the logs in which the body moves."""
+def _windows(logs: Sequence[Log], *, zoh: bool) -> list[_Window]:
+    """Windows of the logs in which the body goes one way."""
     out: list[_Window] = []
     for log in logs:
         one = motion_log(log, zoh=zoh, by_command=False)
-        v, F, y = one.signals["v"], np.asarray(log["F"]), np.asarray(log["y"])
-        up, down = 1.0 * (v > 0.0), 1.0 * (v < 0.0)
-        inputs = np.column_stack([F, -up, down, -v * up, -v * down])
-        for begin in range(0, min(len(log), SAMPLES_TAKEN // len(logs)) - length + 1, length):
-            at = slice(begin, begin + length)
-            if np.any(one.signals["d"][at] != 0.0):
-                out.append(_Window(y[at] - y[begin], inputs[at]))
+        y, d = np.asarray(log["y"]), np.asarray(one.signals["d"])
+        v = (
+            np.diff(y, append=y[-1]) / log.h
+        )  # of each interval; a smooth one lacks what swings fast
+        up, down = 1.0 * (d > 0.0), 1.0 * (d < 0.0)
+        F = np.pad(np.asarray(log["F"]), MOST_LAG, mode="edge")
+        friction = np.column_stack([-up, down, -v * up, -v * down])
+        taken = min(len(log), SAMPLES_TAKEN // len(logs))
+        longest, shortest = (max(2, round(s / log.h)) for s in (RUN_SECONDS, SHORTEST_RUN))
+        turns = [0, *(np.flatnonzero(np.diff(d[:taken])) + 1), taken]
+        for begin, end in itertools.pairwise(turns):
+            for first in range(begin, end if d[begin] else begin, longest):
+                at = slice(first, min(first + longest, end))
+                on = d[begin] * y[at]
+                back = np.max(np.maximum.accumulate(on) - on)
+                if len(on) >= shortest and back <= BEYOND_CHANCE * one.noise.y:
+                    force = F[first : at.stop + 2 * MOST_LAG]
+                    out.append(_Window(y[at] - y[first], force, friction[at]))
     return out

@@ -18,7 +18,7 @@ from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.run_or_equation import STEPS_WHY
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.two_masses import two_masses
+from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
@@ -108,8 +108,16 @@ def trace(
     resonance = two_masses(train, rig)
     if resonance is None:
         return traced
-    around = replace(beside, resonance=resonance)
-    return replace(traced, surroundings=around, missing_force=None)  # which is of one body
+    around, plant = replace(beside, resonance=resonance), traced.plant
+    friction, sizes = of_two_masses(resonance, plant.friction, traced.parameters_after)
+    return replace(
+        traced,
+        surroundings=around,
+        plant=replace(plant, friction=friction),
+        parameters_after=sizes,
+        missing_force=None,  # which is of one body
+        next_experiment="",
+    )
 
 
 def _is_followed(traced: Trace) -> bool:

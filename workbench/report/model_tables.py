@@ -14,7 +14,7 @@ from identification.model.estimates import Estimate
 from identification.thresholds import ADEQUATE, ASTRAY, MATERIAL, OF_ACCOUNT
 from workbench.remarks import printed_once
 from workbench.report.templating import MEANINGS
-from workbench.report.trace_words import share_of_friction
+from workbench.report.trace_words import share_of_friction, two_masses_sentence
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, more, tabled
 
@@ -131,7 +131,7 @@ def summary(model: Model, missing: LatentForces | None) -> str:
     if missing is None or share is None or model.coulomb_unknown:
         return _found(model, None)
     said = share_of_friction(share, missing)
-    known = None if missing.is_a_bound else share
+    known = None if missing.is_a_bound and share > MATERIAL else share
     return f"{_found(model, known)} Force missing: {said} of friction."
 
 
@@ -148,14 +148,19 @@ def _found(model: Model, missing: float | None) -> str:
         who, more = ("free run", ", the equation of motion more") if shows else ("model", "")
         return f"{text} The {who} leaves nothing but {_noise_of(model)}{more}."
     if model.resonance is not None:
-        hertz = number(used(model.resonance["frequency"]), 4)
-        return f"{text} Two masses with a spring between them swing at {hertz} Hz."
+        said = two_masses_sentence(model.resonance)
+        return f"{text} {said[0].upper()}{said[1:]}"
     if model.by_equation and missing is not None and missing <= MATERIAL:
         times_noise = times(model.fit.chi_square**0.5)
         return f"{text} The equation of motion leaves {times_noise} the sensors' noise."
     if to_the_noise_by_equation(model):
         leaves = "little more than noise, but a force is missing" if shows else "nothing but noise"
         return f"{text} The equation of motion leaves {leaves}; no free run follows."
+    if missing is not None and missing <= MATERIAL:
+        return (
+            f"{text} No force is missing while it slides; what the run leaves, {left_of(model)}, is"
+            " of stops and breakaways."
+        )
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 

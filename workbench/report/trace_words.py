@@ -1,12 +1,14 @@
 """A trace in words: its verdict, and what to do next."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from design.identified.trace_logs import Traced
+from design.machine.model import used
 from design.machine.readable import force, length, number, shown_unit
 from identification.estimation.latent_force import LatentForces
+from identification.model.estimates import Estimate
 from identification.thresholds import OF_ACCOUNT
 from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
@@ -28,6 +30,12 @@ class ReportedError(NamedTuple):
     after: float
     noise: float | None
     write: Callable[[float], str]
+
+
+def two_masses_sentence(resonance: Mapping[str, Estimate]) -> str:
+    """At which frequency two masses swing."""
+    hertz = number(used(resonance["frequency"]), 4)
+    return f"two masses with a spring between them swing at {hertz} Hz."
 
 
 def words(key: str) -> str:
@@ -94,6 +102,8 @@ def _verdict_sentence(traced: Traced) -> str:
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _ if found.effects:
             return _partly(traced, names, errors)
+        case _ if traced.model.resonance is not None:
+            return f"No effect of the library: {two_masses_sentence(traced.model.resonance)}"
         case _ if found.unknown.depends_on:
             left = _on_signals(found.unknown)
             return f"Unknown: what is left {left}, and no effect of the library explains it."
@@ -263,7 +273,8 @@ def advice(traced: Traced) -> list[str]:
     left = found.after["test"].force_rms
     if found.verdict == "none" and (left is None or left > NOISE * found.noise_force):
         out.append("what is left is more than noise: check a controller on the machine with care")
-    if found.verdict == "unknown" and found.unknown.depends_on:
+    seen = traced.model.resonance is None and found.unknown.depends_on
+    if found.verdict == "unknown" and seen:
         out.append(
             "if you know what it is, write it as an effect of your own: `workbench effects check"
             " FOLDER`, then `workbench trace ... --effects FOLDER`"

@@ -21,6 +21,9 @@ from identification.estimation.estimates import FIXED_AT_DEFAULT, of_effect
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.model.resonance import Resonance
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from identification.signals.running_median import running_median
 from identification.tracing.residual_rows import effect_at_rows, log_starts, share_inside
 from identification.tracing.result import (
@@ -46,7 +49,7 @@ from workbench.report.trace import (
     rivals_table,
 )
 from workbench.report.trace_pictures import axis_of
-from workbench.report.trace_words import percent, trace_sentence
+from workbench.report.trace_words import advice, percent, trace_sentence
 from workbench.report.view import view
 from workbench.steps.trace import named_logs
 
@@ -210,6 +213,17 @@ def test_the_verdict_is_a_plain_sentence(
     assert said in text
     errors = "Held-out force error 1.83 N -> 0.07 N (sensors' noise 0.069 N)."
     assert (errors in text) == bool(keys)
+
+
+def test_two_masses_are_the_answer_where_no_effect_is() -> None:
+    size = Size(25.0, 0.01)
+    resonance = Resonance(*[size] * 9)
+    found = replace(trace_of("unknown", ()), surroundings=Surroundings(resonance=resonance))
+    found = replace(found, next_experiment="")
+    text = trace_sentence(traced(found))
+    assert text.startswith("No effect of the library: two masses with a spring between them swing")
+    assert "25 Hz" in text and "depends on" not in text
+    assert not advice(traced(found))
 
 
 def test_an_effect_that_is_not_all_is_reported_with_its_share_and_the_rest() -> None:
