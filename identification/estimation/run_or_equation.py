@@ -4,9 +4,9 @@ One place decides. A rig that prescribes the motion, or a run by a measured forc
 body's own, leaves the equation. Else the fit converges on the run, whole where it is followed so
 (`converged_fit`); and where it leaves clearly more of the equation than the equation's own least
 squares do on held-out stretches, or identifies less of mass and sliding friction without following
-the log, the equation answers after all. Where the force or command is noisy, mass and sliding
-friction are those of largest likelihood, if the run's are significantly less likely
-(`prediction_error`).
+the log, the equation answers after all. Where the force or command is noisy, or a motor's run
+loses its stops, mass and sliding friction are those of largest likelihood, if the run's are
+significantly less likely (`prediction_error`).
 """
 
 from contextlib import suppress
