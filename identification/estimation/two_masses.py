@@ -1,16 +1,16 @@
 """Two masses and a spring between them: a motor that is measured, and a load behind its shaft.
 
-The position of the first mass in windows of free run (0.5 s), of a linear system whose friction
-acts on it along the measured motion:
+The position of the first mass in windows of free run (at most 0.5 s), of a linear system whose
+friction acts on it along the measured motion:
     y = G(s) [F - (+-)F_c - F_v v] / (m_1 + m_2) + free motion,
     G(s) = (w_r/w_a)^2 (s^2 + 2 z_a w_a s + w_a^2) / (s^2 (s^2 + 2 z w_r s + w_r^2)),
     w_a^2 = k/m_2 (the motor stands still), w_r^2 = k (1/m_1 + 1/m_2), z_a w_r = z w_a.
 F comes late by what a log puts between its columns, which an anti-resonance is not to take up. All
 but the two frequencies, the damping and this lag are linear and solved within (variable
 projection), so these four alone are searched. One body in the same windows, at its own lag, is
-what it has to beat. In every window
-the body goes one way: at a reversal or a stop the friction is none that the motion prescribes.
-Windows that leave three times the median square, in which it stopped unseen, are left out of both.
+what it has to beat. In every window the body goes one way: at a reversal or a stop the friction is
+none that the motion prescribes. Windows that leave three times the median square, in which it
+stopped unseen, are left out of both.
 Sources: drives with an elastic shaft, Schroeder, Elektrische Antriebe - Regelung von
 Antriebssystemen, 4th ed., chapter 19; variable projection, Golub, Pereyra, SIAM J. Numer. Anal. 10
 (1973) 413.
@@ -42,7 +42,7 @@ from identification.model.resonance import Resonance
 from identification.model.size import Size
 from identification.thresholds import ASTRAY, BEYOND_CHANCE, FAR_LESS, WORSE
 
-RUN_SECONDS, SHORTEST_RUN = 0.5, 0.1  # s
+RUN_SECONDS, SHORTEST_RUN = 0.5, 0.05  # s
 LEAST_CYCLES = 2.0  # of the resonance in a window of full length
 HIGHEST_SHARE = 0.25  # of the sampling rate
 SAMPLES_TAKEN = 12_000
