@@ -16,7 +16,7 @@ from design.closed_loop.loop_figures import common_reference, tested_of
 from design.controllers.validate import validate
 from design.machine.design import Design
 from design.machine.model import Model
-from design.machine.readable import force, length
+from design.machine.readable import Display
 from design.measured.predict import default_drive, pooled, predict
 from identification.errors import BadModel
 from identification.log import Log
@@ -105,12 +105,12 @@ def challenge(
         else None
         for name, one in both.items()
     }
-    rotary, old = challenger.model.rotary, loop["champion"]
-    pairs = _compared(errors["champion"], errors["challenger"], rotary)
+    display, old = challenger.model.display, loop["champion"]
+    pairs = _compared(errors["champion"], errors["challenger"], display)
     lost = _lost_held_out(pairs, terms)
     if lost:
         return Contest(False, False, lost, errors, loop)
-    won, said = _tracked(old, loop["challenger"], terms, rotary)
+    won, said = _tracked(old, loop["challenger"], terms, display)
     champion_passes = old is not None and old.rms is not None and not old.missed
     said = f"{_held_out_words(pairs)}; simulation: {said}"
     return Contest(won, not won and champion_passes, said, errors, loop)
@@ -131,14 +131,14 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
 Pairs = list[tuple[str, float, float, str]]
 
 
-def _compared(old: HeldOut, new: HeldOut, rotary: bool) -> Pairs:
+def _compared(old: HeldOut, new: HeldOut, display: Display) -> Pairs:
     pairs = (
-        ("free run", old.position_rms, new.position_rms, length),
-        ("force", old.force_rms, new.force_rms, force),
+        ("free run", old.position_rms, new.position_rms, display.length_text),
+        ("force", old.force_rms, new.force_rms, display.force_text),
     )
     return [
-        (name, before, after, f"{shown(after, rotary)} rms against {shown(before, rotary)}")
-        for name, before, after, shown in pairs
+        (name, before, after, f"{text(after)} rms against {text(before)}")
+        for name, before, after, text in pairs
         if before is not None and after is not None
     ]
 
@@ -161,19 +161,19 @@ def _held_out_words(pairs: Pairs) -> str:
 
 
 def _tracked(
-    old: Tracking | None, new: Tracking | None, terms: Terms, rotary: bool
+    old: Tracking | None, new: Tracking | None, terms: Terms, display: Display
 ) -> tuple[bool, str]:
     """Whether the challenger wins in simulation, and what came out there."""
     if new is None:
         return False, "no design"
     if new.missed or new.rms is None:
         return False, "; ".join(new.missed)
-    text = f"tracking error {length(new.rms, rotary)} rms"
+    text = f"tracking error {display.length_text(new.rms)} rms"
     if old is None:
         return True, f"{text}, no design before"
     if old.missed or old.rms is None:
         return True, f"{text}, the active design misses: {'; '.join(old.missed)}"
-    text = f"{text} against {length(old.rms, rotary)} of the active design"
+    text = f"{text} against {display.length_text(old.rms)} of the active design"
     if new.rms <= old.rms * (1.0 - terms.loop):
         return True, text
     return False, f"{text} on the same machine, at least {100 * terms.loop:g} % less needed"

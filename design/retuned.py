@@ -135,8 +135,7 @@ class Retuning:
         evidence = {**evidence, "contest": asdict(contest)}
         reason = _then(said, contest.reason)
         moved = moved_between(champion.model.friction, challenger.model.friction)
-        rotary = champion.model.rotary
-        by_hand = no_wear(moved, rotary)
+        by_hand = no_wear(moved, champion.model.display)
         if by_hand and (contest.won or contest.model_won):
             reason = f"{by_hand}: nothing is replaced by itself, a person decides; {reason}"
             return Judgement("refused", reason, candidate, evidence)

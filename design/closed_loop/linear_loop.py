@@ -12,7 +12,6 @@ from design.machine.codec import Command
 from design.machine.design import From, Linear
 from design.machine.drive import ForceLoop
 from design.machine.model import Model, used
-from design.machine.readable import shown
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.estimation.estimates import reported_estimate
@@ -35,7 +34,7 @@ def command_of(model: Model, force: ForceLoop | None) -> Command:
         return Command(rig.command_unit, rig.control_limit, drive.k_a)
     if force is not None:
         return Command(rig.command_unit, rig.control_limit, None)
-    unit = shown(model.rotary).force
+    unit = model.display.force
     return Command(unit, rig.control_limit if rig.command_unit == unit else None, 1.0)
 
 

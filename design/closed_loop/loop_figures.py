@@ -26,7 +26,6 @@ from design.machine.design import (
     margin_values,
 )
 from design.machine.model import Model
-from design.machine.readable import length, shown
 from design.margins import margins
 from design.rst import closed_loop_poles
 from design.tune import worst_modulus
@@ -269,7 +268,7 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> Iterator[str
         samples = result.margins.delay_samples
         if samples is not None and not (samples >= limits.delay):
             yield f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed"
-    standstill = f"error at standstill {length(result.standstill, machine.rotary)},"
+    standstill = f"error at standstill {machine.display.length_text(result.standstill)},"
     for what, share, of, allowed in (
         (standstill, result.standstill_relative, "the step", limits.standstill),
         ("error along the smooth reference", result.smooth_relative, "its amplitude",
@@ -278,7 +277,7 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> Iterator[str
     ):  # fmt: skip
         if not (share <= allowed):
             yield f"{what} {100 * share:.1f} % of {of}, at most {100 * allowed:g} % allowed"
-    units, seen = shown(machine.rotary), result.force_seen
+    units, seen = machine.display, result.force_seen
     if seen > 0 and not (result.force_peak <= limits.force * seen):
         yield (
             f"peak force {result.force_peak:.4g} {units.force}, the logs show {seen:.4g} at most,"

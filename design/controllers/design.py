@@ -42,7 +42,7 @@ from design.machine.design import (
 from design.machine.drive import ForceLoop
 from design.machine.model import Model, used
 from design.machine.plausible import bandwidth_remarks, stored_remarks
-from design.machine.readable import Shown, length, number, shown, shown_unit
+from design.machine.readable import Display, number
 from design.machine.versions import versions
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
@@ -107,7 +107,7 @@ def _tracks_better(model: Model, cascade: Design, found: Design) -> Iterator[str
     taken = choice.controller + (COMPENSATED if choice.compensator else "")
     ours = compared(model, found)[taken].smooth_relative
     if its["p-pi"].smooth_relative < CLEARLY_LESS * ours and not _least_missed(cascade):
-        figures = reasons("p-pi", False, {"p-pi": its["p-pi"]}, shown(model.rotary))
+        figures = reasons("p-pi", False, {"p-pi": its["p-pi"]}, model.display)
         yield (
             f"a P-PI, the cascade of most drives, would track better: {own_figures(figures)};"
             " 'workbench design MODEL --structure p-pi' makes it"
@@ -233,7 +233,7 @@ def _placed_at(
                 tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
             )
             followed = _followable(tuned, of_poles, None if wanted.dominant else model.speed)
-            found[name] = _controller(followed, plant, shown(model.rotary))
+            found[name] = _controller(followed, plant, model.display)
         except BadSpecification as error:
             refused[name] = str(error)
     if "p-pi" in structures:
@@ -321,7 +321,7 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned, plant: Linear, units: Shown) -> Controller:
+def _controller(tuned: Tuned, plant: Linear, display: Display) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
     return Controller(
         R=tuple(rst.R.tolist()),
@@ -336,14 +336,14 @@ def _controller(tuned: Tuned, plant: Linear, units: Shown) -> Controller:
         overshoot=taken.overshoot,
         missed=tuned.missed,
         gains=None if pid is None else pid.gains,
-        note="; ".join(_notes(tuned, units)),
+        note="; ".join(_notes(tuned, display)),
         # Where all of a controller forgot at once what a limit cut off, loops went on at the limit
         # for ever after large steps (EMPS at 4 V, both ways half of the time).
         W=drive_law(rst, 1.0 / tuned.dominant[0]).W,
     )
 
 
-def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
+def _notes(tuned: Tuned, display: Display) -> Iterator[str]:
     """What to know of a controller's reference and form, in words."""
     pid, rate = tuned.pid, tuned.followed.rate
     if pid is not None and pid.gains is not None:
@@ -351,9 +351,9 @@ def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
         yield f"set-point weights b = {b:.3g}, c = {c:.3g}"
     yield f"follows a ramp {1e3 * tuned.followed.lag:.3g} ms behind"
     if rate is not None:
-        step, (speed, factor) = rate * tuned.rst.h, shown_unit(units.velocity)
+        step, (speed, factor) = rate * tuned.rst.h, display.shown("velocity")
         yield (
-            f"move the reference by at most {length(step, units.position == 'rad')} in a sample"
+            f"move the reference by at most {display.length_text(step)} in a sample"
             f" ({number(factor * rate)} {speed})"
         )
     if pid is not None and (said := pid.note or pid.reason):
@@ -370,7 +370,7 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
     if model.assumed:
         out.append(f"compensator: assumed, not identified: {', '.join(model.assumed)}")
     if model.rig.motor_inertia and model.friction["m"].value is not None:
-        out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.rotary))
+        out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.display))
     if asks := [over for over in asked_for(model) if over != "direction"]:
         what = " and ".join(asks)
         out.append(
@@ -383,9 +383,9 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
     return out
 
 
-def _inertia(whole: float, motor: float, rotary: bool) -> str:
+def _inertia(whole: float, motor: float, display: Display) -> str:
     """The machine's inertia beside that of its motor, and the load's ratio to it, in words."""
-    unit = "kg m^2" if rotary else "kg"
+    unit = display.mass
     said = f"inertia {number(whole, 4)} {unit}, {number(motor, 4)} {unit} of it the motor's"
     if whole < motor:
         return f"{said}: less than the motor's alone; check motor_inertia in the card"

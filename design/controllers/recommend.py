@@ -12,7 +12,7 @@ from design.closed_loop.loop_motion import SETTLING_BAND, LimitCycle
 from design.controllers.clear_win import contest
 from design.machine.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
 from design.machine.model import Model
-from design.machine.readable import Shown, shown
+from design.machine.readable import Display
 from identification.errors import BadModel
 
 USUAL_SEED = 0  # of the noise, where none is asked for: that of `validate`
@@ -51,7 +51,7 @@ def recommended(model: Model, found: Design) -> Recommendation:
         and beside.standstill <= figures[alone].standstill
     )
     better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
-    said = reasons(alone, better, figures, shown(model.rotary))
+    said = reasons(alone, better, figures, model.display)
     taken = both[1] if better else alone
     stays = _present_as_good(taken, figures)
     present_said = "; the present controller is as good, keep it" if stays else ""
@@ -85,7 +85,9 @@ def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
     return {name: one for name, (one, _) in tried_loops(model, model, found, Limits(), rng).items()}
 
 
-def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], units: Shown) -> str:
+def reasons(
+    name: str, compensator: bool, figures: Mapping[str, LoopFigures], units: Display
+) -> str:
     """Why this controller, in one line with its numbers and those of the others."""
     taken = name + (COMPENSATED if compensator else "")
     every = (*DESIGNED_STRUCTURES, name + COMPENSATED, PRESENT)
@@ -206,7 +208,7 @@ def called(name: str) -> str:
     return " with the ".join((alone.upper(), *beside))
 
 
-def _rest(one: LoopFigures, units: Shown) -> str:
+def _rest(one: LoopFigures, units: Display) -> str:
     """The error at standstill, and the limit cycle in which it is."""
     if not one.stable:
         return "runs away"
@@ -215,13 +217,13 @@ def _rest(one: LoopFigures, units: Shown) -> str:
     return f"{percent(one.standstill_relative)} in a {cycle_words(one.limit_cycle, units)}"
 
 
-def cycle_words(cycle: LimitCycle, units: Shown) -> str:
+def cycle_words(cycle: LimitCycle, units: Display) -> str:
     """A limit cycle with its size, peak to peak, and its period."""
     size, unit = in_thousandths(cycle.amplitude, units)
     return f"limit cycle of {size:.2g} {unit} every {cycle.period:.2g} s"
 
 
-def in_thousandths(length: float, units: Shown) -> tuple[float, str]:
+def in_thousandths(length: float, units: Display) -> tuple[float, str]:
     """A length [m, rad] in mm or mrad."""
     return 1e3 * length, f"m{units.position}"
 

@@ -23,7 +23,7 @@ from design.controllers.recommend import called, cycle_words, reasons
 from design.machine.design import Design
 from design.machine.documents import design_digest
 from design.machine.model import Model
-from design.machine.readable import Shown, shown
+from design.machine.readable import Display
 from design.machine.versions import versions
 from identification.model.estimates import Estimate
 from identification.remarks import MinorRemark
@@ -76,7 +76,7 @@ def validate(
         for name, tried in tried_loops(machine, model, found, limits, rng, refused).items():
             figures.setdefault(name, {})[place], traces[name, place] = tried
         unseen += [f"the present controller is not shown on the {place}: {why}" for why in refused]
-    figures = calm_or_missed(figures, shown(model.rotary))
+    figures = calm_or_missed(figures, model.display)
     alone = tested_of(found)
     with_it = found.recommendation is not None and found.recommendation.compensator
     judged = alone + (COMPENSATED if with_it else "")
@@ -94,7 +94,7 @@ def validate(
             *_remarks(figures, judged, found, (model, plant)),
         ),
         versions=versions(),
-        why=reasons(alone, with_it, first, shown(model.rotary)),
+        why=reasons(alone, with_it, first, model.display),
         design=design_digest(found),
         lacks=found.lacks or model.lacks,
     ), traces
@@ -108,7 +108,7 @@ def with_resonance(model: Model, resonance: Mapping[str, Estimate] | None) -> Mo
 
 
 def calm_or_missed(
-    figures: Mapping[str, Mapping[str, LoopFigures]], units: Shown
+    figures: Mapping[str, Mapping[str, LoopFigures]], units: Display
 ) -> dict[str, dict[str, LoopFigures]]:
     """The figures, in which a loop misses a limit that swings at rest where the same controller
     alone, or the one that the machine has now, does not."""
@@ -152,7 +152,7 @@ def _remarks(
     out += dict.fromkeys(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )
-    unit = shown(found.motion == "rotary")
+    unit = found.display
     for name, places in figures.items():
         for place, one in places.items():
             seen = _seen(one, unit, missed=name == judged or not name.endswith(COMPENSATED))
@@ -164,7 +164,7 @@ def _remarks(
     return out
 
 
-def _seen(one: LoopFigures, units: Shown, *, missed: bool) -> Iterator[str]:
+def _seen(one: LoopFigures, units: Display, *, missed: bool) -> Iterator[str]:
     """A limit cycle, and limits that a loop hits or comes near, in words.
 
     missed: what a loop misses is reported elsewhere, a command at its limit among it.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from design.asked import Limits
+from design.machine.readable import Display
 from design.machine.velocity import VelocityDesign, VelocityModel
 from design.machine.versions import versions
 from design.margins import Margins, margins
@@ -99,10 +100,11 @@ def margin_numbers(found: Margins) -> dict[str, float | None]:
 
 
 def _numbers(law: ValveController, model: VelocityModel) -> dict[str, Estimate]:
-    position = "rad" if model.rotary else "m"
+    display = model.display
     unit = {
-        "k_p": "1/s", "k_i": "1/s^2", "h": "s", "smooth": f"{position}/s", "band": position,
-        "limit": model.rig.command_unit, **{name: model.valve[name].unit for name in DESIGN_NEEDS},
+        "k_p": "1/s", "k_i": "1/s^2", "h": "s",
+        "smooth": display.velocity, "band": display.position, "limit": display.command,
+        **{name: model.valve[name].unit for name in DESIGN_NEEDS},
     }  # fmt: skip
     return {name: Estimate(value, unit[name]) for name, value in asdict(law).items()}
 
@@ -156,9 +158,7 @@ def validate_velocity(
     """
     law = law_of(design)
     for one in (model, *([plant] if plant else [])):
-        if one.rig.command_unit != design.rig.command_unit or one.rotary != (
-            design.rig.motion == "rotary"
-        ):
+        if one.display != Display.of(design.rig):
             raise BadModel(
                 f"the design is for {design.card} (command in {design.rig.command_unit}), the model"
                 f" of {one.card} ({one.rig.command_unit}); give those of one machine"

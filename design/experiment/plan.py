@@ -34,7 +34,7 @@ from design.loop import LoopRun
 from design.machine.design import Design
 from design.machine.effect_values import known_effect
 from design.machine.model import Model
-from design.machine.readable import Shown, shown
+from design.machine.readable import Display
 from design.machine.versions import versions
 from design.servo import moved_reference
 from identification.arrays import Array
@@ -357,13 +357,13 @@ def made_safe(
         raise NotIdentifiable(
             f"{bench.model.card}: no run that {bench.controller} keeps within the limits:"
             f" {exceeding} of {len(plants)} machines drawn from what the model leaves open exceed"
-            f" one{_beyond(worst, limits, shown(bench.model.rotary))}, also with the reference at"
+            f" one{_beyond(worst, limits, bench.model.display)}, also with the reference at"
             f" {scale:.0%}; give --speed {SLOWER_RUN * limits.speed:.2g} or less, or wider limits"
         )
     return smaller, Safety(len(plants), worst, exceeding, scale)
 
 
-def _beyond(worst: Peaks, limits: MotionLimits, units: Shown) -> str:
+def _beyond(worst: Peaks, limits: MotionLimits, units: Display) -> str:
     """Force and speed beyond their limits, in brackets; "" where it is another limit."""
     said = [
         f"{name} {reached:.3g} of {limit:.3g} {unit}"

@@ -15,9 +15,11 @@ from design.experiment.segments import Segment
 from design.loop import LoopRun
 from design.machine.model import Model
 from design.machine.plain import plain
+from design.machine.readable import Display
 from identification.arrays import Array
 from identification.effects._library import Library
 from identification.errors import BadModel
+from identification.log import Motion
 from identification.model.estimates import Estimate
 
 Criterion = Literal["D", "T"]
@@ -76,7 +78,7 @@ class Experiment:
     """
 
     card: str
-    motion: str
+    motion: Motion
     command_unit: str
     criterion: Criterion
     parameters: tuple[str, ...]
@@ -95,6 +97,11 @@ class Experiment:
     versions: Mapping[str, str]
     r: Array
     runs: tuple[LoopRun, ...]
+
+    @property
+    def display(self) -> Display:
+        """In which units its numbers are held and shown."""
+        return Display(self.motion, self.command_unit)
 
 
 def limits_of(model: Model, wanted: Wanted) -> MotionLimits:

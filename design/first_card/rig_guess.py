@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.machine.readable import Display
 from identification.columns.column import Column
 from identification.columns.log_columns import Columns
 from identification.columns.motion_guess import UnitGuess
@@ -85,7 +86,7 @@ def rig_of(
                             "as area_p_m2: measure bore and rod"))  # fmt: skip
         out.append(_around_the_rod(roles, units, columns.notation.factor))
     if roles.kind == "motor":
-        force = "N m" if motion == "rotary" else "N"
+        force = Display(motion).force
         out.append(_motor_constant(columns, force, asked=units["u"].unit == force))
     if "u" in roles.columns and (limit := _limit(roles.columns["u"])) is not None:
         out.append(RigGuess("control_limit_v", limit, "unit of u", False,

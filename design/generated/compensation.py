@@ -19,7 +19,7 @@ from design.compensation_tables import (
 from design.generated.exported import identifier
 from design.generated.filled import Filled
 from design.machine.model import Model
-from design.machine.readable import Unit, number, shown_unit, units_of
+from design.machine.readable import Display, Unit, number
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
@@ -75,18 +75,9 @@ class Compensation:
         return identifier(self.asked.name or self.model.card)
 
     @property
-    def rotary(self) -> bool:
-        return self.model.rotary
-
-    @property
-    def force_unit(self) -> str:
-        """N or N m."""
-        return units_of(self.rotary).force.name
-
-    @property
-    def speed_unit(self) -> Unit:
-        """In which speeds of the axis are shown."""
-        return units_of(self.rotary).velocity
+    def display(self) -> Display:
+        """In which units numbers of the axis are shown."""
+        return self.model.display
 
     @cached_property
     def friction(self) -> SlidingFriction:
@@ -148,7 +139,7 @@ class Compensation:
     @property
     def beyond(self) -> tuple[str, ...]:
         """A remark where the tables go further than the logs."""
-        seen, unit = self.model.speed, self.speed_unit
+        seen, unit = self.model.speed, self.display.shown("velocity")
         if seen is None or self.high <= 1.001 * seen:
             return ()
         return (
@@ -207,14 +198,14 @@ class Compensation:
         rotary axis whose gearing is not said its own; else the longest period of its cogging."""
         if self.asked.per_turn is not None:
             return self.asked.per_turn
-        return 2.0 * np.pi if self.rotary else max(one.period for one in self.harmonics)
+        return 2.0 * np.pi if self.model.rotary else max(one.period for one in self.harmonics)
 
     @property
     def turn_words(self) -> str:
         """What `turn` is."""
         if self.asked.per_turn is not None:
             return "a turn of the motor"
-        return "a turn of the axis" if self.rotary else "the longest period of the cogging"
+        return "a turn of the axis" if self.model.rotary else "the longest period of the cogging"
 
     @property
     def at(self) -> str:
@@ -224,7 +215,7 @@ class Compensation:
     @property
     def at_motor(self) -> "AtMotor":
         """How forces and speeds of the axis are at its motor."""
-        return AtMotor(self.rotary, self.asked.per_turn)
+        return AtMotor(self.display, self.asked.per_turn)
 
 
 @dataclass(frozen=True)
@@ -270,7 +261,7 @@ class Format:
         """The file of a model; filled: fills in its template. Raises BadModel where a number that
         it needs is wanting."""
         made = self.content(what)
-        costs = [one.in_words(what.force_unit) for one in made.costs]
+        costs = [one.in_words(what.display.force) for one in made.costs]
         lead = {"card": what.model.card, "costs": costs, "remarks": made.remarks}
         whole = {**vars(made), "remarks": (*made.said, *made.remarks)}
         return TableFile(
@@ -286,12 +277,12 @@ class AtMotor:
     A linear axis of which no `per_turn` is said has a linear motor, a rotary one its motor on it.
     """
 
-    rotary: bool
+    axis: Display
     per_turn: float | None
 
     @property
     def turns(self) -> bool:
-        return self.rotary or self.per_turn is not None
+        return self.axis.rotary or self.per_turn is not None
 
     @property
     def travel(self) -> float:
@@ -314,9 +305,9 @@ class AtMotor:
     def words(self) -> str:
         """What was taken for it."""
         if self.per_turn is not None:
-            unit, factor = shown_unit("rad" if self.rotary else "m")
+            unit, factor = self.axis.shown("position")
             return f"of the motor, {number(factor * self.per_turn, 6)} {unit} of the axis a turn"
-        return "of a motor on the axis itself" if self.rotary else "of a linear motor"
+        return "of a motor on the axis itself" if self.axis.rotary else "of a linear motor"
 
 
 def first_of(reason: str | None) -> str:
@@ -331,7 +322,7 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
         off, constant = curve.asymmetry, curve.constant_share
         most = ""
         if abs(constant) > MOST_OF_IT * off > 0:
-            beside = f"{number(constant)} {what.force_unit}"
+            beside = f"{number(constant)} {what.display.force}"
             most = f" (a constant {beside} beside it would take most of it)"
         mean = f"asymmetry: the table is the mean of both directions{most}"
         out.append(Cost(f"{mean}, off either way by up to", off))

@@ -16,7 +16,6 @@ from design.controllers.cascade import filter_words
 from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.machine.design import Design, Structure
-from design.machine.readable import shown
 from design.program import (
     Assign,
     Choice,
@@ -92,7 +91,7 @@ def exported(
         filters = found.compensator.filters or filters_at(loop.law.h)
         loop = replace(loop, compensation=Compensation(found.compensator.value, filters))
     assert found.command is not None
-    units = shown(found.motion == "rotary")
+    units = found.display
     own = ProgramUnits(units.position, units.force, found.command.unit)
     program = _without_unread(
         controller_program(identifier(name or found.card), loop.servo, loop.h, own, loop.k_a or 0.0)

@@ -21,7 +21,7 @@ from design.generated.compensation import (
     Format,
     friction_costs,
 )
-from design.machine.readable import number, shown_unit
+from design.machine.readable import number
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
@@ -56,14 +56,14 @@ def both_ways(what: Compensation, most_each: int) -> tuple[Array, Array, float]:
 
 def friction_csv(what: Compensation) -> Content:
     """Speed, and the force that each direction needs, for any control."""
-    curve, (unit, factor) = what.friction, what.speed_unit
+    curve, (unit, factor) = what.friction, what.display.shown("velocity")
     ways = (curve.positive, curve.negative)
     found = [table_points(one, curve.speeds, NEUTRAL_POINTS // 2) for one in ways]
     v = np.unique(np.concatenate([one.x for one in found]))
     rows = zip(factor * v, curve.positive(v), -curve.negative(v), strict=True)
     return _content(
-        what, f"{unit}, {what.force_unit} of the axis", len(v), max(one.error for one in found),
-        signed=True, speed=unit, force=what.force_unit,
+        what, f"{unit}, {what.display.force} of the axis", len(v), max(one.error for one in found),
+        signed=True, speed=unit, force=what.display.force,
         rows=[[f"{one:.9g}" for one in row] for row in rows],
     )  # fmt: skip
 
@@ -77,7 +77,7 @@ def twincat_cnc(what: Compensation) -> Content:
             " not in the model; give it by --rated [N m, or N of a linear motor]"
         )
     points = unsigned(what, CNC_POINTS - 1)
-    factor, unit = CNC_SPEED[what.rotary]
+    factor, unit = CNC_SPEED[what.display.rotary]
     share = 1e3 * CNC_PARTS * motor.travel / rated
     pairs = [(round(factor * v), round(share * F)) for v, F in zip(points.x, points.y, strict=True)]
     written, curve = np.array(pairs) / np.array([factor, share]), what.friction
@@ -135,10 +135,10 @@ def sinamics(what: Compensation) -> Content:
 def linuxcnc_hal(what: Compensation) -> Content:
     """Both directions as a lincurve of LinuxCNC's HAL."""
     v, F, error = both_ways(what, CURVE_OF_HAL // 2)
-    factor, unit = (180.0 / np.pi, "deg/s") if what.rotary else (1e3, "mm/s")
+    factor, unit = (180.0 / np.pi, "deg/s") if what.display.rotary else (1e3, "mm/s")
     return _content(
-        what, f"{unit}, {what.force_unit} of the axis", len(v), error, signed=True,
-        name=what.name.lower(), speed=unit, force=what.force_unit,
+        what, f"{unit}, {what.display.force} of the axis", len(v), error, signed=True,
+        name=what.name.lower(), speed=unit, force=what.display.force,
         points=[(f"{factor * one:.9g}", f"{force:.9g}") for one, force in zip(v, F, strict=True)],
     )  # fmt: skip
 
@@ -161,7 +161,7 @@ def _content(
     signed: bool = False, **values: object,
 ) -> Content:  # fmt: skip
     """A file of friction against speed; own: costs of this format; signed: it has both ways."""
-    (unit, factor), curve = what.speed_unit, what.friction
+    (unit, factor), curve = what.display.shown("velocity"), what.friction
     ends = {"low": f"{number(factor * curve.low)} {unit}",
             "high": f"{number(factor * curve.high)} {unit}"}  # fmt: skip
     costs = (*own, *friction_costs(what, signed=signed))
@@ -190,7 +190,7 @@ NO_COGGING_TABLE = {
 
 def cogging_csv(what: Compensation) -> Content:
     """Order, period, amplitude and phase of each wave."""
-    unit, factor = shown_unit("rad" if what.rotary else "m")
+    unit, factor = what.display.shown("position")
     waves = known_harmonics(what)
     rows = [
         [f"{value:.9g}" for value in (what.turn / one.period, factor * one.period, one.amplitude,
@@ -198,19 +198,19 @@ def cogging_csv(what: Compensation) -> Content:
         for one in waves
     ]  # fmt: skip
     turn = f"{number(factor * what.turn, 6)} {unit}, {what.turn_words}"
-    values = {"rows": rows, "unit": unit, "force": what.force_unit, "turn": turn}
-    units = f"{what.force_unit}, deg, {unit} of the axis"
+    values = {"rows": rows, "unit": unit, "force": what.display.force, "turn": turn}
+    units = f"{what.display.force}, deg, {unit} of the axis"
     return Content(units, len(rows), values=values, remarks=_unidentified(what))
 
 
 def turn_csv(what: Compensation) -> Content:
     """The force of cogging over one turn, and the one that compensates it."""
-    unit, factor = shown_unit("rad" if what.rotary else "m")
+    unit, factor = what.display.shown("position")
     y = what.turn * np.arange(TURN_POINTS) / TURN_POINTS
     force = summed(known_harmonics(what), y)
     rows = [[f"{v:.9g}" for v in row] for row in zip(factor * y, force, -force, strict=True)]
-    values = {"rows": rows, "unit": unit, "force": what.force_unit, "turn": what.turn_words}
-    units = f"{unit}, {what.force_unit} of the axis"
+    values = {"rows": rows, "unit": unit, "force": what.display.force, "turn": what.turn_words}
+    units = f"{unit}, {what.display.force} of the axis"
     return Content(units, TURN_POINTS, values=values, remarks=_unidentified(what))
 
 
@@ -341,7 +341,7 @@ def of_axis(
 def twincat_cnc_play(what: Compensation) -> Content:
     """getriebe[0].lose of an axis of TwinCAT CNC."""
     width, _unit, _factor = _signed(what)
-    factor, unit = CNC_UNITS[what.rotary]
+    factor, unit = CNC_UNITS[what.display.rotary]
     value = round(factor * width)
     if abs(value) > CNC_LARGEST:
         raise BadModel(
@@ -383,7 +383,7 @@ def known_play(what: Compensation) -> Estimate:
 
 def _length(what: Compensation) -> tuple[str, float]:
     """The unit in which controls take lengths or angles of an axis, and how many make one in SI."""
-    return ("deg", 180.0 / np.pi) if what.rotary else ("mm", 1e3)
+    return ("deg", 180.0 / np.pi) if what.display.rotary else ("mm", 1e3)
 
 
 def _signed(what: Compensation) -> tuple[float, str, float]:

@@ -98,12 +98,12 @@ def feed_forward(what: Compensation, language: str) -> Content:
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
     form = (lambda value: repr(float(value))) if language == "C" else st_syntax("double").number
-    length = "rad" if what.rotary else "m"
+    length, force = what.display.position, what.display.force
     values = {
         "name": what.name,
         "length": length,
-        "force": what.force_unit,
-        "mass_unit": "kg m^2" if what.rotary else "kg",
+        "force": force,
+        "mass_unit": what.display.mass,
         "m": form(model.karnopp.m),
         "last": len(v) - 1,
         "size": len(v),
@@ -120,7 +120,7 @@ def feed_forward(what: Compensation, language: str) -> Content:
         "command": model.rig.command_unit,
         "zero": form(0.0),
     }
-    units = f"{length}, {length}/s, {length}/s^2, {what.force_unit} of the axis"
+    units = f"{length}, {length}/s, {length}/s^2, {force} of the axis"
     small = what.small((*IDENTIFIED_BY_SLIDING, "m"))
     remarks = (*small, *what.unidentified_places, *what.beyond)
     return Content(units, len(v), error, values, _costs(what), remarks)
@@ -228,7 +228,7 @@ def costs_of(found: Tables) -> dict[Cost, list[str]]:
 
 def tables_document(what: Compensation, found: Tables) -> dict[str, Any]:
     """The files with their units, points, error and costs, and what was not written."""
-    unit = what.force_unit
+    unit = what.display.force
     return {
         "schema": TABLES_SCHEMA,
         "card": what.model.card,

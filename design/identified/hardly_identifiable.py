@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from design.machine.readable import length
+from design.machine.readable import Display
 from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
 from identification.log import Log, Rig
@@ -74,7 +74,7 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
         return
     whole = low_pass(logged, log.h, motion.cutoff) if np.ptp(logged) > 0.0 else logged
     drive = whole[sure]
-    yield from _against_stops(log["y"], whole, sure, name, rotary=rig.motion == "rotary")
+    yield from _against_stops(log["y"], whole, sure, name, Display.of(rig))
     if one_way and _is_idle(drive, v, a):
         yield _said_of_coasting(name, np.abs(v))
         return
@@ -97,7 +97,7 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
 
 
 def _against_stops(
-    y: Array, drive: Array, sure: BoolArray, name: str, *, rotary: bool
+    y: Array, drive: Array, sure: BoolArray, name: str, display: Display
 ) -> Iterator[str]:
     """Lines on an end of the travel at which a body rests though the drive (n,) pushes it on with
     far more than what moves it elsewhere; sure (n,): samples in motion."""
@@ -108,7 +108,7 @@ def _against_stops(
         if len(pushed) >= FEWEST_MOVING and np.mean(hard) > HALF:
             times = f"{np.median(pushed[hard]) / usual:.2g} times"
             yield (
-                f"the body rests at {length(end, rotary)} though the {name} pushes it on with"
+                f"the body rests at {display.length_text(end)} though the {name} pushes it on with"
                 f" {times} what moves it elsewhere: an end stop (leave those rows out, or log"
                 " strokes that stay off it), or a strong spring"
             )

@@ -17,7 +17,7 @@ from design.machine.active_model import active_model
 from design.machine.arx_plant import ArxPlant, ArxTests
 from design.machine.effect_values import relabelled
 from design.machine.model import FitSummary, LogEntry, Model, ParameterCorrelation
-from design.machine.readable import friction_units
+from design.machine.readable import Display
 from design.machine.source import Source
 from design.machine.versions import versions
 from design.measured.predict import of_one_instant
@@ -167,7 +167,7 @@ def _correlation(fit: KarnoppFit) -> ParameterCorrelation:
 
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit kept fixed have their assumed value."""
-    units = friction_units(rig.motion)
+    units = Display.of(rig).friction
     unseen = "fixed at a value that does not matter for these logs"
     return {
         name: fit.estimates.get(name)

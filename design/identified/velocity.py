@@ -8,7 +8,7 @@ import numpy as np
 
 from design.machine.model import Model
 from design.machine.plausible import refuse_other_machine
-from design.machine.readable import length
+from design.machine.readable import Display
 from design.machine.source import MachineLogs, Source, refuse_twins
 from design.machine.velocity import PredictionErrors, VelocityLog, VelocityModel
 from design.machine.versions import versions
@@ -126,7 +126,7 @@ def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list
 
 
 def _rms(squares: Array, rig: Rig) -> str:
-    return length(float(np.sqrt(np.mean(squares))), rig.motion == "rotary")
+    return Display.of(rig).length_text(float(np.sqrt(np.mean(squares))))
 
 
 @dataclass(frozen=True)
@@ -220,11 +220,11 @@ class VelocityPrediction:
 
 @dataclass(frozen=True, eq=False)
 class VelocityPredicted:
-    """The predictions of a log; window [s]: after which each begins anew; rotary: y is in rad."""
+    """The predictions of a log; window [s]: after which each begins anew."""
 
     runs: tuple[VelocityPrediction, ...]
     window: float | None
-    rotary: bool
+    display: Display
 
 
 def predict_velocity(
@@ -250,4 +250,4 @@ def predict_velocity(
         anchors = e[np.minimum(starts, len(e) - 1)]
         simulated = np.where(after < 0, np.nan, log["y"] - e + anchors)
         out.append(VelocityPrediction(log["t"], log["y"], simulated))
-    return VelocityPredicted(tuple(out), window, model.rotary)
+    return VelocityPredicted(tuple(out), window, model.display)

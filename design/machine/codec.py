@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from design.machine.nearest import nearest
 from design.machine.plain import as_number
-from design.machine.readable import Conversion, Shown, converted, in_unit, no_conversion, shown
+from design.machine.readable import Conversion, Display, converted, in_unit, no_conversion
 from identification.effects._library import Library
 from identification.errors import BadModel, BadSpecification
 from identification.log import Motion
@@ -43,7 +43,7 @@ class Around(NamedTuple):
     that a file may name. conversion: of the units of a file that is read.
     """
 
-    units: Shown
+    units: Display
     command: "Command | None" = None
     output: Output = "command"
     in_full: bool = False
@@ -53,7 +53,7 @@ class Around(NamedTuple):
     @property
     def motion(self) -> Motion:
         """How the machine moves."""
-        return "rotary" if self.units.position == "rad" else "linear"
+        return self.units.motion
 
     @property
     def actuator(self) -> Mapping[str, str]:
@@ -78,10 +78,11 @@ def around_in(table: object, motion: str, other: object, command: str) -> Around
     """What the numbers hang on in a file of which nothing is checked yet: its motion stands in the
     one table by that key, the unit of its command in the other."""
     own, beside = (one if isinstance(one, Mapping) else {} for one in (table, other))
-    unit, rotary = beside.get(command), own.get(motion) == "rotary"
+    unit = beside.get(command)
+    moves: Motion = "rotary" if own.get(motion) == "rotary" else "linear"
     if not isinstance(unit, str):
-        return Around(shown(rotary))
-    return Around(shown(rotary, unit), Command(unit, None, None))
+        return Around(Display(moves))
+    return Around(Display(moves, unit), Command(unit, None, None))
 
 
 def written(value: Any, around: Around) -> Any:

@@ -14,7 +14,7 @@ from pydantic import Field
 from design.drive_law import drive_law
 from design.machine.card_table import CardTable, InUnit, NotNegative, Positive
 from design.machine.drive import ForceLoop, Present
-from design.machine.readable import shown
+from design.machine.readable import Display
 from design.pid import pd_to_rst, pid_to_rst
 from design.present import cascade_to_rst
 from design.rst import RST
@@ -126,7 +126,7 @@ class _Common(CardTable):
     def value(self, rig: Rig, in_unit: InUnit) -> CardController:
         """The controller; in_unit: what reads a text with its unit. Raises BadCard where a
         gain's unit is of another kind."""
-        units = shown(rig.motion == "rotary", rig.command_unit)
+        units = Display.of(rig)
         output = self.output or ("command" if self.force is None else "force")
         if self.force is not None and (rig.kind == "motor" or output == "command"):
             raise BadCard(

@@ -46,7 +46,7 @@ from design.machine.drive import (
     law_file,
     law_of,
 )
-from design.machine.readable import Shown, shown
+from design.machine.readable import Display
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
@@ -374,14 +374,9 @@ class Design:
         return next((one for key, one in own if key == name), None)
 
     @property
-    def rotary(self) -> bool:
-        """Whether positions are angles [rad]."""
-        return self.motion == "rotary"
-
-    @property
-    def units(self) -> Shown:
-        """Units of its numbers."""
-        return shown(self.rotary, self.command.unit if self.command else "V")
+    def display(self) -> Display:
+        """In which units its numbers are held and shown."""
+        return Display(self.motion, self.command.unit if self.command else "V")
 
     @property
     def output(self) -> Output:

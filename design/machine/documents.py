@@ -7,14 +7,14 @@ from typing import Any
 from design.machine.codec import Around, Command, written
 from design.machine.design import Design
 from design.machine.model import Model
-from design.machine.readable import shown
+from design.machine.readable import Display
 from identification.log import Rig
 from identification.model.karnopp import NAMES
 
 
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document = written(found, Around(found.units, found.command, found.output))
+    document = written(found, Around(found.display, found.command, found.output))
     return {"schema": document.pop("schema"), **document}
 
 
@@ -33,5 +33,4 @@ def model_document(model: Model) -> dict[str, Any]:
 
 def around_of(rig: Rig) -> Around:
     """What the written form of a rig's controller hangs on."""
-    units = shown(rig.motion == "rotary", rig.command_unit)
-    return Around(units, Command(units.command, rig.control_limit, None))
+    return Around(Display.of(rig), Command(rig.command_unit, rig.control_limit, None))

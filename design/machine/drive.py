@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from design.drive_law import DriveLaw
 from design.force_pi import ForcePI
 from design.machine.codec import PLACEHOLDER, Around, InUnit, Output, Parameter, Through
-from design.machine.readable import Shown
+from design.machine.readable import Display
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 
@@ -74,7 +74,7 @@ def law_file(law: DriveLaw, around: Around) -> LawFile:
     )  # fmt: skip
 
 
-def law_of(found: LawFile, units: Shown, where: str) -> DriveLaw:
+def law_of(found: LawFile, units: Display, where: str) -> DriveLaw:
     """The law of a file; raises BadModel where it is none, or in other units."""
     for key, unit, ours in (
         ("unit", found.unit, getattr(units, found.output)),
@@ -128,7 +128,7 @@ def _present(found: PresentFile, info: Any) -> Present:
 PRESENT_LOOP = Through(PresentFile, _present, _present_file)
 
 
-def equation_lines(law: DriveLaw, output: Output, limit: float | None, units: Shown) -> list[str]:
+def equation_lines(law: DriveLaw, output: Output, limit: float | None, units: Display) -> list[str]:
     """The difference equation as it is programmed; k counts its samples.
 
     limit: of the command. F_comp, the compensator's force, is 0 without it.
@@ -156,7 +156,7 @@ def equation_lines(law: DriveLaw, output: Output, limit: float | None, units: Sh
     ]
 
 
-def force_lines(force: ForceLoop, limit: float | None, units: Shown) -> list[str]:
+def force_lines(force: ForceLoop, limit: float | None, units: Display) -> list[str]:
     """The force loop as it is programmed; j counts its samples, limit: of the command."""
     within = "" if limit is None else f", within +- {limit:.6g} {units.command}"
     return [

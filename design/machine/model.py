@@ -20,7 +20,7 @@ from design.machine.drive import PRESENT_LOOP, Present
 from design.machine.effect_values import estimates_in_si, known_effect
 from design.machine.nearest import nearest
 from design.machine.plain import as_number
-from design.machine.readable import in_unit
+from design.machine.readable import Display, in_unit
 from identification.drift.reference_model import OwnLogs
 from identification.effects._base import Acting
 from identification.effects._library import Library, built_in
@@ -341,6 +341,11 @@ class Model:
     def rotary(self) -> bool:
         """Whether positions are angles [rad]."""
         return self.rig.motion == "rotary"
+
+    @property
+    def display(self) -> Display:
+        """In which units its numbers are held and shown."""
+        return Display.of(self.rig)
 
 
 def used(estimate: Estimate) -> float:

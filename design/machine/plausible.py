@@ -234,7 +234,7 @@ def _impossible(name: str, found: Model) -> str | None:
     value = abs(_number(found.friction[name]))
     peak = max(entry.force_peak for entry in found.log)
     speed = max((entry.speed or 0.0 for entry in found.log), default=0.0)
-    force = "N m" if found.rig.motion == "rotary" else "N"
+    force = found.display.force
     most = f"the largest force of its logs is {peak:.4g} {force}"
     if name.startswith(("F_c", "F_s")) and value > _BEYOND * peak > 0:
         return most

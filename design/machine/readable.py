@@ -3,11 +3,11 @@ numbers as an engineer reads them: no exponents, lengths in mm, digits that say 
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Self
 
 from identification.errors import BadCard, BadModel
-from identification.log import Motion
+from identification.log import Motion, Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import ROTARY_UNITS, UNITS
 from identification.model.plant import over
@@ -15,53 +15,6 @@ from identification.model.plant import over
 # Of two units: by what a number in the first is multiplied, and what is added to it, to have it in
 # the other; None where they are unlike. It raises BadCard where it does not know one.
 Conversion = Callable[[str, str], tuple[float, float] | None]
-
-
-class Shown(NamedTuple):
-    """Units of a machine's numbers, in which tables and axes show them and results hold them.
-
-    force_gain: of a force loop's k_i.
-    """
-
-    position: str
-    velocity: str
-    force: str
-    stiffness: str
-    force_gain: str
-    command: str
-
-    @property
-    def friction(self) -> Mapping[str, str]:
-        """Units of the nine, by name."""
-        return friction_units("rotary" if self.position == "rad" else "linear")
-
-    def by_name(self, quantities: Mapping[str, str]) -> dict[str, str]:
-        """The unit of each number, of a unit or of a quantity whose unit hangs on the machine."""
-        return {name: self.named(one) for name, one in quantities.items()}
-
-    def named(self, quantity: str) -> str:
-        """The unit of a quantity, or the unit that is given itself."""
-        own: dict[str, str] = {
-            **self._asdict(),
-            "acceleration": f"{self.position}/s^2",
-            "damping": f"{self.force} s/{self.position}",
-            "force_per_command": over(self.force, self.command),
-            "viscous": self.friction["F_vp"],
-            "mass": self.friction["m"],
-        }
-        return own.get(quantity, quantity)
-
-
-def shown(rotary: bool, command: str = "V") -> Shown:
-    """The units of a linear or a rotary machine whose command has the unit `command`."""
-    if rotary:
-        return Shown("rad", "rad/s", "N m", "N m/rad", over(command, "N m"), command)
-    return Shown("m", "m/s", "N", "N/m", over(command, "N"), command)
-
-
-def friction_units(motion: Motion) -> Mapping[str, str]:
-    """Units of the nine, by name."""
-    return ROTARY_UNITS if motion == "rotary" else UNITS
 
 
 def no_conversion(unit: str, _target: str) -> None:
@@ -123,23 +76,9 @@ class Unit(NamedTuple):
     factor: float
 
 
-class Units(NamedTuple):
-    """Units of what charts show."""
-
-    position: Unit
-    velocity: Unit
-    force: Unit
-
-
 def shown_unit(unit: str) -> Unit:
     """The unit in which a value in an SI unit is shown."""
     return Unit(*SHOWN_UNITS.get(unit, (unit, 1.0)))
-
-
-def units_of(rotary: bool) -> Units:
-    """Millimetres and newtons, or radians and newton metres."""
-    plain = shown(rotary)
-    return Units(*map(shown_unit, plain[:3]))
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -156,19 +95,93 @@ def small(value: float, least: float = 1e-4) -> str:
     return f"< {least:.4f}" if 0 < abs(value) < least else number(value)
 
 
-def length(value: float, rotary: bool = False) -> str:
-    """A length [m] in mm, in µm where mm would need zeros; an angle [rad] in rad."""
-    if rotary:
-        return f"{number(value)} rad"
-    mm = 1e3 * value
-    if 0 < abs(mm) < MICROMETRES_BELOW:
-        return f"{number(1e3 * mm)} µm"
-    return f"{number(mm)} mm"
+@dataclass(frozen=True)
+class Display:
+    """In which units a machine's numbers are held, and in which they are shown.
 
+    motion: of the machine; command: unit of its command. Made once of its rig, and handed on to
+    whatever writes numbers.
+    """
 
-def force(value: float, rotary: bool = False) -> str:
-    """A force [N] or torque [N m], with three digits."""
-    return f"{number(value)} {shown(rotary).force}"
+    motion: Motion = "linear"
+    command: str = "V"
+
+    @classmethod
+    def of(cls, rig: Rig) -> Self:
+        """That of the machine on a rig."""
+        return cls(rig.motion, rig.command_unit)
+
+    @property
+    def rotary(self) -> bool:
+        """Whether positions are angles [rad]."""
+        return self.motion == "rotary"
+
+    @property
+    def position(self) -> str:
+        return "rad" if self.rotary else "m"
+
+    @property
+    def velocity(self) -> str:
+        return f"{self.position}/s"
+
+    @property
+    def force(self) -> str:
+        return "N m" if self.rotary else "N"
+
+    @property
+    def stiffness(self) -> str:
+        return over(self.force, self.position)
+
+    @property
+    def force_gain(self) -> str:
+        """Of a force loop's k_i."""
+        return over(self.command, self.force)
+
+    @property
+    def friction(self) -> Mapping[str, str]:
+        """Units of the nine, by name."""
+        return ROTARY_UNITS if self.rotary else UNITS
+
+    @property
+    def mass(self) -> str:
+        return self.friction["m"]
+
+    def by_name(self, quantities: Mapping[str, str]) -> dict[str, str]:
+        """The unit of each number, of a unit or of a quantity whose unit hangs on the machine."""
+        return {name: self.named(one) for name, one in quantities.items()}
+
+    def named(self, quantity: str) -> str:
+        """The unit of a quantity, or the unit that is given itself."""
+        own: dict[str, str] = {
+            "position": self.position,
+            "velocity": self.velocity,
+            "force": self.force,
+            "stiffness": self.stiffness,
+            "force_gain": self.force_gain,
+            "command": self.command,
+            "acceleration": f"{self.position}/s^2",
+            "damping": f"{self.force} s/{self.position}",
+            "force_per_command": over(self.force, self.command),
+            "viscous": self.friction["F_vp"],
+            "mass": self.mass,
+        }
+        return own.get(quantity, quantity)
+
+    def shown(self, quantity: str) -> Unit:
+        """The unit in which tables and charts show a quantity."""
+        return shown_unit(self.named(quantity))
+
+    def length_text(self, value: float) -> str:
+        """A length [m] in mm, in µm where mm would need zeros; an angle [rad] in rad."""
+        unit, factor = self.shown("position")
+        size = factor * value
+        if unit == "mm" and 0 < abs(size) < MICROMETRES_BELOW:
+            return f"{number(1e3 * size)} µm"
+        return f"{number(size)} {unit}"
+
+    def force_text(self, value: float) -> str:
+        """A force [N] or torque [N m], with three digits."""
+        return f"{number(value)} {self.force}"
 
 
 def times(value: float) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from design.machine.readable import number
+from design.machine.readable import Display, number
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.thresholds import OF_ACCOUNT, TWICE
 
@@ -47,11 +47,12 @@ def moved_between(
     return out
 
 
-def slip_of_scale(moved: Mapping[str, Moved], rotary: bool) -> str:
+def slip_of_scale(moved: Mapping[str, Moved], display: Display) -> str:
     """That all moved as if every length, every force or the time had changed by one factor of two
     at least, in words; "" where that is not so."""
     found = [
-        f"every {'angle' if rotary and what == 'length' else what} by the factor {number(factor)}"
+        f"every {'angle' if display.rotary and what == 'length' else what} by the factor"
+        f" {number(factor)}"
         f" (the unit of {_COLUMNS[k]} 1/{number(factor)} of what the card says)"
         for k, what in enumerate(QUANTITIES)
         for factor in [_common_factor(moved, k)]
@@ -65,22 +66,21 @@ def slip_of_scale(moved: Mapping[str, Moved], rotary: bool) -> str:
     )
 
 
-def no_wear(moved: Mapping[str, Moved], rotary: bool) -> str:
+def no_wear(moved: Mapping[str, Moved], display: Display) -> str:
     """What else than wear has moved the parameters, in words; "" where wear may have."""
-    return slip_of_scale(moved, rotary) or other_mass(moved, rotary)
+    return slip_of_scale(moved, display) or other_mass(moved, display)
 
 
-def other_mass(moved: Mapping[str, Moved], rotary: bool) -> str:
+def other_mass(moved: Mapping[str, Moved], display: Display) -> str:
     """That the mass is another by a factor of two at least, in words; "" where it is not."""
     if "m" not in moved:
         return ""
     old, new, sd = moved["m"]
     if max(new / old, old / new) < TWICE or abs(new / old - 1.0) < NORMAL_95 * sd:
         return ""
-    unit = "kg m^2" if rotary else "kg"
     return (
-        f"m {old:.4g} -> {new:.4g} {unit}, which no wear does: another load or gear, a wrong unit"
-        " or scale, or a fault in the log"
+        f"m {old:.4g} -> {new:.4g} {display.mass}, which no wear does: another load or gear, a"
+        " wrong unit or scale, or a fault in the log"
     )
 
 

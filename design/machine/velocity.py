@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from design.machine.nearest import nearest
 from design.machine.plain import plain
+from design.machine.readable import Display
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -105,9 +106,9 @@ class VelocityModel:
         return max(entry.command_peak for entry in self.log)
 
     @property
-    def rotary(self) -> bool:
-        """Whether positions are angles [rad]."""
-        return self.rig.motion == "rotary"
+    def display(self) -> Display:
+        """In which units its numbers are held and shown."""
+        return Display.of(self.rig)
 
 
 @dataclass(frozen=True)

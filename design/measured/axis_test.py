@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from design.machine.readable import number, shown_unit
+from design.machine.readable import Display, number, shown_unit
 from design.machine.source import MachineLogs, Source
 from design.measured.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 from identification.arrays import Array
@@ -81,7 +81,7 @@ class AxisTest:
 
     machine: str
     source: Source
-    rotary: bool
+    display: Display
     quantities: tuple[Quantity, ...]
     travel: Travel
     breakaways: tuple[int, int]
@@ -162,7 +162,7 @@ def axis_test(
     runs = len(logs.runs)
     longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
     return AxisTest(
-        machine or logs.card, source, logs.rig.motion == "rotary",
+        machine or logs.card, source, Display.of(logs.rig),
         tuple(judged(name, estimates[name], allowed.get(name)) for name in MEANING_OF),
         travel, found.breakaways, earlier,
         (*(earlier.remarks if earlier else ()), *longest, *logs.remarks),

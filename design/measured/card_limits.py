@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Strict
 
 from design.machine.card_table import CardTable, InUnit
-from design.machine.readable import shown
+from design.machine.readable import Display
 from identification.errors import BadCard
 from identification.log import Rig
 from identification.model.plant import units_of
@@ -66,7 +66,7 @@ class LimitsSection(CardTable):
 
 def limit_units(rig: Rig) -> Mapping[str, str]:
     """Unit of each quantity that may have limits, by name."""
-    plain = shown(rig.motion == "rotary")
+    plain = Display.of(rig)
     nine = units_of(rig.motion, rig.command_unit)
     return {
         **{name: nine[name] for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn")},

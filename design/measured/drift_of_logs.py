@@ -80,7 +80,7 @@ class Drifted:
         found = [one.test.shifts for one in self.tests if one.test.verdict == "drift"]
         nine = {n: one for n, one in (found[-1] if found else {}).items() if n in NAMES}
         moved = {name: Moved(one.before, one.after, one.sd) for name, one in nine.items()}
-        return no_wear(moved, self.model.rotary)
+        return no_wear(moved, self.model.display)
 
     @property
     def tested(self) -> bool:

@@ -11,7 +11,7 @@ from design.closed_loop.linear_loop import dead_time, law_to_force
 from design.machine.model import Model, used
 from design.machine.plain import as_number
 from design.machine.plausible import refuse_other_machine
-from design.machine.readable import shown
+from design.machine.readable import Display
 from design.machine.source import Source, fingerprints
 from design.measured.linear_force import (
     freed,
@@ -60,7 +60,7 @@ class Responded:
     """
 
     card: str
-    rotary: bool
+    display: Display
     logs: tuple[dict[str, Any], ...]
     found: MachineResponses
     modes: Modes | None
@@ -120,7 +120,7 @@ def respond(
         )
     return Responded(
         card=card,
-        rotary=rig.motion == "rotary",
+        display=Display.of(rig),
         logs=tuple(fingerprints(runs)),
         found=found,
         modes=modes,
@@ -249,7 +249,7 @@ def sure_share(response: Response, upto: float) -> float:
 
 def response_document(found: Responded) -> dict[str, Any]:
     """What response.json holds; the curves themselves are in response.csv."""
-    units, f = shown(found.rotary), found.found.f
+    units, f = found.display, found.found.f
     loop, m = found.open_loop, found.margins
     return {
         "schema": RESPONSE_SCHEMA,

@@ -18,7 +18,7 @@ from design.machine.documents import around_of
 from design.machine.drive import Present
 from design.machine.effect_values import exact
 from design.machine.plain import as_number
-from design.machine.readable import friction_units
+from design.machine.readable import Display
 from design.measured.predict import lacking_signals
 from design.rst import RST
 from design.servo import Compensation, simulate_servo
@@ -189,7 +189,7 @@ def truth(
     controller: that of the card, as results have it, where it runs the machine.
     """
     motion, command = (rig.motion, rig.command_unit) if rig else ("linear", "V")
-    friction, actuator = friction_units(motion), actuator_units(motion, command)
+    friction, actuator = Display(motion).friction, actuator_units(motion, command)
     drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else {}
     known = {
         "schema": "truth/1",

@@ -45,10 +45,9 @@ def command(
         with running("demo", DEMO_STAGES) as course, fits_compiled_ahead():
             found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
-        rotary = traced.model.rotary
         view(traced).write(folder)
         view(found.design).write(folder, "design.html")
-        view(validation, found.traces, rotary).write(folder, "validation.html")
+        view(validation, found.traces, traced.model.display).write(folder, "validation.html")
     result = {
         "recipe": RECIPE,
         "seed": seed,

@@ -174,7 +174,7 @@ def _tables(given: ExportOptions) -> int:
 
     model = read_model(given.file)
     asked = tables_asked(
-        model.rotary, given.name, given.speed, given.per_turn, given.rated, given.encoder
+        model.display, given.name, given.speed, given.per_turn, given.rated, given.encoder
     )
     what = Compensation(model, asked)
     found = tables(what, given.targets, given.controls, filled)

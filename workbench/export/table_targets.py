@@ -9,7 +9,7 @@ import numpy as np
 
 from design.generated.compensation import Compensation, Encoder, TablesAsked
 from design.generated.tables import Tables, costs_of
-from design.machine.readable import number
+from design.machine.readable import Display, number
 from identification.errors import BadModel
 from workbench.cards.units import in_unit_of
 from workbench.output import written
@@ -46,7 +46,7 @@ def _sentence(what: Compensation, found: Tables) -> str:
     said = f"{what.model.card}: {', '.join(kinds)} from its model"
     if not any(one.table in ("friction-table", "feed-forward") for one in found.files):
         return f"{said}."
-    curve, (unit, factor) = what.friction, what.speed_unit
+    curve, (unit, factor) = what.friction, what.display.shown("velocity")
     ends = np.array([curve.low, curve.high])
     slow, fast = (number(factor * v) for v in ends)
     up, down = (
@@ -54,8 +54,8 @@ def _sentence(what: Compensation, found: Tables) -> str:
         for way in (curve.positive, curve.negative)
     )
     return (
-        f"{said}; sliding from {slow} to {fast} {unit} takes {up} {what.force_unit} in positive and"
-        f" {down} {what.force_unit} in negative direction."
+        f"{said}; sliding from {slow} to {fast} {unit} takes {up} {what.display.force} in positive"
+        f" and {down} {what.display.force} in negative direction."
     )
 
 
@@ -63,19 +63,19 @@ def _left_out(what: Compensation, found: Tables) -> Iterator[str]:
     """Costs with the files that have them, the largest first, those without a size last."""
     for cost, names in costs_of(found).items():
         whose = names[0] if len(names) == 1 else f"{len(names)} of the files"
-        yield f"not in {whose}: {cost.in_words(what.force_unit)}"
+        yield f"not in {whose}: {cost.in_words(what.display.force)}"
 
 
 def tables_asked(
-    rotary: bool, name: str | None, speed: str | None, per_turn: str | None, rated: str | None,
+    display: Display, name: str | None, speed: str | None, per_turn: str | None, rated: str | None,
     encoder: Encoder | None,
 ) -> TablesAsked:  # fmt: skip
     """The options in SI; raises BadModel where one is no positive number of its kind."""
-    turn = _positive(per_turn, "deg" if rotary else "mm", "--per-turn")
-    travel = None if turn is None else (math.radians(turn) if rotary else 1e-3 * turn)
-    high = _positive(speed, "rad/s" if rotary else "mm/s", "--speed")
-    high = high if high is None or rotary else 1e-3 * high
-    unit = "N m" if rotary or travel else "N"
+    turn = _positive(per_turn, "deg" if display.rotary else "mm", "--per-turn")
+    travel = None if turn is None else (math.radians(turn) if display.rotary else 1e-3 * turn)
+    high = _positive(speed, display.shown("velocity").name, "--speed")
+    high = high if high is None or display.rotary else 1e-3 * high
+    unit = "N m" if travel else display.force
     return TablesAsked(name, high, travel, _positive(rated, unit, "--rated"), encoder)
 
 

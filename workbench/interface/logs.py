@@ -11,6 +11,7 @@ import numpy as np
 
 from design.identified.identify_logs import identify_logs
 from design.machine.model import Model
+from design.machine.readable import Display
 from design.measured.axis_test import AxisTest
 from design.measured.drift_of_logs import Drifted, drift_of
 from design.measured.predicted_logs import Predicted, predict_logs
@@ -54,9 +55,9 @@ class PredictResult(Result):
     """What a model says of a log, and how far off it is."""
 
     _command = "predict"
-    _shown = ("found", "rotary", "log")
+    _shown = ("found", "display", "log")
     found: Predicted
-    rotary: bool = False
+    display: Display
     log: str = "LOG"  # as it was named
 
     @property
@@ -162,7 +163,7 @@ def predict(
         where = str(found.card.path)
         predicted = predict_logs(known, found.logs, where, drive=drive, window=window)
     named = (os.fspath(log),) if isinstance(log, str | os.PathLike) else ()
-    return PredictResult(predicted, known.rotary, *named)
+    return PredictResult(predicted, known.display, *named)
 
 
 def response(

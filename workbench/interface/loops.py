@@ -22,6 +22,7 @@ from design.experiment.plan import experiment as plan_experiment
 from design.experiment.planned import Experiment, rivals_of
 from design.machine.design import Design
 from design.machine.model import Model
+from design.machine.readable import Display
 from design.robust.robust import ROBUST, ROBUST_STAGES, Robust
 from design.robust.robust import robust_design as robust_of_model
 from identification.errors import BadModel
@@ -123,10 +124,10 @@ class ValidateResult(Result):
     """What `validate` saw of a design in the simulated loop."""
 
     _command = "validate"
-    _shown = ("found", "traces", "rotary")
+    _shown = ("found", "traces", "display")
     found: Validation
     traces: Mapping[tuple[str, str], Traces]
-    rotary: bool = False
+    display: Display
 
     @property
     def passed(self) -> bool:
@@ -217,7 +218,7 @@ def validate(
     with working("simulating the loop"):
         rng = np.random.default_rng(seed)
         found, traces = validate_design(known, made, rng, plant=other, limits=limits)
-    return ValidateResult(found, traces, known.rotary)
+    return ValidateResult(found, traces, known.display)
 
 
 def experiment(

@@ -114,7 +114,7 @@ def _identified(sources: Sources, course: Course) -> Made:
 
 def _traced(sources: Sources, course: Course) -> Made:
     found = trace_logs(sources.logs, None, library(()), 0, course.report)
-    errors = errors_table(found.trace, found.model.rotary, tested=False)
+    errors = errors_table(found.trace, found.model.display, tested=False)
     result = {
         "notes": _notes((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
         "errors": {"head": errors.full_head, "rows": errors.whole},

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from design.machine.readable import in_digits, number, shown_unit, units_of
+from design.machine.readable import in_digits, number, shown_unit
 from design.measured.axis_document import axis_document
 from design.measured.axis_test import AxisTest, Quantity
 from identification.estimation.estimates import counted
@@ -107,13 +107,13 @@ def axis_charts(test: AxisTest) -> list[Chart]:
 
 def _along_panel(test: AxisTest) -> Panel:
     """Coulomb friction of both directions along the travel, as sizes."""
-    units, travel = units_of(test.rotary), test.travel
+    (unit, factor), travel = test.display.shown("position"), test.travel
     found = np.concatenate([travel.positive, travel.negative])
     found = found[np.isfinite(found)]
-    x = units.position.factor * travel.place
+    x = factor * travel.place
     up, down = travel.positive, travel.negative
     return Panel(
-        f"position [{units.position.name}]", f"friction [{units.force.name}]",
+        f"position [{unit}]", f"friction [{test.display.force}]",
         [Line("positive direction", x, up, "measured"),
          Line("negative direction", x, down, "other")],
         "along the travel",
@@ -139,7 +139,7 @@ def _history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
     low, high = float(np.nanmin(every)), float(np.nanmax(every))
     room = 0.1 * (high - low) or 0.1 * abs(high)
     return Panel(
-        "logs before this one", f"friction [{units_of(test.rotary).force.name}]", lines,
+        "logs before this one", f"friction [{test.display.force}]", lines,
         f"{said}, over the last logs", bands=bands, x_range=(-len(past) - 0.5, 0.6),
         y_range=(low - room, high + room), height=AXIS_HEIGHT,
     )  # fmt: skip

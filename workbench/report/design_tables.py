@@ -7,7 +7,7 @@ from design.drive_law import DriveLaw
 from design.machine.codec import Output
 from design.machine.design import Controller, Design
 from design.machine.drive import equation_lines, force_lines
-from design.machine.readable import length, number
+from design.machine.readable import number
 from workbench.report.view import notes
 from workbench.screen import Part, Row, instead, listed, more, tabled
 
@@ -78,7 +78,7 @@ def design_lines(found: Design) -> list[str]:
 
 def loop_lines(found: Design) -> list[str]:
     """Periods, gains and the compensator of the loops."""
-    c, units, output, command = found.compensator, found.units, "", found.command
+    c, units, output, command = found.compensator, found.display, "", found.command
     if command is not None:
         most = (
             "no limit" if command.limit is None else f"at most {command.limit:.4g} {command.unit}"
@@ -107,7 +107,7 @@ def loop_lines(found: Design) -> list[str]:
     return [
         *lines,
         f"compensator: pushes with {pushed} at a position error of"
-        f" {length(c.e_T, found.rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)",
+        f" {found.display.length_text(c.e_T)} (e_T), in the stick band over {c.N_c:g} (N_c)",
     ]
 
 
@@ -116,9 +116,9 @@ def cascade_lines(found: Design) -> list[str]:
     one = found.p_pi
     if one is None or one.cascade is None:
         return []
-    g, units, command = one.cascade, found.units, found.command
+    g, units, command = one.cascade, found.display, found.command
     k_v = f"{number(g.k_v)} 1/s"
-    if not found.rotary:
+    if not found.display.rotary:
         k_v += f" ({number(METRES_PER_MINUTE * g.k_v)} m/min/mm)"
     k_p = f"{number(g.k_p)} {units.force} s/{units.position}"
     per = command.force_per_command if command else None
@@ -158,7 +158,7 @@ def schedule_rows(found: Design) -> list[str]:
     table, out = found.schedule, list[str]()
     if table is None:
         return out
-    units, over = found.units, _unit_over(found, table.over)
+    units, over = found.display, _unit_over(found, table.over)
     for name, one in table.controllers.items():
         for at, point, rubs in zip(table.at, one.points, table.friction, strict=True):
             said = "R, S, T in design.json"
@@ -177,7 +177,7 @@ def schedule_rows(found: Design) -> list[str]:
 
 def _unit_over(found: Design, over: str) -> str:
     """The unit of what a schedule goes over, with a space before it."""
-    units = found.units
+    units = found.display
     return {"place": f" {units.position}", "load": f" {units.force}"}.get(over, "")
 
 
@@ -208,7 +208,7 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
     """The difference equation of each controller, or of one, as its drive runs it."""
     if found.command is None:
         return []
-    units, limit, out = found.units, found.command.limit, list[str]()
+    units, limit, out = found.display, found.command.limit, list[str]()
     laws: dict[str, tuple[DriveLaw, Output]] = {
         name: (one.law(found.command), found.output) for name, one in found.controllers.items()
     }

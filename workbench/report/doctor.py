@@ -10,7 +10,7 @@ import numpy as np
 
 from design.identified.examined import CheckedLog, Examined
 from design.identified.identifiable_by_log import Way
-from design.machine.readable import number
+from design.machine.readable import Display, number
 from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.log import Log
 from identification.remarks import MinorRemark
@@ -232,7 +232,8 @@ def unit_of(found: CheckedLog, name: str) -> tuple[float, str]:
 
 def speed_unit(found: CheckedLog) -> tuple[float, str]:
     """Factor and unit in which a speed is shown."""
-    return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
+    unit = Display.of(found.rig).velocity
+    return SCREEN_UNITS.get(unit, (1.0, unit))
 
 
 def _position(found: CheckedLog, log: Log) -> Panel:

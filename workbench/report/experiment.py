@@ -3,7 +3,6 @@
 import numpy as np
 
 from design.experiment.planned import Experiment, experiment_document
-from design.machine.readable import shown
 from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.view import Section, View, notes, table, view
 from workbench.screen import Part, Row, listed, more, tabled
@@ -30,7 +29,7 @@ RUN_CAPTION = (
 
 def reference_text(found: Experiment) -> str:
     """The reference as CSV: t [s] and r, a row a sample of the controller."""
-    unit = shown(found.motion == "rotary").position
+    unit = found.display.position
     rows = [f"{found.h * i:.9g},{r:.9g}" for i, r in enumerate(found.r.tolist())]
     return "\n".join([f"t [s],r [{unit}]", *rows, ""])
 
@@ -72,7 +71,7 @@ def experiment_lead(found: Experiment) -> str:
 
 def limit_lines(found: Experiment) -> list[str]:
     """How to run it, and what it uses of the limits."""
-    units, limits, used = shown(found.motion == "rotary"), found.limits, found.safety.peaks
+    units, limits, used = found.display, found.limits, found.safety.peaks
     r_0 = float(found.r[0])
     return [
         f"begin with the machine at rest at {r_0:.4g} {units.position} ({found.controller} moves"
@@ -119,7 +118,7 @@ def _(found: Experiment) -> View:
 
 
 def _sections(found: Experiment) -> list[Section]:
-    units, pieces = shown(found.motion == "rotary"), list[Row]()
+    units, pieces = found.display, list[Row]()
     for i, one in enumerate(found.segments, 1):
         pace = f"{1.0 / one.rate:.3g} s each"
         if one.kind in ("strokes", "creep"):
@@ -143,7 +142,7 @@ def _sections(found: Experiment) -> list[Section]:
 
 def run_chart(found: Experiment) -> Chart:
     """Position, speed and force along the run, with the limits."""
-    units, limits = shown(found.motion == "rotary"), found.limits
+    units, limits = found.display, found.limits
     seen, panels = found.runs[0], []
     for key, name, unit, edges in (
         ("y", "position", units.position, limits.stroke),

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from design.machine.model import Model
-from design.machine.readable import force, times, units_of
+from design.machine.readable import Display, times
 from design.machine.source import Source
 from design.measured.predict import FORCE_WINDOW, force_by_model, in_windows
 from identification.arrays import Array
@@ -68,12 +68,12 @@ def in_a_row(sources: Sequence[Source]) -> InARow:
 
 def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Chart:
     """Position and force of every log, measured and by the model."""
-    units, row = units_of(model.rotary), in_a_row(sources)
+    display, row = model.display, in_a_row(sources)
     pairs = list(zip(sources, runs, strict=True))
     position = [run.y if run else np.full(len(one.log), np.nan) for one, run in pairs]
     columns = (
-        ("position", units.position, "y", position),
-        ("applied force", units.force, "F", [_force(model, *pair) for pair in pairs]),
+        ("position", display.shown("position"), "y", position),
+        ("applied force", display.shown("force"), "F", [_force(model, *pair) for pair in pairs]),
     )
     panels = []
     for name, (unit, factor), signal, modelled in columns:
@@ -122,7 +122,7 @@ def residual(
     """Position's and force's residual over time, with the noise that a perfect model leaves; none
     where neither is known. friction: of the runs."""
     row, panels = in_a_row(sources), []
-    unit, factor = units_of(model.rotary).position
+    unit, factor = model.display.shown("position")
     known = [run for run in runs if run]
     if len(known) == len(sources):
         off = [one.log["y"] - run.y for one, run in zip(sources, known, strict=True)]
@@ -149,7 +149,7 @@ def _force_panel(
 ) -> Panel | None:  # fmt: skip
     """The force less that of the actuator's run, or the force that the model lacks, with its band;
     None where neither is known."""
-    label = f"force [{units_of(model.rotary).force.name}]"
+    label = f"force [{model.display.force}]"
     if len(runs) == len(sources) and model.rig.kind != "motor" and model.fit.drive == "command":
         noise = 2 * model.fit.noise_F
         off = [one.log["F"] - run.F for one, run in zip(sources, runs, strict=True)]
@@ -171,7 +171,7 @@ def _own_limits(model: Model, friction: Karnopp) -> str:
     own, used = (friction.F_sp, friction.F_sn), (model.karnopp.F_sp, model.karnopp.F_sn)
     if model.by_equation or np.allclose(own, used):
         return ""
-    first, second = (force(one, model.rotary) for one in own)
+    first, second = map(model.display.force_text, own)
     return (
         f" The run has its own stick limits, {first} and {second}; the table's stand midway to the"
         " force at the breakaways."
@@ -200,7 +200,7 @@ def _residual_caption(model: Model) -> str:
 
 
 def missing_chart(
-    found: Trace, rotary: bool, logs: Sequence[str], which: Which = "training"
+    found: Trace, display: Display, logs: Sequence[str], which: Which = "training"
 ) -> Chart:
     """The force that the model lacks over time, where a body slides.
 
@@ -225,7 +225,7 @@ def missing_chart(
     ]
     panel = Panel(
         f"time, {which} logs in a row [s]" if len(starts) > 1 else f"time of the {which} log [s]",
-        f"force that is missing [{units_of(rotary).force.name}]", lines, areas=areas,
+        f"force that is missing [{display.force}]", lines, areas=areas,
         marks=[Mark(at, "x") for at in starts[1:]],
         y_range=range_of(force.before, level),
     )  # fmt: skip

@@ -8,7 +8,6 @@ import numpy as np
 
 from design.identified.trace_logs import Traced
 from design.machine.model import Model, used
-from design.machine.readable import units_of
 from design.machine.source import Source
 from design.measured.friction_curve import (
     branches,
@@ -52,8 +51,8 @@ def _panels(
 ) -> list[Panel]:  # fmt: skip
     """All speeds and the low ones; fit: of the one curve, for its band. Dots are those samples
     that lie in the range shown."""
-    p, units, out = model.karnopp, units_of(model.rotary), list[Panel]()
-    (speed, factor), points = units.velocity, POINTS if fit else CURVE
+    p, display, out = model.karnopp, model.display, list[Panel]()
+    (speed, factor), points = display.shown("velocity"), POINTS if fit else CURVE
     for title, (begin, end) in (("all speeds", reach), ("low speeds", low_speeds(p, reach))):
         lines = [_curve(*one, begin, end, points) for one in curves]
         bottom = min(float(np.nanmin(one.y)) for one in lines)
@@ -67,7 +66,7 @@ def _panels(
         areas = _interval(fit, p, begin, end) if fit else []
         out.append(
             Panel(
-                f"velocity [{speed}]", f"friction force [{units.force.name}]",
+                f"velocity [{speed}]", f"friction force [{display.force}]",
                 [replace(one, x=factor * one.x) for one in shown], title,
                 areas=[replace(one, x=factor * one.x) for one in areas],
                 bands=[Band("stick band", factor * p.dv_n, factor * p.dv_p, "x")],

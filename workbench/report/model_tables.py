@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from design.machine.effect_values import known_effect
 from design.machine.model import Model, used
-from design.machine.readable import as_shown, in_digits, length, number, shown, times
+from design.machine.readable import as_shown, in_digits, number, times
 from design.machine.velocity import VelocityModel
 from identification.effects._base import Param
 from identification.estimation.converged_fit import STOP_TURNS_ON_LESS
@@ -180,8 +180,8 @@ def left_of(model: Model) -> str:
     off = _off(model)
     if off is None:
         return f"{times(model.fit.chi_square**0.5)} the sensors' noise"
-    noise = length(model.fit.noise_y, model.rotary)
-    return f"{length(off, model.rotary)} rms of position, where the sensor's noise is {noise}"
+    noise = model.display.length_text(model.fit.noise_y)
+    return f"{model.display.length_text(off)} rms of position, where the sensor's noise is {noise}"
 
 
 def _off(model: Model) -> float | None:
@@ -205,8 +205,8 @@ def fit_lines(model: Model) -> list[str]:
     elif in_windows(model):
         within = f" in windows of {FORCE_WINDOW:g} s from measured states"
     lines = [
-        f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms{within}"
-        f" over {e.duration:.4g} s, driven by {by}"
+        f"{e.file}: simulated position within {model.display.length_text(e.position_rms)}"
+        f" rms{within} over {e.duration:.4g} s, driven by {by}"
         for e in model.log
         if e.position_rms is not None
     ]
@@ -234,7 +234,7 @@ def plant_lines(model: Model) -> list[str]:
     return [
         f"linear plant (ARX) from {p.input} to y, every {1e3 * p.h:.4g} ms: na={p.na},"
         f" nb={p.nb}, nk={p.nk}; one step ahead within"
-        f" {length(p.one_step_rms, model.rotary)} rms on held-out samples"
+        f" {model.display.length_text(p.one_step_rms)} rms on held-out samples"
     ]
 
 
@@ -256,5 +256,5 @@ def run_coupling(model: Model) -> str:
     anew = f"restarted from the measured state every {FORCE_WINDOW:g} s"
     if model.fit.stiffness == 0.0:
         return anew
-    unit = shown(model.rotary).stiffness
+    unit = model.display.stiffness
     return f"corrected to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"

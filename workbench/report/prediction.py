@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from design.machine.readable import force, length, units_of
+from design.machine.readable import Display
 from design.measured.predicted_logs import Predicted
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
@@ -32,7 +32,7 @@ FORCE_ERRORS = {
 }
 
 
-def error_lines(found: Predicted, rotary: bool) -> list[str]:
+def error_lines(found: Predicted, display: Display) -> list[str]:
     """How far the model lies from the log, a line each."""
     summary = found.summary
     by = "the command" if summary["drive"] == "command" else "the applied force"
@@ -40,25 +40,25 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     start = "free run" if window is None else f"restarted every {window} s"
     lines = []
     if summary["position_rms"] is not None:
-        rms = length(summary["position_rms"], rotary)
+        rms = display.length_text(summary["position_rms"])
         lines.append(f"position ({start}, driven by {by}): error {rms} rms")
     if summary["run_refused"] is not None:
         lines.append(f"position: {summary['run_refused']}")
     for key, said in FORCE_ERRORS.items():
         if summary[key] is not None:
-            lines.append(said.format(force(summary[key], rotary)))
+            lines.append(said.format(display.force_text(summary[key])))
     return lines
 
 
 @view.register
-def _(found: Predicted, rotary: bool, log: str) -> View:
+def _(found: Predicted, display: Display, log: str) -> View:
     """How far a model lies from a log."""
-    first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
+    first, *more = error_lines(found, display) or ["nothing of this log can be compared"]
     remarks = found.summary["remarks"]
 
     def sections() -> list[Section]:
         lines = [*more, *(f"note: {one}" for one in remarks)]
-        drawn = Section("Over time", prediction_chart(found, rotary))
+        drawn = Section("Over time", prediction_chart(found, display))
         return [drawn, Section("In words", lines)] if lines else [drawn]
 
     return View(
@@ -67,7 +67,7 @@ def _(found: Predicted, rotary: bool, log: str) -> View:
         [*more, notes(remarks, (Path(log).name,))],
         {"prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10)},
         sections,
-        lambda: prediction_chart(found, rotary),
+        lambda: prediction_chart(found, display),
         step=after_predict("LOG", "CARD"),
         has_page=False,
         lead=first.rstrip(".") + ".",
@@ -88,15 +88,14 @@ def csv_text(frame: "pd.DataFrame", digits: int) -> str:
     return str(whole.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
-def prediction_chart(found: Predicted, rotary: bool) -> Chart:
+def prediction_chart(found: Predicted, display: Display) -> Chart:
     """Position and force of the log and of the model over time, run after run."""
-    units = units_of(rotary)
     gap = np.array([np.nan])
     t = np.concatenate([np.append(run.t, run.t[-1:]) for run in found.runs])
     panels = []
     for name, (unit, factor), columns in (
-        ("position", units.position, POSITION_COLUMNS),
-        ("force", units.force, FORCE_COLUMNS),
+        ("position", display.shown("position"), POSITION_COLUMNS),
+        ("force", display.shown("force"), FORCE_COLUMNS),
     ):
         lines = []
         for key, colour, said in columns:

@@ -151,7 +151,7 @@ def sensitivity_chart(found: Design) -> Chart:
         disturbance.append(Line(name.upper(), w, _db(s.S_yp), colour))
         noise.append(Line(name.upper(), w, _db(s.S_up), colour))
     top = max(float(line.y.max()) for line in noise) + 5.0 if noise else 0.0
-    unit, frequency = found.units.stiffness, "frequency [rad/s]"
+    unit, frequency = found.display.stiffness, "frequency [rad/s]"
     panels = (
         Panel(frequency, "|S_yp| [dB]", disturbance, "disturbance to position", log_x=True),
         Panel(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from design.machine.model import Model
-from design.machine.readable import number, shown
+from design.machine.readable import number
 from design.machine.source import Source
 from design.measured.response import (
     Responded,
@@ -197,7 +197,7 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
 
 def plant_chart(found: Responded) -> Chart:
     """Position over force: magnitude, phase and coherence."""
-    every, units = found.found, shown(found.rotary)
+    every, units = found.found, found.display
     f, by_position = every.f, -1.0 / (2.0 * np.pi * every.f) ** 2 + 0j
     others = [("the model", None if found.curves is None else found.curves.plant)]
     beside = None if found.left_in else every.with_friction.times(by_position)
@@ -235,7 +235,7 @@ def loop_chart(found: Responded) -> Chart:
 def controller_chart(found: Responded) -> Chart:
     """The controller: magnitude, phase and coherence."""
     assert found.found.controller is not None
-    curves, units = found.curves, shown(found.rotary)
+    curves, units = found.curves, found.display
     card = None if curves is None else curves.controller
     panels = _bode(
         found.found.f, found.found.controller, f"controller [{units.stiffness}]",

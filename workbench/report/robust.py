@@ -7,7 +7,7 @@ import numpy as np
 
 from design.closed_loop.loop_figures import FIGURES_SAID, PRESENT
 from design.machine.documents import design_document
-from design.machine.readable import length, number, units_of
+from design.machine.readable import Display, number
 from design.robust.outcomes import MEASURES, Measure
 from design.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread, robust_document
 from design.robust.search import WEIGHED
@@ -56,12 +56,12 @@ def robust_sentence(found: Robust) -> str:
 
 def promise_table(found: Robust) -> Part:
     """A row a measure of the robust loop."""
-    rotary, rows = found.design.rotary, list[Row]()
+    display, rows = found.design.display, list[Row]()
     for one, spread in _of(found.promises[ROBUST]):
-        limit = "" if spread.limit is None else _said(one, spread.limit, rotary)
+        limit = "" if spread.limit is None else _said(one, spread.limit, display)
         if limit not in ("", "none"):
             limit = f"{'at least' if one.floor else 'at most'} {limit}"
-        values = (_said(one, value, rotary) for value in (spread.low, spread.median, spread.high))
+        values = (_said(one, value, display) for value in (spread.low, spread.median, spread.high))
         rows.append((one.words, limit, _percent(spread), *values))
     return tabled(ROBUST_HEAD, rows, right=(2, 3, 4, 5))
 
@@ -74,7 +74,7 @@ def beside_table(found: Robust) -> Part:
         for name, promise in found.promises.items():
             if spread := promise.measures.get(one.name):
                 share = f" ({_percent(spread)})" if _percent(spread) else ""
-                cells[name] = _said(one, spread.median, found.design.rotary) + share
+                cells[name] = _said(one, spread.median, found.design.display) + share
         rows.append((one.words, *cells.values()))
     return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
 
@@ -87,12 +87,12 @@ def _of(promise: Promise) -> list[tuple[Measure, Spread]]:
     return [(one, promise.measures[one.name]) for one in MEASURES if one.name in promise.measures]
 
 
-def _said(one: Measure, value: float, rotary: bool) -> str:
+def _said(one: Measure, value: float, display: Display) -> str:
     """A value of a measure in words."""
     if not np.isfinite(value):
         return "any" if one.floor else "runs away"
     if one.kind == "length":
-        return "none" if value == 0.0 else length(value, rotary)
+        return "none" if value == 0.0 else display.length_text(value)
     factor, unit = UNITS_OF_KIND.get(one.kind, (1.0, ""))
     return f"{number(factor * value)} {unit}".rstrip()
 
@@ -105,7 +105,7 @@ def robust_lines(found: Robust) -> list[str]:
 
 def choice_lines(found: Robust) -> list[str]:
     """How it was chosen."""
-    speed, factor = units_of(found.design.rotary).velocity
+    speed, factor = found.design.display.shown("velocity")
     drift = ", ".join(f"{n} {100 * s:.2g} %" for n, s in (found.asked.drift or {}).items())
     return [
         f"the best of {found.tried} loops on {found.asked.draws} machines: of those whose limits"
@@ -169,7 +169,7 @@ def robust_chart(found: Robust) -> Chart:
 def _shares(found: Robust, one: Measure) -> Panel:
     factor, unit = UNITS_OF_KIND.get(one.kind, (1.0, ""))
     if one.kind == "length":
-        unit, factor = units_of(found.design.rotary).position
+        unit, factor = found.design.display.shown("position")
     limit = found.promises[ROBUST].measures[one.name].limit
     lines = []
     for name, promise in found.promises.items():

@@ -9,7 +9,7 @@ from pathlib import Path
 from design.identified.trace_document import trace_document
 from design.identified.trace_logs import Traced, effect_estimates
 from design.machine.documents import model_document
-from design.machine.readable import as_shown, in_digits, number, shown, shown_unit, small, units_of
+from design.machine.readable import Display, as_shown, in_digits, number, shown_unit, small
 from identification.effects._base import Param
 from identification.log import Rig
 from identification.tracing.regression.significance import DRAWS
@@ -39,11 +39,11 @@ HIDDEN = (
 )
 
 
-def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
+def errors_table(found: Trace, display: Display, tested: bool = True) -> Part:
     """Errors before and after, on training and held-out logs; not tested: on stretches left out."""
     test = "held out" if tested else "left out"
     head = ("error", "train before", "after", f"{test} before", "after", "sensors' noise")
-    unit, position = shown(rotary).force, units_of(rotary).position
+    unit, position = display.force, display.shown("position")
     errors = (
         ("force_rms", f"force, equation of motion [{unit}]", 1.0, found.noise_force),
         ("force_relative", "the same, of the applied force [%]", 100.0, None),
@@ -102,13 +102,12 @@ def effect_lines(found: Trace) -> list[str]:
     return [f"{', '.join(names)}: {line}" for line, names in said.items()]
 
 
-def rivals_table(found: Trace, rotary: bool) -> Part:
+def rivals_table(found: Trace, display: Display) -> Part:
     """Rivals in the order of the force error that they leave; last those that leave none."""
-    unit = shown(rotary).force
     left = [(one.test_force_rms, one) for one in found.rivals]
     left.sort(key=lambda both: math.inf if both[0] is None else both[0])
     rows = [
-        (words(one.key), "-" if rms is None else f"{number(rms)} {unit}", one.why_not)
+        (words(one.key), "-" if rms is None else display.force_text(rms), one.why_not)
         for rms, one in left
     ]
     return tabled(RIVAL_HEAD, rows)
@@ -147,12 +146,12 @@ def trace_parts(traced: Traced) -> list[Part | str]:
 
     Behind --verbose: the effects' equations and sources, and the rivals.
     """
-    found, rotary, logs = traced.trace, traced.model.rotary, logs_of_trace(traced)
+    found, display, logs = traced.trace, traced.model.display, logs_of_trace(traced)
     return [
-        errors_table(found, rotary, bool(traced.test)),
+        errors_table(found, display, bool(traced.test)),
         effects_table(found, traced.model.rig, logs),
         *map(more, effect_lines(found)),
-        more(rivals_table(found, rotary)),
+        more(rivals_table(found, display)),
         changes_table(found, logs),
         differences_table(found),
         notes((*traced.remarks, *found.remarks), logs),
@@ -186,47 +185,47 @@ def _(traced: Traced) -> View:
 def _main_chart(traced: Traced) -> Chart:
     """What is missing against the signal that explains it, else over time, else the friction before
     and after."""
-    drawn, rig = pictures(traced.trace), traced.model.rig
+    drawn = pictures(traced.trace)
     if drawn:
-        return signal_chart(drawn[0], traced.model.rotary, rig.command_unit)
+        return signal_chart(drawn[0], traced.model.display)
     if traced.trace.missing_force is not None:
-        return missing_chart(traced.trace, traced.model.rotary, *_unseen(traced))
+        return missing_chart(traced.trace, traced.model.display, *_unseen(traced))
     return trace_friction_chart(traced)
 
 
 def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
-    drawn, command = pictures(found), model.rig.command_unit
+    drawn, display = pictures(found), model.display
     logs = [source.file for source in traced.train]
     sections = list[Section]()
     if found.missing_force is not None:
-        chart = missing_chart(found, model.rotary, *_unseen(traced))
+        chart = missing_chart(found, display, *_unseen(traced))
         sections.append(Section("Force that the model lacks", chart))
     # What is left of each equation against every signal that explains it, then over time.
-    sections += [against_signal(picture, model.rotary, command) for picture in drawn]
+    sections += [against_signal(picture, display) for picture in drawn]
     left = {picture.residual.equation: picture.residual for picture in drawn}
     seen = set(left) if found.residuals else {"mechanical", "actuator"}
     if found.missing_force is not None:  # the report begins with it
         left.pop("mechanical", None)
-    sections += [over_time(residual, model.rotary, logs) for residual in left.values()]
+    sections += [over_time(residual, display, logs) for residual in left.values()]
     hidden = [e.effect for e in found.effects if in_equation(e.effect) not in seen]
     if hidden:
         sections.append(
             Section("Where it shows", [HIDDEN.format(words(one.key)) for one in hidden])
         )
     if found.run is not None:
-        sections.append(over_time(found.run, model.rotary, logs))
-    errors = errors_table(found, model.rotary, bool(traced.test))
+        sections.append(over_time(found.run, display, logs))
+    errors = errors_table(found, display, bool(traced.test))
     sections.append(Section("Before and after", errors))
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
         sections.append(Section(title, effects_table(found, model.rig), effect_lines(found)))
     if found.curves:
-        sections.append(free_curves(found.curves, model.rotary, command))
+        sections.append(free_curves(found.curves, display))
     sections.append(Section("Friction", trace_friction_chart(traced)))
     plain = "Parameters before and after" if found.effects else "Parameters"
     tables = {
-        "Rivals, by the force that they leave": rivals_table(found, model.rotary),
+        "Rivals, by the force that they leave": rivals_table(found, display),
         plain: changes_table(found),
         "Drift between training and test logs": differences_table(found),
     }

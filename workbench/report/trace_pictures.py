@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from design.machine.readable import units_of
+from design.machine.readable import Display
 from identification.arrays import Array, BoolArray
 from identification.signals.envelope import SHOWN_SHARE, evenly_spread
 from identification.signals.running_median import running_median
@@ -43,12 +43,12 @@ EQUATION_TITLES = {
 ROWS_TAKEN = {"position": "sample by sample, run in windows of 2 s from measured states"}
 
 
-def over_time(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Section:
+def over_time(residual: Residual, display: Display, logs: Sequence[str] = ()) -> Section:
     """Residual against time before and after, with the band of the sensors' noise; logs: names of
     those in a row."""
     equation, both = EQUATION_TITLES[residual.equation], _both(residual)
     shares = [f"{share_inside(y, residual.noise):.0f} % ({name})" for y, _, name in both]
-    unit, factor = residual_unit(residual.equation, rotary)
+    unit, factor = residual_unit(residual.equation, display)
     noise = 2 * factor * float(np.median(residual.noise))
     chosen = evenly_spread(len(residual.t))
     lines = [
@@ -82,20 +82,20 @@ def _both(residual: Residual) -> list[tuple[Array, Colour, str]]:
     return [(residual.before, "before", "before"), (residual.after, "model", "after")]
 
 
-def against_signal(picture: Picture, rotary: bool, command: str = "V") -> Section:
+def against_signal(picture: Picture, display: Display) -> Section:
     """Residual against the signal that explains it, before and after, with running medians."""
-    signal = axis_of(picture.signal, rotary)[0].split(" [")[0]
+    signal = axis_of(picture.signal, display)[0].split(" [")[0]
     alone = len(_both(picture.residual)) == 1
     title = f"Against {signal}" if alone else f"What it depends on: {signal}"
-    return Section(title, signal_chart(picture, rotary, command))
+    return Section(title, signal_chart(picture, display))
 
 
-def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
+def signal_chart(picture: Picture, display: Display) -> Chart:
     """The chart of `against_signal`: points, and running medians and what the fitted effect takes
-    away in each direction of motion; command: unit of u."""
+    away in each direction of motion."""
     residual, ways, levels = picture.residual, by_direction(picture.residual), picture.levels
-    label, x_factor = axis_of(picture.signal, rotary, command)
-    unit, factor = residual_unit(residual.equation, rotary)
+    label, x_factor = axis_of(picture.signal, display)
+    unit, factor = residual_unit(residual.equation, display)
     x = x_factor * residual.signals[picture.signal]
     both = _both(residual)
     if len(both) > 1:
@@ -149,23 +149,21 @@ def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, Colour]]:
     return {name: way for name, way in ways.items() if np.count_nonzero(way[0]) > LEVELS}
 
 
-def axis_of(signal: str, rotary: bool, command: str = "V") -> tuple[str, float]:
-    """Label of a signal's axis, and what its values are multiplied by; command: unit of u."""
+def axis_of(signal: str, display: Display) -> tuple[str, float]:
+    """Label of a signal's axis, and what its values are multiplied by."""
     if signal not in SIGNALS:
         return signal, 1.0
     name, unit = SIGNALS[signal]
-    units = units_of(rotary)
-    known = {key: getattr(units, key) for key in ("position", "velocity", "force")}
-    shown = unit.format(**{key: one.name for key, one in known.items()}, command=command)
+    known = {key: display.shown(key) for key in ("position", "velocity", "force")}
+    shown = unit.format(**{key: one.name for key, one in known.items()}, command=display.command)
     factor = next((one.factor for key, one in known.items() if f"{{{key}}}" in unit), 1.0)
     return f"{name} [{shown}]", PASCALS if shown == "bar" else factor
 
 
-def residual_unit(equation: str, rotary: bool) -> tuple[str, float]:
+def residual_unit(equation: str, display: Display) -> tuple[str, float]:
     """Unit of an equation's residual, and what its values are multiplied by."""
-    units = units_of(rotary)
-    of = {"actuator": (f"{units.force.name}/s", 1.0), "position": units.position}
-    return of.get(equation, units.force)
+    of = {"actuator": (f"{display.force}/s", 1.0), "position": display.shown("position")}
+    return of.get(equation, display.shown("force"))
 
 
 def _limits(residual: Residual, factor: float, values: Array | None = None) -> tuple[float, float]:
@@ -175,14 +173,13 @@ def _limits(residual: Residual, factor: float, values: Array | None = None) -> t
     return -top, top
 
 
-def free_curves(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -> Section:
-    """Each named effect that is a function of a logged signal, by its law and free of it; command:
-    unit of u."""
+def free_curves(curves: Sequence[FreeCurve], display: Display) -> Section:
+    """Each named effect that is a function of a logged signal, by its law and free of it."""
     panels = []
     for one in curves:
-        label, x_factor = axis_of(one.signal, rotary, command)
+        label, x_factor = axis_of(one.signal, display)
         label = label if one.period is None else label.replace(" [", " within a period [")
-        unit, factor = residual_unit(one.equation, rotary)
+        unit, factor = residual_unit(one.equation, display)
         x, free, wide = x_factor * one.at, factor * one.free, 1.96 * factor * one.sd
         panels.append(
             Panel(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from design.identified.trace_logs import Traced
 from design.machine.model import used
-from design.machine.readable import force, length, number, shown_unit
+from design.machine.readable import Display, number, shown_unit
 from identification.estimation.latent_force import LatentForces
 from identification.model.estimates import Estimate
 from identification.thresholds import OF_ACCOUNT
@@ -85,7 +85,7 @@ def _verdict_sentence(traced: Traced) -> str:
         case "unknown" if found.not_tried and not found.effects:
             return f"Open: {unexplained(traced, found.unknown.depends_on)}"
         case "none":
-            return nothing_missing(found, traced.model.rotary)
+            return nothing_missing(found, traced.model.display)
         case "effect":
             also = f" The test logs also differ in {changed}." if changed else ""
             return f"Missing: {names}.{share_explained(traced)}{errors}{also}"
@@ -177,59 +177,59 @@ def share_explained(traced: Traced) -> str:
 def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
     """What is left where it is far more than noise; signals: on which it depends."""
     depends = f"depends on {listed(signals)}" if signals else "depends on none of the signals"
-    found, rotary = traced.trace, traced.model.rotary
+    found, display = traced.trace, traced.model.display
     left, off = found.after["train"].force_rms, found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
-            f"the free run has an error of {length(off, rotary)} in 2 s (sensors' noise"
-            f" {length(found.noise_y, rotary)}), and it {depends}."
+            f"the free run has an error of {display.length_text(off)} in 2 s (sensors' noise"
+            f" {display.length_text(found.noise_y)}), and it {depends}."
         )
-    said = "an unknown part" if left is None else force(left, rotary)
+    said = "an unknown part" if left is None else display.force_text(left)
     return (
         f"the model leaves {said} of force, the sensors' noise alone"
-        f" {force(found.noise_force, rotary)}, and it {depends}."
+        f" {display.force_text(found.noise_force)}, and it {depends}."
     )
 
 
-def nothing_missing(found: Trace, rotary: bool) -> str:
+def nothing_missing(found: Trace, display: Display) -> str:
     """The verdict "none" in words; what is left may be more than noise, without a structure."""
-    left, noise = found.after["test"].force_rms, force(found.noise_force, rotary)
+    left, noise = found.after["test"].force_rms, display.force_text(found.noise_force)
     if left is None:
         return "Open: no row was held out on which it would show whether something is missing."
     bound = found.missing[1] if found.missing is not None else 0.0
     if bound > OF_ACCOUNT:
         return (
             f"Open: a force of {100 * bound:.2g} % of friction would not show in these logs, of"
-            f" which the model leaves {force(left, rotary)} and the sensors' noise {noise}."
+            f" which the model leaves {display.force_text(left)} and the sensors' noise {noise}."
         )
     if left <= NOISE * found.noise_force:
         where = "" if found.noise_actuator is not None else " in the equation of motion"
         off = found.after["test"].position_rms
         astray = (
-            f" Its free run does not follow: in 2 s it is {length(off, rotary)} off (rms)."
+            f" Its free run does not follow: in 2 s it is {display.length_text(off)} off (rms)."
             if off is not None and off > FOLLOWS_NOT * found.noise_y
             else ""
         )
         return (
-            f"Nothing is missing{where}: the model leaves {force(left, rotary)} of force, the"
+            f"Nothing is missing{where}: the model leaves {display.force_text(left)} of force, the"
             f" sensors' noise alone {noise}.{astray}"
         )
     return (
-        f"No effect is missing that these logs show: what is left ({force(left, rotary)}, sensors'"
-        f" noise {noise}) depends on none of their signals."
+        f"No effect is missing that these logs show: what is left ({display.force_text(left)},"
+        f" sensors' noise {noise}) depends on none of their signals."
     )
 
 
 def reported_error(traced: Traced) -> ReportedError | None:
     """The force error, or where that hardly falls the one that falls most."""
-    found, rotary = traced.trace, traced.model.rotary
+    found, display = traced.trace, traced.model.display
     before, after = found.before["test"], found.after["test"]
     where = "Held-out" if traced.test else "On stretches left out,"
     every: tuple[tuple[str, str, float | None, Callable[[float], str]], ...] = (
-        ("force_rms", "force error", found.noise_force, lambda x: force(x, rotary)),
+        ("force_rms", "force error", found.noise_force, display.force_text),
         ("actuator_rms", "error of the actuator equation", found.noise_actuator,
-         lambda x: f"{force(x, rotary)}/s"),
-        ("position_rms", "position error in 2 s", found.noise_y, lambda x: length(x, rotary)),
+         lambda x: f"{display.force_text(x)}/s"),
+        ("position_rms", "position error in 2 s", found.noise_y, display.length_text),
     )  # fmt: skip
     known = {
         key: ReportedError(f"{where} {name}", was, now, noise, write)

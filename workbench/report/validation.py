@@ -28,7 +28,7 @@ from design.controllers.recommend import (
 from design.controllers.validate import Validation, validation_document
 from design.identified.trace_logs import effect_estimates
 from design.loop import LoopRun
-from design.machine.readable import Shown, length, number, shown, shown_unit, units_of
+from design.machine.readable import Display, number, shown_unit
 from identification.arrays import Array
 from identification.model.estimates import Estimate
 from workbench.output import next_step, step, written
@@ -55,40 +55,40 @@ STEPS_CAPTION = (
 
 
 @view.register
-def _(found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False) -> View:
+def _(found: Validation, traces: Mapping[tuple[str, str], Traces], display: Display) -> View:
     """Whether the design holds in simulation, and what the loop does."""
 
     def sections() -> Sequence[Section]:
         drawn = list[Section]()
         for place in dict.fromkeys(place for _, place in traces):
             on = "the identified plant" if place == "model" else "the other plant"
-            steps = Section(f"Steps on {on}", _step_chart(found, traces, place, rotary))
-            drawn += [steps, Section(f"Error on {on}", _error_chart(found, traces, place, rotary))]
-        lines = validation_lines(found, rotary)
-        verdict = Section("Verdict", validation_table(found, rotary), lines)
+            steps = Section(f"Steps on {on}", _step_chart(found, traces, place, display))
+            drawn += [steps, Section(f"Error on {on}", _error_chart(found, traces, place, display))]
+        lines = validation_lines(found, display)
+        verdict = Section("Verdict", validation_table(found, display), lines)
         return (*drawn[:1], verdict, *drawn[1:])
 
     return View(
         f"Validation for {found.card}",
         validation_sentence(found),
-        validation_parts(found, rotary),
+        validation_parts(found, display),
         {"validation.json": lambda: validation_document(found)},
         sections,
-        lambda: _step_chart(found, traces, "model", rotary),
+        lambda: _step_chart(found, traces, "model", display),
         step=as_code(Path("DESIGN"))
         if found.passed
         else step("slower poles, to validate again", "design", "MODEL", "--poles", "W_N,ZETA"),
     )
 
 
-def validation_table(found: Validation, rotary: bool = False) -> Part:
+def validation_table(found: Validation, display: Display) -> Part:
     """A row a controller and plant."""
-    alone, units, one = len(found.figures[found.judged]) == 1, shown(rotary), _any(found)
+    alone, one = len(found.figures[found.judged]) == 1, _any(found)
     command = () if one.command_peak is None else (f"command {one.command_unit}",)
     figures = ("ok", "margin", "delay", "at rest", "over", "settling", "smooth")
-    head = ("loop", *(() if alone else ("on",)), *figures, f"force {units.force}", *command)
+    head = ("loop", *(() if alone else ("on",)), *figures, f"force {display.force}", *command)
     rows = [
-        (loop_name(name), *(() if alone else (place,)), *_row(one, units))
+        (loop_name(name), *(() if alone else (place,)), *_row(one, display))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
@@ -106,7 +106,7 @@ def loop_name(name: str) -> str:
     return PRESENT if alone == PRESENT else alone.upper() + shown
 
 
-def _row(one: LoopFigures, units: Shown) -> Row:
+def _row(one: LoopFigures, display: Display) -> Row:
     m, passes = one.margins, "yes" if one.passed else "no"
     modulus, delay = f"{m.modulus:.3f}" if m else "unstable", "-"
     command: tuple[str, ...] = ()
@@ -119,7 +119,7 @@ def _row(one: LoopFigures, units: Shown) -> Row:
         return (passes, modulus, delay, *["-"] * (6 + len(command)))
     cycle = "none"
     if one.limit_cycle:
-        size, unit = in_thousandths(one.limit_cycle.amplitude, units)
+        size, unit = in_thousandths(one.limit_cycle.amplitude, display)
         cycle = f"{size:.2g} {unit}, {one.limit_cycle.period:.2g} s"
     return (passes, modulus, delay, *error_cells(one), *command, cycle)
 
@@ -135,27 +135,27 @@ def error_cells(one: LoopFigures) -> Row:
     )
 
 
-def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
+def validation_lines(found: Validation, display: Display) -> list[str]:
     """What fails and what to know, in words."""
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
     others = other_figures(found.why)
     lines = [others] if others else []
     lines += [line for name in alone for line in _missed(found, name)]
-    lines.append(columns_line(found, rotary))
+    lines.append(columns_line(found, display))
     return [*lines, *(f"note: {line}" for line in found.remarks)]
 
 
-def columns_line(found: Validation, rotary: bool = False) -> str:
+def columns_line(found: Validation, display: Display) -> str:
     """What the columns of the table mean, and the limits of command and force."""
-    one, units = _any(found), shown(rotary)
+    one = _any(found)
     limit = (
         "" if one.command_limit is None else f"; limit {one.command_limit:.4g} {one.command_unit}"
     )
     table = any(name.endswith(SCHEDULED) for name in found.figures)
     beside = "+comp: with the compensator" + ("; +table: with the gain schedule" if table else "")
-    limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
+    limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {display.force}"
     return (
-        f"steps of {length(one.step, rotary)}; at rest: the static error, of the worst of the"
+        f"steps of {display.length_text(one.step)}; at rest: the static error, of the worst of the"
         f" steps; over: overshoot, of the step; smooth: the tracking error; margin: modulus margin;"
         f" delay: delay margin in sampling periods; {beside}{limit}; {FIGURES_SAID}"
     )
@@ -183,23 +183,23 @@ def validation_sentence(found: Validation) -> str:
     return f"{said}: {own_figures(found.why)}." if found.why else f"{said}."
 
 
-def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
+def validation_parts(found: Validation, display: Display) -> list[Part | str]:
     """The figures of each loop; what controllers miss that are not tested, with --verbose."""
     others = other_figures(found.why)
     return [
-        validation_table(found, rotary),
+        validation_table(found, display),
         *([more(others)] if others else []),
         *(more(listed(_missed(found, name))) for name in found.figures),
-        columns_line(found, rotary),
+        columns_line(found, display),
         notes(found.remarks),
     ]
 
 
 def _step_chart(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, display: Display
 ) -> Chart:
     """Position and command after the first step up and the first one down, loops overlaid."""
-    (unit, factor), first = units_of(rotary).position, found.figures[found.judged][place]
+    (unit, factor), first = display.shown("position"), found.figures[found.judged][place]
     runs = _runs(traces, place, "step")
     some = next(iter(runs.values()))
     begins = [int(at) for at in np.flatnonzero(np.diff(some.r))[:2] + 1]
@@ -208,7 +208,7 @@ def _step_chart(
     most, h = begins[1] - begins[0], float(some.t[1] - some.t[0])
     samples = SETTLING_TIMES_SHOWN * float(np.median(times)) / h
     span = int(np.clip(samples, min(50, most), most))
-    command = first.command_unit if first.command_peak is not None else units_of(rotary).force.name
+    command = first.command_unit if first.command_peak is not None else display.force
     limit = first.command_limit
     panels = []
     for begin in begins:
@@ -240,11 +240,11 @@ def _near(lines: Sequence[Line], height: float) -> tuple[float, float] | None:
 
 
 def _error_chart(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, display: Display
 ) -> Chart:
     """Error along the smooth reference, and at rest where that of the tested loop is the largest,
     loops overlaid."""
-    unit, factor = units_of(rotary).position
+    unit, factor = display.shown("position")
     tested = traces[found.judged, place].step
     part, before = worst_rest(tested)
     height = factor * float(tested.r[part.start] - tested.r[before])
@@ -300,8 +300,8 @@ TRUTH_HEAD = ("parameter", "estimate", "unit", "95 % interval", "truth")
 
 def demo_screen(found: Demonstration, folder: Path) -> Screen:
     """The demo for a terminal; with --verbose also what `design` and `validate` say of it."""
-    traced, rotary = found.traced, found.traced.model.rotary
-    errors = errors_table(traced.trace, rotary)
+    traced, display = found.traced, found.traced.model.display
+    errors = errors_table(traced.trace, display)
     rows: Any = errors.whole
     parts: list[Part | str] = [
         SIMULATED,
@@ -313,8 +313,8 @@ def demo_screen(found: Demonstration, folder: Path) -> Screen:
         controller_sentence(found),
         controller_table(found),
         more(validation_sentence(found.validation)),
-        more(validation_table(found.validation, rotary)),
-        more(listed(validation_lines(found.validation, rotary))),
+        more(validation_table(found.validation, display)),
+        more(listed(validation_lines(found.validation, display))),
         more(listed(design_lines(found.design))),
         more(notes((*traced.remarks, *traced.trace.remarks), logs_of_trace(traced))),
         written(folder, "report.html", "design.html", "validation.html"),
@@ -335,9 +335,9 @@ def controller_sentence(found: Demonstration) -> str:
 
 def controller_table(found: Demonstration) -> Part:
     """The present controller and the recommended one, side by side."""
-    units, judged = shown(found.traced.model.rotary), found.validation.judged
+    force, judged = found.traced.model.display.force, found.validation.judged
     head = ("controller", "static error", "overshoot", "settling", "tracking error",
-            f"peak force [{units.force}]", "modulus margin")  # fmt: skip
+            f"peak force [{force}]", "modulus margin")  # fmt: skip
     figures = {key: places["model"] for key, places in found.validation.figures.items()}
     named = {PRESENT: "before: present"}
     if found.design.recommended != "none":

@@ -11,7 +11,7 @@ import numpy as np
 from design.controllers.velocity_loop import VelocityValidation, velocity_validation_document
 from design.identified.velocity import VelocityPredicted, VelocityPrediction, VelocityTraced
 from design.identified.velocity_documents import prediction_summary, velocity_trace_document
-from design.machine.readable import length, number
+from design.machine.readable import number
 from design.machine.velocity import VelocityDesign, VelocityModel, velocity_document
 from identification.velocity.record import RUN_IN
 from identification.velocity.rivals import STRUCTURES, is_noise
@@ -31,12 +31,12 @@ RIVAL_ROWS = ("rival", "held out, 2 s", "0.2 s", "chance", "clearly better")
 
 
 def _errors(model: VelocityModel) -> str:
-    fit, rotary = model.fit, model.rotary
+    fit, display = model.fit, model.display
     return (
         f"position predicted by the command alone, on stretches held out of the fit: within"
-        f" {length(fit.position_rms_2s, rotary)} rms over 2 s,"
-        f" {length(fit.position_rms_02s, rotary)} over 0.2 s (sensor's noise"
-        f" {length(fit.noise_y, rotary)})"
+        f" {display.length_text(fit.position_rms_2s)} rms over 2 s,"
+        f" {display.length_text(fit.position_rms_02s)} over 0.2 s (sensor's noise"
+        f" {display.length_text(fit.noise_y)})"
     )
 
 
@@ -107,8 +107,8 @@ def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder:
 
 
 def _verdict(found: VelocityTraced) -> str:
-    left, rotary = found.left, found.model.rotary
-    over = f"{length(left.unextended.rms[0], rotary)} rms of held-out position over 2 s"
+    left, display = found.left, found.model.display
+    over = f"{display.length_text(left.unextended.rms[0])} rms of held-out position over 2 s"
     match left.verdict:
         case "none":
             return f"Nothing is missing: the valve leaves {over}, no more than the sensor's noise"
@@ -117,7 +117,7 @@ def _verdict(found: VelocityTraced) -> str:
             whole = "what is left is noise" if left.complete else "more than noise is left"
             return (
                 f"Missing: {STRUCTURES[best.key].words} ({best.key}): {over} ->"
-                f" {length(best.left.rms[0], rotary)}; {whole}"
+                f" {display.length_text(best.left.rms[0])}; {whole}"
             )
         case "inseparable":
             able = ", ".join(one.key for one in left.rivals if one.better)
@@ -127,9 +127,9 @@ def _verdict(found: VelocityTraced) -> str:
 
 
 def _rivals(found: VelocityTraced) -> Part:
-    rotary = found.model.rotary
+    display = found.model.display
     rows = [
-        (one.key, length(one.left.rms[0], rotary), length(one.left.rms[1], rotary),
+        (one.key, display.length_text(one.left.rms[0]), display.length_text(one.left.rms[1]),
          number(one.p_value, 2), "yes" if one.better else "no")
         for one in found.left.rivals
     ]  # fmt: skip
@@ -150,12 +150,12 @@ def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
 @view.register
 def _(found: VelocityPredicted) -> View:
     """How far the simulated position is from the measured one."""
-    runs, window, rotary = found.runs, found.window, found.rotary
+    runs, window, display = found.runs, found.window, found.display
     summary = prediction_summary(runs, window)
     begun = f" from {RUN_IN:g} s on, since commands from before the log act until then"
     anew = f"{begun}{f', anew every {window:g} s' if window else ''}"
     off, worst = (
-        length(float(summary[k] or 0.0), rotary) for k in ("position_rms", "position_worst")
+        display.length_text(float(summary[k] or 0.0)) for k in ("position_rms", "position_worst")
     )
     return View(
         "Prediction",

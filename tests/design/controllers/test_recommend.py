@@ -16,6 +16,7 @@ from design.controllers.validate import validate
 from design.machine.controller import CardController, present
 from design.machine.design import Design, Recommendation
 from design.machine.model import Model
+from design.machine.readable import Display
 from design.tune import Asked
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
@@ -120,7 +121,7 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     result, traces = validate(model, found, np.random.default_rng(0), plant=model)
     assert next(iter(result.figures)) == PRESENT
     assert set(result.figures[PRESENT]) == {"model", "plant"} and (PRESENT, "plant") in traces
-    table = validation_table(result)
+    table = validation_table(result, Display())
     row = dict(zip(table.head, table.whole[0], strict=True))
     assert row["loop"] == "present" and row["ok"] == "no"
     # A PD against Coulomb friction stays off by up to F_c/(k_a k_d).

@@ -103,7 +103,7 @@ def test_it_is_validated_exported_written_and_read_again(tmp_path: Path) -> None
     file.write_text(dumps(design_document(found)))
     assert read_design(file).schedule == found.schedule
     result, traces = validate(model, found, np.random.default_rng(0))
-    page = view(result, traces, model.rotary).page()
+    page = view(result, traces, model.display).page()
     assert "P-PI + schedule" in page and "+table: with the gain schedule" in page
     assert {"pid + schedule", "p-pi + schedule"} <= set(result.figures)
     assert result.figures["p-pi + schedule"]["model"].stable

@@ -17,7 +17,7 @@ from design.loop import LoopRun
 from design.machine.design import Recommendation
 from design.machine.documents import design_document
 from design.machine.model import Model
-from design.machine.readable import shown
+from design.machine.readable import Display
 from design.tune import Asked
 from identification.arrays import Array
 from tests.chain import EMPS, designed, model_of
@@ -104,7 +104,7 @@ def test_a_loop_that_swings_where_it_did_not_before_misses_a_limit(
     _, figures = seen()
     one = replace(figures["pid"], limit_cycle=None, missed=())
     bad = replace(one, limit_cycle=LimitCycle(2.2e-3, 0.85))
-    out = calm_or_missed({swings: {"model": bad}, calm: {"model": one}}, shown(False))
+    out = calm_or_missed({swings: {"model": bad}, calm: {"model": one}}, Display())
     assert out[calm]["model"].passed
     said = out[swings]["model"].missed
     assert (missed in said[0] and said[0].startswith("swings at rest")) if missed else said == ()
@@ -121,7 +121,7 @@ def test_the_recommended_loop_decides_and_is_named_with_its_compensator() -> Non
     assert validation_sentence(result).startswith("PID with the compensator passes in simulation:")
     titles = [
         panel.title
-        for section in view(result, traces).sections()
+        for section in view(result, traces, Display()).sections()
         if isinstance(section.content, Chart)
         for panel in section.content.panels
     ]

@@ -2,7 +2,8 @@
 
 import pytest
 
-from design.machine.readable import as_shown, force, in_digits, length, number, small, times
+from design.machine.readable import Display, as_shown, in_digits, number, small, times
+from identification.log import Rig
 from identification.model.estimates import Estimate
 
 
@@ -20,12 +21,22 @@ def test_numbers_have_no_exponent(value: float, digits: int, said: str) -> None:
     [(5.63e-3, "5.63 mm"), (9.94e-6, "9.94 µm"), (-1.2, "-1200 mm"), (0.0, "0 mm")],
 )
 def test_lengths_are_in_mm_and_below_in_micrometres(metres: float, said: str) -> None:
-    assert length(metres) == said
+    assert Display().length_text(metres) == said
 
 
 def test_a_rotary_machine_has_angles_and_torques() -> None:
-    assert length(0.0123, rotary=True) == "0.0123 rad" and force(2.0, rotary=True) == "2 N m"
-    assert force(2.415) == "2.42 N" and times(5540.0) == "5500 times"
+    turns = Display("rotary")
+    assert turns.length_text(0.0123) == "0.0123 rad" and turns.force_text(2.0) == "2 N m"
+    assert Display().force_text(2.415) == "2.42 N" and times(5540.0) == "5500 times"
+
+
+def test_a_display_is_made_once_of_a_rig() -> None:
+    found = Display.of(Rig("motor", motion="rotary", command_unit="A"))
+    assert found == Display("rotary", "A")
+    assert (found.stiffness, found.force_gain, found.mass) == ("N m/rad", "A/(N m)", "kg m^2")
+    assert found.named("force_per_command") == "N m/A" and found.named("s") == "s"
+    assert found.shown("velocity") == ("rad/s", 1.0)
+    assert Display.of(Rig("force")).shown("velocity") == ("mm/s", 1e3)
 
 
 def test_less_than_a_column_shows() -> None:

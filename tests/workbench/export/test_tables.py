@@ -14,6 +14,7 @@ import pytest
 from design.generated.compensation import Compensation, TableFile, TablesAsked
 from design.generated.tables import Tables, tables
 from design.machine.model import Model
+from design.machine.readable import Display
 from identification.errors import BadModel, UserError
 from identification.model.estimates import Estimate
 from identification.model.karnopp import slip_friction
@@ -408,11 +409,11 @@ def test_beyond_the_logs_the_table_is_the_law_and_says_so() -> None:
 
 
 def test_what_is_asked_comes_with_units() -> None:
-    found = tables_asked(False, None, "0.5 m/s", "10", "2400 N mm", None)
+    found = tables_asked(Display(), None, "0.5 m/s", "10", "2400 N mm", None)
     assert (found.high, found.per_turn) == (0.5, 0.01) and found.rated == pytest.approx(2.4)
-    found = tables_asked(False, None, "500", None, "250 N", "motor")
+    found = tables_asked(Display(), None, "500", None, "250 N", "motor")
     assert (found.high, found.per_turn, found.rated) == (0.5, None, 250.0)
-    found = tables_asked(True, None, "60 rpm", "36 deg", "2 N m", None)
+    found = tables_asked(Display("rotary"), None, "60 rpm", "36 deg", "2 N m", None)
     assert found.high == pytest.approx(2 * np.pi) and found.per_turn == pytest.approx(np.pi / 5)
     for speed, per_turn, rated, said in (
         ("fast", None, None, "--speed"),
@@ -421,4 +422,4 @@ def test_what_is_asked_comes_with_units() -> None:
         (None, None, "2 N m", "of another kind"),  # of a linear motor it is a force
     ):
         with pytest.raises(UserError, match=said):
-            tables_asked(False, None, speed, per_turn, rated, None)
+            tables_asked(Display(), None, speed, per_turn, rated, None)

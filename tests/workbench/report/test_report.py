@@ -9,7 +9,7 @@ import pytest
 
 from design.controllers.validate import validate
 from design.identified.identify_logs import Identified
-from design.machine.readable import friction_units
+from design.machine.readable import Display
 from identification.model.plant import Actuator, actuator_units
 from identification.signals.envelope import evenly_spread, liveliest
 from tests.chain import TABLES, designed, identified, model_of
@@ -95,7 +95,7 @@ def test_a_rotary_report_shows_rotary_units() -> None:
 def turned(found: Identified) -> Identified:
     """The same numbers as those of a rotary machine."""
     model = found.model
-    friction, actuator = friction_units("rotary"), actuator_units("rotary")
+    friction, actuator = Display("rotary").friction, actuator_units("rotary")
     turning = replace(
         model,
         rig=replace(model.rig, motion="rotary"),
@@ -114,8 +114,9 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     assert "[dB, N m/rad]" in html and " V/(N m)," in html
     assert "N/m" not in html and "V/N," not in html
     result, _ = validate(model, found, np.random.default_rng(0))
-    assert any(re.match(r"steps of [\d.]+ rad;", line) for line in validation_lines(result, True))
-    assert any(re.match(r"steps of [\d.]+ mm;", line) for line in validation_lines(result))
+    for display, unit in ((Display("rotary"), "rad"), (Display(), "mm")):
+        said = validation_lines(result, display)
+        assert any(re.match(rf"steps of [\d.]+ {unit};", line) for line in said)
 
 
 def test_design_report() -> None:
@@ -134,9 +135,9 @@ def test_design_report() -> None:
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
     result, traces = validate(model, designed(model), np.random.default_rng(0), plant=other)
-    html = checked(view(result, traces, False).page(), 4)
+    html = checked(view(result, traces, Display()).page(), 4)
     assert "Steps on the identified plant" in html and "Steps on the other plant" in html
-    rotary = view(result, traces, True).page()
+    rotary = view(result, traces, Display("rotary")).page()
     assert "position [rad]" in rotary and "force N m" in rotary
 
 
@@ -180,6 +181,6 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
 def test_a_rotary_validation_has_rotary_columns() -> None:
     model = turned(identified()).model
     result, _ = validate(model, designed(model), np.random.default_rng(0))
-    found = validation_table(result, rotary=True)
-    assert "force N m" in found.head and "force N" in validation_table(result).head
+    found = validation_table(result, Display("rotary"))
+    assert "force N m" in found.head and "force N" in validation_table(result, Display()).head
     assert all(len(row) == len(found.head) for row in found.whole)

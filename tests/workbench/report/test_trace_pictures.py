@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.machine.readable import Display
 from identification.tracing.residual_rows import folded_at
 from identification.tracing.result import Residual
 from identification.tracing.shown_against import pictures
@@ -27,7 +28,7 @@ def test_a_swing_is_drawn_over_its_period_in_the_first_log() -> None:
 def test_the_missing_force_is_drawn_before_and_after_with_its_band() -> None:
     found = trace_of("effect", ("stribeck",))
     assert found.missing_force is not None and found.missing is not None
-    (panel,) = missing_chart(found, False, ["a.csv", "b.csv"]).panels
+    (panel,) = missing_chart(found, Display(), ["a.csv", "b.csv"]).panels
     before, after = panel.lines
     first = found.missing_force.before.logs[0]
     assert np.nanstd(before.y) > 10.0 * np.nanstd(after.y)

@@ -14,6 +14,7 @@ from design.identified import trace_logs as tracing
 from design.identified.trace_document import trace_document
 from design.identified.trace_logs import trace_logs, traced_model
 from design.machine.documents import model_document
+from design.machine.readable import Display
 from design.measured.friction_curve import sliding_friction
 from identification.effects._library import built_in
 from identification.errors import BadLog
@@ -124,7 +125,8 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad",
         "N m/rad**3",
     ]
-    assert "[rad]" in str(errors_table(found.trace, True).whole) and "N m" in trace_sentence(found)
+    errors = errors_table(found.trace, found.model.display)
+    assert "[rad]" in str(errors.whole) and "N m" in trace_sentence(found)
     html = checked(view(found).page(), 5)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
@@ -317,8 +319,8 @@ def test_the_error_in_which_an_effect_shows_is_reported() -> None:
 
 def test_rows_of_the_tables() -> None:
     found = trace_of("drift")
-    assert errors_table(found, False).whole[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
-    assert [row[0] for row in rivals_table(found, False).whole] == [
+    assert errors_table(found, Display()).whole[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
+    assert [row[0] for row in rivals_table(found, Display()).whole] == [
         "spring",
         "nonlinear viscous",
         "cogging",
@@ -445,11 +447,11 @@ def test_the_running_median_is_not_drawn_across_a_gap() -> None:
 def test_shares_starts_and_labels() -> None:
     assert share_inside(np.array([0.0, 1.9, -2.1, 5.0]), np.ones(4)) == 50.0
     assert log_starts(residual("mechanical", ()))[0] == 0.1
-    assert axis_of("temperature", False) == ("temperature", 1.0)
-    assert axis_of("v", True) == ("velocity [rad/s]", 1.0)
-    assert axis_of("v", False) == ("velocity [mm/s]", 1e3)
-    assert axis_of("p_n", False) == ("pressure p_n [bar]", 1e-5)
-    assert axis_of("du", False, "A") == ("rate of the command [A/s]", 1.0)
+    assert axis_of("temperature", Display()) == ("temperature", 1.0)
+    assert axis_of("v", Display("rotary")) == ("velocity [rad/s]", 1.0)
+    assert axis_of("v", Display()) == ("velocity [mm/s]", 1e3)
+    assert axis_of("p_n", Display()) == ("pressure p_n [bar]", 1e-5)
+    assert axis_of("du", Display("linear", "A")) == ("rate of the command [A/s]", 1.0)
 
 
 def test_friction_of_speed_joins_the_curve() -> None:
