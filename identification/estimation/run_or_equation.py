@@ -176,7 +176,7 @@ def likeliest(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     Source: prediction-error method, Ljung, System Identification (1999), 7.2.
     """
     noisy = any(one.has_random_walk(recorded.drive) for one in recorded.logs)
-    loses_stops = recorded.drive == "command" and not fit.adequate
+    loses_stops = not fit.adequate and recorded.drive == "command"
     if not (loses_stops or (noisy and fit.adequate)):
         return fit
     rows = first_stage(recorded.logs, recorded.by_command, (MECHANICAL, ACTUATOR))[1]

@@ -50,7 +50,7 @@ HERTZ_TRIED = 24  # tried, on a scale of ratios
 APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
-DIFFERENCE = 1e-5  # of the logarithms, for the gradient: recursions round off at 1e-10
+GRADIENT_STEP = 1e-5  # of the logarithms, for the gradient: recursions round off at 1e-10
 FEWEST_RUNS = 8
 MOST_LAG = 4  # samples between force and position, to either side
 ONE_BODY = (np.ones(1), np.array([1.0, 0.0, 0.0]))  # y = F / (m s^2), for a unit mass
@@ -169,7 +169,7 @@ def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
     def left(tried: Array) -> Array:
         return np.asarray(_left_of(tried, cut, h) / size)
 
-    apart = np.full(len(p), DIFFERENCE)
+    apart = np.full(len(p), GRADIENT_STEP)
     return optimize.least_squares(left, p, method="lm", max_nfev=runs, diff_step=apart)
 
 

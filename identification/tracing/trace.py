@@ -21,6 +21,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
+from identification.model.surroundings import Surroundings
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
@@ -103,16 +104,23 @@ def trace(
     if beside.sampled:  # a measured current, which no period holds
         traced = replace(traced, command_period=0.0)
     elastic = traced.verdict == "unknown" and not traced.effects and not halt.reached()
-    if not (elastic and acts_directly(train, rig)):
-        return traced
+    if elastic and acts_directly(train, rig):
+        return _of_two_masses(traced, beside, train, rig)
+    return traced
+
+
+def _of_two_masses(
+    traced: Trace, beside: Surroundings, train: Sequence[Log], rig: Rig
+) -> Trace:  # fmt: skip
+    """The trace with the resonance, mass and friction of two masses, where these show."""
     resonance = two_masses(train, rig)
     if resonance is None:
         return traced
-    around, plant = replace(beside, resonance=resonance), traced.plant
+    plant = traced.plant
     friction, sizes = of_two_masses(resonance, plant.friction, traced.parameters_after)
     return replace(
         traced,
-        surroundings=around,
+        surroundings=replace(beside, resonance=resonance),
         plant=replace(plant, friction=friction),
         parameters_after=sizes,
         missing_force=None,  # which is of one body
