@@ -21,6 +21,7 @@ from design.experiment.planned import Experiment, Promised, Safety
 from design.judgement import Candidate
 from design.machine.design import Recommendation
 from design.machine.model import Model
+from design.machine.readable import Display
 from design.measured.drift_of_logs import Drifted
 from design.measured.drift_of_logs import Tested as OneTested
 from design.measured.predicted_logs import Predicted
@@ -129,7 +130,7 @@ def validation(passed: bool) -> Validation:
 
 
 def validate() -> Iterator[Screen]:
-    yield from (view(validation(passed), {}).screen(OUT) for passed in (True, False))
+    yield from (view(validation(passed), {}, Display()).screen(OUT) for passed in (True, False))
 
 
 def design() -> Iterator[Screen]:
@@ -205,7 +206,7 @@ def predict() -> Iterator[Screen]:
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
-    yield view(Predicted((), summary), False, LOGS[0]).screen(OUT)
+    yield view(Predicted((), summary), Display(), LOGS[0]).screen(OUT)
 
 
 def response() -> Iterator[Screen]:
