@@ -48,6 +48,7 @@ HIGHEST_SHARE = 0.25  # of the sampling rate
 SAMPLES_TAKEN = 12_000
 HERTZ_TRIED = 24  # tried, on a scale of ratios
 APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
+MOST_APART = 3.0  # of their logarithms, in the search: a load 400 times the motor
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
 GRADIENT_STEP = 1e-5  # of the logarithms, for the gradient: recursions round off at 1e-10
@@ -104,7 +105,8 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     one_body = _one_body(cut, h)
     two = _left_of(found, cut, h)
     w_a, w_r, damping = (float(x) for x in np.exp(found[:3]))
-    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
+    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest
+    inside = inside and shows_a_load(w_r, w_a) and bool(found[1] - found[0] < MOST_APART)
     if not inside or not are_two(one_body, float(two @ two)):
         return None
     return _resonance(found, cut, h, damping)
@@ -204,7 +206,10 @@ def _left_of(p: Array, cut: Sequence[_Window], h: float) -> Array:
 
 def _two_bodies(p: Array, cut: Sequence[_Window], h: float) -> tuple[Array, Array]:
     """What two masses leave of every window, and the linear parameters (5,) over the mass."""
-    w_a, w_r, damping = (float(x) for x in np.exp(np.clip(p[:3], -10.0, 11.0)))
+    fastest = np.log(np.pi / h)
+    anti = np.clip(p[0], fastest - 12.0, fastest)
+    near = np.clip(p[1], anti - MOST_APART, min(anti + MOST_APART, fastest))
+    w_a, w_r, damping = np.exp([anti, near, np.clip(p[2], -10.0, 2.0)]).tolist()
     lag = float(np.clip(p[3], 1.0 - MOST_LAG, MOST_LAG - 1.0))
     top = np.array([1.0, 2.0 * damping * w_a**2 / w_r, w_a**2]) * (w_r / w_a) ** 2
     below = np.array([1.0, 2.0 * damping * w_r, w_r**2, 0.0, 0.0])

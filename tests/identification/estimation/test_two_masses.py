@@ -6,6 +6,8 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
+from identification.estimation.two_masses import _left_of as left_by
+from identification.estimation.two_masses import _windows as windows
 from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.tracing.trace import trace
@@ -102,6 +104,14 @@ def test_a_trace_takes_mass_and_friction_of_the_two() -> None:
     assert found.parameters_after["m"].value == pytest.approx(4e-3, rel=1e-3)
     assert found.parameters_after["F_cp"].value == pytest.approx(0.05, rel=0.01)
     assert found.plant.friction.m == pytest.approx(4e-3, rel=1e-3)
+
+
+def test_a_search_that_goes_astray_warns_of_nothing() -> None:
+    """A real pendulum's had ended in coefficients of which scipy warns."""
+    k = (2.0 * np.pi * 25.0) ** 2 * 0.75e-3
+    cut = windows([log_of(1e-3, 3e-3, k, damping=1e-3, seed=1).part(0, 3000)], zoh=False)
+    for p in np.random.default_rng(0).uniform(-30.0, 30.0, (40, 4)):
+        assert np.all(np.isfinite(left_by(p, cut, H)))
 
 
 def test_one_body_is_not_two() -> None:
