@@ -6,7 +6,6 @@ import itertools
 import json
 import math
 import os
-import secrets
 import shlex
 import shutil
 import sys
@@ -142,7 +141,7 @@ class OutputFolder:
         self.final = default if out is None else out
         self._inside = not self._default and self.final.is_dir()
         home = self.final if self._inside else self.final.parent
-        self.path = home / f".{self.final.name}.{secrets.token_hex(4)}.part"
+        self.path = home / f".{self.final.name}.{os.urandom(4).hex()}.part"
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -236,7 +235,7 @@ def write_whole(path: Path, text: str, option: str) -> None:
 
     option: that named the file, for the message. Raises BadOutput where it cannot be written.
     """
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(text, encoding="utf-8")
