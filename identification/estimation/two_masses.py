@@ -104,9 +104,8 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
     found = _nearest(found, cut, h, 4 * EACH_SEARCH).x
     one_body = _one_body(cut, h)
     two = _left_of(found, cut, h)
-    w_a, w_r, damping = (float(x) for x in np.exp(found[:3]))
-    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest
-    inside = inside and shows_a_load(w_r, w_a) and bool(found[1] - found[0] < MOST_APART)
+    w_a, w_r, damping = _shape(found, h)
+    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
     if not inside or not are_two(one_body, float(two @ two)):
         return None
     return _resonance(found, cut, h, damping)
@@ -193,11 +192,21 @@ def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Re
 def _numbers(p: Array, cut: Sequence[_Window], h: float) -> Array:
     """Resonance and anti-resonance [Hz], damping, both masses [kg], and the friction (4,) [N]."""
     _, theta = _two_bodies(p, cut, h)
-    w_a, w_r, damping = np.exp(p[:3])
+    w_a, w_r, damping = _shape(p, h)
     mass = 1.0 / theta[0]
     first = mass * (w_a / w_r) ** 2
     own = [w_r / (2.0 * np.pi), w_a / (2.0 * np.pi), damping, first, mass - first]
     return np.array([*own, *(mass * theta[1:])])
+
+
+def _shape(p: Array, h: float) -> tuple[float, float, float]:
+    """Anti-resonance and resonance [rad/s], as a log of samples every h [s] can hold them, and
+    damping."""
+    fastest = np.log(np.pi / h)
+    anti = np.clip(p[0], fastest - 12.0, fastest)
+    near = np.clip(p[1], anti - MOST_APART, min(anti + MOST_APART, fastest))
+    w_a, w_r, damping = np.exp([anti, near, np.clip(p[2], -10.0, 2.0)]).tolist()
+    return w_a, w_r, damping
 
 
 def _left_of(p: Array, cut: Sequence[_Window], h: float) -> Array:
@@ -206,10 +215,7 @@ def _left_of(p: Array, cut: Sequence[_Window], h: float) -> Array:
 
 def _two_bodies(p: Array, cut: Sequence[_Window], h: float) -> tuple[Array, Array]:
     """What two masses leave of every window, and the linear parameters (5,) over the mass."""
-    fastest = np.log(np.pi / h)
-    anti = np.clip(p[0], fastest - 12.0, fastest)
-    near = np.clip(p[1], anti - MOST_APART, min(anti + MOST_APART, fastest))
-    w_a, w_r, damping = np.exp([anti, near, np.clip(p[2], -10.0, 2.0)]).tolist()
+    w_a, w_r, damping = _shape(p, h)
     lag = float(np.clip(p[3], 1.0 - MOST_LAG, MOST_LAG - 1.0))
     top = np.array([1.0, 2.0 * damping * w_a**2 / w_r, w_a**2]) * (w_r / w_a) ** 2
     below = np.array([1.0, 2.0 * damping * w_r, w_r**2, 0.0, 0.0])
