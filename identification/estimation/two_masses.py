@@ -48,7 +48,9 @@ HIGHEST_SHARE = 0.25  # of the sampling rate
 SAMPLES_TAKEN = 12_000
 HERTZ_TRIED = 24  # tried, on a scale of ratios
 APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
-MOST_APART = 3.0  # of their logarithms, in the search: a load 400 times the motor
+# Where the search may go, in logarithms: the slowest below half the rate of samples; resonance and
+# anti-resonance apart (a load 400 times the motor); dampings.
+SLOWEST_SWING, MOST_APART, DAMPING_RANGE = 12.0, 3.0, (-10.0, 2.0)
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
 GRADIENT_STEP = 1e-5  # of the logarithms, for the gradient: recursions round off at 1e-10
@@ -96,17 +98,15 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
         for f in np.geomspace(lowest, highest, HERTZ_TRIED)
         for ratio in APART_TRIED
     ]
-    starts = sorted(tried, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))[:SEARCHES_RUN]
-    every = [_nearest(p, cut, h, 4 * EACH_SEARCH).x for p in starts]
-    found = min(every, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))
+    starts = sorted(tried, key=lambda p: _square(p, cut, h))[:SEARCHES_RUN]
+    every = [_nearest(p, cut, h, 4 * EACH_SEARCH) for p in starts]
+    found = min(every, key=lambda p: _square(p, cut, h))
     each = _of_windows(_left_of(found, cut, h), cut)
     cut = [one for one, left in zip(cut, each, strict=True) if left <= ASTRAY * np.median(each)]
-    found = _nearest(found, cut, h, 4 * EACH_SEARCH).x
-    one_body = _one_body(cut, h)
-    two = _left_of(found, cut, h)
+    found = _nearest(found, cut, h, 4 * EACH_SEARCH)
     w_a, w_r, damping = _shape(found, h)
     inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
-    if not inside or not are_two(one_body, float(two @ two)):
+    if not inside or not are_two(_one_body(cut, h), _square(found, cut, h)):
         return None
     return _resonance(found, cut, h, damping)
 
@@ -163,7 +163,7 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
     return {name: reported_estimate(one.value, unit, one.sd) for name, (one, unit) in sizes.items()}
 
 
-def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
+def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Array:
     """The nearest minimum of what two masses leave (Levenberg 1944, Marquardt 1963)."""
     size = np.sqrt(np.mean(_left_of(p, cut, h) ** 2))  # in m or rad a gradient is soon "small"
 
@@ -171,7 +171,8 @@ def _nearest(p: Array, cut: Sequence[_Window], h: float, runs: int) -> Any:
         return np.asarray(_left_of(tried, cut, h) / size)
 
     apart = np.full(len(p), GRADIENT_STEP)
-    return optimize.least_squares(left, p, method="lm", max_nfev=runs, diff_step=apart)
+    found = optimize.least_squares(left, p, method="lm", max_nfev=runs, diff_step=apart)
+    return np.asarray(found.x)
 
 
 def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:
@@ -180,7 +181,7 @@ def _resonance(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Re
 
     def without(kept: BoolArray) -> Array:
         some = [one for one, stays in zip(cut, kept, strict=True) if stays]
-        return _numbers(_nearest(p, some, h, EACH_SEARCH).x, some, h)
+        return _numbers(_nearest(p, some, h, EACH_SEARCH), some, h)
 
     sd = spread_of_left_out(left_out(np.arange(len(cut)) % min(10, len(cut)), without))
     sizes = [Size(float(value), float(s)) for value, s in zip(whole, sd, strict=True)]
@@ -203,10 +204,16 @@ def _shape(p: Array, h: float) -> tuple[float, float, float]:
     """Anti-resonance and resonance [rad/s], as a log of samples every h [s] can hold them, and
     damping."""
     fastest = np.log(np.pi / h)
-    anti = np.clip(p[0], fastest - 12.0, fastest)
+    anti = np.clip(p[0], fastest - SLOWEST_SWING, fastest)
     near = np.clip(p[1], anti - MOST_APART, min(anti + MOST_APART, fastest))
-    w_a, w_r, damping = np.exp([anti, near, np.clip(p[2], -10.0, 2.0)]).tolist()
+    w_a, w_r, damping = np.exp([anti, near, np.clip(p[2], *DAMPING_RANGE)]).tolist()
     return w_a, w_r, damping
+
+
+def _square(p: Array, cut: Sequence[_Window], h: float) -> float:
+    """The square that two masses leave of all windows."""
+    left = _left_of(p, cut, h)
+    return float(left @ left)
 
 
 def _left_of(p: Array, cut: Sequence[_Window], h: float) -> Array:
@@ -264,9 +271,8 @@ def _windows(logs: Sequence[Log], *, zoh: bool) -> list[_Window]:
     for log in logs:
         one = motion_log(log, zoh=zoh, by_command=False)
         y, d = np.asarray(log["y"]), np.asarray(one.signals["d"])
-        v = (
-            np.diff(y, append=y[-1]) / log.h
-        )  # of each interval; a smooth one lacks what swings fast
+        # The mean of each interval: a smoothed velocity lacks what swings fast.
+        v = np.diff(y, append=y[-1]) / log.h
         up, down = 1.0 * (d > 0.0), 1.0 * (d < 0.0)
         F = np.pad(np.asarray(log["F"]), MOST_LAG, mode="edge")
         friction = np.column_stack([-up, down, -v * up, -v * down])
