@@ -90,7 +90,7 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--only", nargs="+", metavar="NAME")
     parser.add_argument("--splits", action="store_true", help="other splits of the rigs")
-    parser.add_argument("--halves", action="store_true", help="each file: 60 % of it and the rest")
+    parser.add_argument("--halves", action="store_true", help="each file: 60 %% of it and the rest")
     parser.add_argument("--part", choices=PARTS, default="both")
     parser.add_argument("--limit", type=float, default=300.0, help="processor seconds a case")
     parser.add_argument("--out", type=Path, help="lines of JSON are added to it")
