@@ -18,11 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.errors import NotIdentifiable, UserError
+from identification.errors import NotIdentifiable
 from identification.estimation.converged_fit import converged_fit
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.prescribed_motion import (
-    fit_one_way,
     fit_prescribed,
     of_one_way,
     way_of,
@@ -117,17 +116,14 @@ def fit_beside(
     try:
         recorded = recorded_logs(alone, rig, drive, halt)
         fit = _plain_fit(recorded, rng, report, by=drive, quick=quick, turns=turns)
-    except NotIdentifiable as refused:
-        if are_steps(alone):
+    except NotIdentifiable:
+        if up is None or are_steps(alone):
             raise
-        try:
-            fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
-        except UserError:
-            raise refused from None
+        fit = fit_prescribed(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
     else:
-        if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
+        if turns and not fit.adequate:  # what a run one way leaves open, it bends
             with suppress(NotIdentifiable):
-                fit = fit_one_way(recorded_logs(alone, rig, drive), ONE_WAY_WHY)
+                fit = fit_prescribed(recorded, ONE_WAY_WHY)
     fit = fit if up is None else of_one_way(fit, up, rig)
     shows = not quick or fit.estimates["m"].value is not None
     if shows and not (fit.adequate or beside.orders or halt.reached()):

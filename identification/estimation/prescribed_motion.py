@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import (
     Events,
@@ -22,18 +22,12 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regressed_plant import first_plant, motor_of
 from identification.estimation.regression.equation_rows import (
     FIVE,
-    NOTHING_KNOWN,
     OF_FORCE,
-    MotionLog,
-    mechanical,
 )
 from identification.estimation.regression.force_terms import (
     ForceFit,
     Lateness,
     fewest_terms,
-    fitted,
-    robust_parts,
-    ways_of,
 )
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
@@ -58,7 +52,6 @@ FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_COMPARED = 48  # windows of sliding, by which a fit is compared with the equation
 WIDEST_ASSUMED = 0.06  # of fast sliding, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
-ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
     "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
     "F_v": "constant friction predicts as much of these logs; add runs at other speeds to"
@@ -152,38 +145,28 @@ def withheld(fit: KarnoppFit, reason: str) -> KarnoppFit:
 
 
 def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
-    """Sliding friction by the force equation, and the rows that it was fitted on.
+    """Sliding friction by the force equation, and the rows that it was fitted on; of motion one way
+    alone, that way's.
 
-    Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
-    Messenger, Bortz (2021); terms by cross-validation, Stone (1974).
+    Raises NotIdentifiable where no log slides enough. Source: weak form, Messenger, Bortz (2021);
+    terms by cross-validation, Stone (1974).
     """
     every = converged_rows(recorded.logs)
     made = without_reversals(every)
-    rows = [one.rows for one in made]
-    up, down = ways_of(rows)
-    if min(up, down) < FEWEST_OF_DIRECTION:
+    ways = np.concatenate([one.up for one in made])
+    up, down = (int(np.count_nonzero(ways == way)) for way in (True, False))
+    way = _way(up / len(ways)) if len(ways) >= FEWEST_COMPARED else None
+    if way is not None:
+        every = made = [one.at(one.up == way) for one in made]
+    elif min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
             f"{recorded.name}: {up} windows of sliding in positive and {down} in negative"
             f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
             " directions"
         )
+    rows = [one.rows for one in made]
     late = None if recorded.zoh else Lateness.of([one.windows for one in made], recorded.plain)
-    return fewest_terms(rows, late, stacked([one.rows for one in every])), rows
-
-
-def fit_one_way(recorded: RecordedLogs, why: str) -> KarnoppFit:
-    """The equation of motion of logs that move one way, as `fit_prescribed` has it of both: mass,
-    viscous and Coulomb friction. Raises NotIdentifiable where they go both ways, or hardly slide.
-    Source: Messenger, Bortz (2021)."""
-    moved = _moved(recorded.plain, recorded.zoh)
-    up = np.concatenate([one.up for one in moved])
-    way = _way(up)
-    if way is None or len(up) < FEWEST_COMPARED:
-        raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
-    data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
-    windows = [one.sliding.at(np.flatnonzero(one.up == way)) for one in moved]
-    late = None if recorded.zoh else Lateness.of(windows, recorded.plain)
-    return _made(fitted(robust_parts(data), ONE_WAY[way], late), data, recorded, why)
+    return fewest_terms(rows, late, stacked([one.rows for one in every]), way), rows
 
 
 def way_of(logs: Sequence[Log], *, zoh: bool) -> bool | None:
@@ -191,22 +174,17 @@ def way_of(logs: Sequence[Log], *, zoh: bool) -> bool | None:
 
     By windows of sliding, of quick motion, which has few of them, by samples.
     """
-    moved = _moved(logs, zoh)
+    # Smoothed until its direction is significant.
+    moved = [motion_log(one, zoh=zoh, by_command=False, prescribed=True) for one in logs]
     up = np.concatenate([one.up for one in moved])
     if len(up) < FEWEST_COMPARED:
         d = np.concatenate([one.signals["d"] for one in moved])
         up = d[d != 0.0] > 0.0
-    return _way(up)
+    return _way(float(np.mean(up))) if len(up) else None
 
 
-def _moved(logs: Sequence[Log], zoh: bool) -> list[MotionLog]:
-    """The logs with their motion, smoothed until its direction is significant."""
-    return [motion_log(one, zoh=zoh, by_command=False, prescribed=True) for one in logs]
-
-
-def _way(up: BoolArray) -> bool | None:
-    """The way of samples or windows (n,), as `way_of`."""
-    share = float(np.mean(up)) if len(up) else 0.5
+def _way(share: float) -> bool | None:
+    """The way of motion of which such a share is up, as `way_of`."""
     return share > 0.5 if is_one_way(share) else None
 
 

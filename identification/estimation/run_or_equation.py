@@ -27,7 +27,6 @@ from identification.estimation.estimates import effect_estimates
 from identification.estimation.prediction_error import prediction_error_fit
 from identification.estimation.prescribed_motion import (
     FEWEST_COMPARED,
-    fit_one_way,
     fit_prescribed,
     is_unexplained,
     withheld,
@@ -268,7 +267,6 @@ def _by_equation(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
     (1989), 8.6)."""
     if recorded.steps:
         return None
-    for by in (fit_prescribed, fit_one_way):
-        with suppress(NotIdentifiable):
-            return by(recorded, why)
+    with suppress(NotIdentifiable):
+        return fit_prescribed(recorded, why)
     return None

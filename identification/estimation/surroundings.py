@@ -33,6 +33,7 @@ from identification.estimation.regression.weighted_rows import (
     solve_rows,
     spread_of_left_out,
     stacked,
+    with_model_error,
     without_each_block,
 )
 from identification.estimation.turn_orders import turn_orders
@@ -258,7 +259,7 @@ def _beside_gravity(moved: Sequence[MotionLog]) -> tuple[Array, Array] | None:
     The cosine, about a constant force over a small angle, is 0 where blocks that a fit has not seen
     are predicted no worse without it, and as unsure as beside the rest. Source: Stone (1974).
     """
-    rows = stacked([one.rows for one in converged_rows(moved, gravity=True)])
+    rows = with_model_error(stacked([one.rows for one in converged_rows(moved, gravity=True)]))
     if len(rows.b) < FEWEST_WINDOWS:
         return None
     theta, each = solve_rows(rows).theta, without_each_block(rows)

@@ -19,7 +19,9 @@ from identification.estimation.regression.weighted_rows import (
     least_squares,
     left_unseen,
     robust,
+    solve_rows,
     stacked,
+    with_model_error,
 )
 from identification.log import Log
 from identification.model.estimates import NORMAL_95
@@ -28,10 +30,8 @@ from identification.thresholds import HALF, NEARLY_ALL, OF_ACCOUNT, TWICE, WORSE
 
 # Columns of Coulomb friction with those of viscous friction that may stand beside, or these alone
 LEVEL_COLUMNS, VISCOUS_COLUMNS = (1, 2), (3, 4)
-FRICTION_COLUMNS = ((1, 2), (1, 2, 3), (1, 2, 4), (3, 4), (1, 2, 3, 4))
-COLUMN_SETS = tuple(
-    sorted(((*mass, *friction) for friction in FRICTION_COLUMNS for mass in ((), (0,))), key=len)
-)
+OF_BOTH_WAYS = ((1, 2), (1, 2, 3), (1, 2, 4), (3, 4), (1, 2, 3, 4))
+OF_ONE_WAY = {True: ((1,), (1, 3), (3,)), False: ((2,), (2, 4), (4,))}  # up alone, down alone
 
 
 @dataclass(frozen=True)
@@ -125,29 +125,31 @@ class Lateness:
         return out
 
 
-def ways_of(rows: Sequence[Rows]) -> tuple[int, int]:
-    """Windows in which the body mostly moves up, and down."""
-    up = sum(int(np.count_nonzero(part.X[:, 1] > 0.5)) for part in rows)
-    return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
+def column_sets(up: bool | None) -> list[tuple[int, ...]]:
+    """The columns that may be fitted together, the fewest first; up: the way of motion one way
+    alone, None: both ways."""
+    friction = OF_BOTH_WAYS if up is None else OF_ONE_WAY[up]
+    return sorted(((*mass, *some) for some in friction for mass in ((), (0,))), key=len)
 
 
 def fewest_terms(
-    data: Sequence[Rows], late: Lateness | None = None, every: Rows | None = None
-) -> ForceFit:
+    data: Sequence[Rows], late: Lateness | None = None, every: Rows | None = None,
+    up: bool | None = None,
+) -> ForceFit:  # fmt: skip
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
     than those that leave least; a mass that comes out below 0 is none, nor one that leaves more of
     `every` row, those with reversals too, than none does; nor is viscous friction
     that would take Coulomb friction below 0: at speeds alike it stands for anything. Source:
     cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the margin is ours, and so is that
     the levels are as uncertain as beside viscous friction that is left out, where these logs
-    separate the two."""
-    data = robust_parts(data)
+    separate the two. up: of motion one way alone, as `column_sets`."""
+    data = as_they_err(data)
     rows = stacked(data)
     weight = np.median(rows.sd) / rows.sd
     alike = {column for column in VISCOUS_COLUMNS if of_one_speed(rows, column, WORSE)}
-    sets = [fitted(data, used, late) for used in COLUMN_SETS if not alike.intersection(used)]
+    sets = [fitted(data, used, late) for used in column_sets(up) if not alike.intersection(used)]
     rubs = _rubs(sets[-1], rows.b)
-    fits = [one for one in sets if _may_be(one) and (1 in one.used or rubs)]
+    fits = [one for one in sets if _may_be(one) and (rubs or set(one.used) & set(LEVEL_COLUMNS))]
     if every is not None:
         left_by = {one.used: one.left_of(every) for one in sets}
         fits = [one for one in fits if left_by[one.used] <= left_by[one.used_but_mass]]
@@ -168,9 +170,13 @@ def fewest_terms(
     return replace(best, covariance=covariance, share=sets[-1].share)
 
 
-def robust_parts(data: Sequence[Rows]) -> list[Rows]:
-    """The rows of each log, outliers of their common fit with more deviation, as `robust`."""
-    each = np.split(robust(stacked(data)).sd, np.cumsum([len(part.b) for part in data])[:-1])
+def as_they_err(data: Sequence[Rows]) -> list[Rows]:
+    """The rows of each log with the deviations by which their equation errs, `with_model_error`;
+    where it explains nearly all of the force, the rest are outliers, as of `robust`."""
+    rows = with_model_error(stacked(data))
+    if rms(rows.b - rows.X @ solve_rows(rows).theta) <= OF_ACCOUNT * rms(rows.b):
+        rows = robust(rows)
+    each = np.split(rows.sd, np.cumsum([len(part.b) for part in data])[:-1])
     return [replace(part, sd=sd) for part, sd in zip(data, each, strict=True)]
 
 
@@ -192,7 +198,9 @@ def _rubs(whole: ForceFit, force: Array) -> bool:
     found, sd = dict(zip((FIVE[i] for i in whole.used), whole.theta, strict=True)), whole.sd
     errs = OF_EQUATION * rms(force)
     return all(
-        found[level] >= -float(np.hypot(NORMAL_95 * sd[level], errs)) for level in ("F_cp", "F_cn")
+        found[level] >= -float(np.hypot(NORMAL_95 * sd[level], errs))
+        for level in ("F_cp", "F_cn")
+        if level in found
     )
 
 

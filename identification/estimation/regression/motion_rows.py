@@ -56,6 +56,15 @@ class MotionRows:
     windows: WeakWindows
     v: Array
 
+    @property
+    def up(self) -> BoolArray:
+        """Rows (r,) in which the body moves up for most of the window."""
+        return np.asarray(self.rows.X[:, 1] > HALF)
+
+    def at(self, kept: BoolArray) -> "MotionRows":
+        """The rows of a mask (r,), with their windows."""
+        return replace(self, rows=self.rows.at(kept), windows=self.windows.at(np.flatnonzero(kept)))
+
     def outside(self, p: Karnopp) -> BoolArray:
         """Rows (r,) in which the body is faster than the band of a plant, which says something else
         of friction within it."""
@@ -115,10 +124,7 @@ def without_reversals(made: Sequence[MotionRows]) -> list[MotionRows]:
     square = ((every.b - every.X @ theta) / every.sd) ** 2
     if np.mean(square[~kept]) <= ADEQUATE * np.mean(square[kept]):
         return list(made)
-    return [
-        replace(one, rows=one.rows.at(keep), windows=one.windows.at(np.flatnonzero(keep)))
-        for one, keep in zip(made, one_way, strict=True)
-    ]
+    return [one.at(keep) for one, keep in zip(made, one_way, strict=True)]
 
 
 def rows_of_width(one: MotionLog, half: int, theta: Array, *, gravity: bool = False) -> MotionRows:

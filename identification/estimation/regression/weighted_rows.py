@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.signals.steps import MEDIAN_OF_NOISE
@@ -15,6 +16,7 @@ BLOCKS = 8  # stretches of a log that are left out in turn
 BIWEIGHT = 4.685
 # What such a row counts all the same, since none is without; when the weights have converged.
 LEAST_WEIGHT, NEAR_ENOUGH, MOST_ROUNDS = 1e-3, 1e-2, 50
+CLOSE_VARIANCE = 1e-3  # to which a variance is found, of itself
 NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 
 
@@ -91,6 +93,28 @@ def robust(rows: Rows) -> Rows:
         if float(np.max(np.abs(weight - was))) < NEAR_ENOUGH:
             break
     return replace(rows, sd=rows.sd / weight)
+
+
+def with_model_error(rows: Rows) -> Rows:
+    """The rows, each with the error of the equation itself beside its noise: one variance for all,
+    with which what is left is as large as it should be; none where the noise is all.
+
+    Where a model lacks something its rows are wrong by as much whatever the sensors' noise, and
+    weights by that alone would let the few of least noise decide. Source: Paule, Mandel, J. Res.
+    Natl. Bur. Stand. 87 (1982) 377.
+    """
+    free = len(rows.b) - rows.X.shape[1]
+
+    def more(variance: float) -> float:
+        """What is left beyond what these rows should leave, as a share of it."""
+        wider = replace(rows, sd=np.sqrt(rows.sd**2 + variance))
+        return float(solve_rows(wider).cost / free - 1.0)
+
+    if free <= 0 or more(0.0) <= 0.0:
+        return rows
+    most = float(np.sum(rows.b**2)) / free
+    variance = float(brentq(more, 0.0, most, rtol=CLOSE_VARIANCE)) if more(most) < 0.0 else most
+    return replace(rows, sd=np.sqrt(rows.sd**2 + variance))
 
 
 def least_squares(A: Array, b: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.estimation.prescribed_motion import fit_one_way, fit_prescribed, way_of
+from identification.estimation.prescribed_motion import fit_prescribed, way_of
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 
@@ -13,11 +13,26 @@ def test_a_direction_in_which_nothing_moved_is_not_said_to_need_no_friction() ->
     v = 20.0 * (1.0 - np.exp(-t / 0.1)) + 4.0 * np.sin(9.0 * t) * (t > 0.3)
     y = np.cumsum(v) * 2e-3 + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
     F = 0.14 * np.gradient(v, 2e-3) + 30.0 + 1.1 * v
-    fit = fit_one_way(
+    fit = fit_prescribed(
         recorded_logs([Log("wheel", {"t": t, "y": y, "F": F})], Rig("force"), "force"), "why"
     )
     for name in ("F_cn", "F_vn"):
         assert "0 samples of sliding in the negative direction" in str(fit.estimates[name].reason)
+
+
+def test_a_wheel_of_one_speed_has_the_force_that_it_was_logged_with() -> None:
+    """Level and slope are one there: fitted together they were -0.1 and 0.055, of which a level
+    below 0 was then left out, and twice the force predicted."""
+    rng = np.random.default_rng(4)
+    t = np.arange(6000, dtype=np.float64) * 1e-3
+    v = 5.0 + 0.2 * np.sin(40.0 * t)
+    y = np.cumsum(v) * 1e-3 + 1e-5 * rng.standard_normal(len(t))
+    F = 0.15 + 2e-4 * np.gradient(v, 1e-3) - 0.02 * (v - 5.0) + 0.03 * rng.standard_normal(len(t))
+    fit = fit_prescribed(
+        recorded_logs([Log("wheel", {"t": t, "y": y, "F": F})], Rig("force"), "force"), "why"
+    )
+    predicted = fit.friction.F_cp + 5.0 * fit.friction.F_vp
+    assert abs(predicted - 0.15) < 0.01
 
 
 def test_a_mass_that_the_equation_does_without_is_slight_in_any_motion() -> None:

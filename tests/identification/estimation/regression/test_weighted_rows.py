@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array, BoolArray
-from identification.estimation.regression.weighted_rows import Rows, robust, solve_rows
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    robust,
+    solve_rows,
+    with_model_error,
+)
 
 TRUTH = np.array([2.0, -1.0, 0.5])
 
@@ -54,3 +59,23 @@ def test_rows_without_errors_have_no_outliers_but_beyond_what_the_equation_errs(
     assert np.all(rows.sd / robust(rows).sd > 0.9)
     rows, _ = rows_of(0.0, 1.0)
     assert of(robust(rows)) == pytest.approx(TRUTH, abs=1e-4)
+
+
+def test_rows_that_err_by_their_noise_alone_have_no_model_error() -> None:
+    rows, _ = rows_of(0.1)
+    wider = with_model_error(rows)
+    assert wider.sd == pytest.approx(rows.sd, rel=0.1)
+    assert with_model_error(replace(rows, sd=2.0 * rows.sd)).sd == pytest.approx(2.0 * rows.sd)
+
+
+def test_the_log_of_the_finest_sensor_does_not_decide_where_the_equation_errs() -> None:
+    """One log in ten has a hundredth of the noise, and all lack the same force of 0.5."""
+    rows, _ = rows_of(0.01, 0.0)
+    fine = np.arange(400) % 10 == 0
+    lacks = 0.5 * np.random.default_rng(3).standard_normal(400)
+    rows = replace(rows, b=rows.b + lacks, sd=np.where(fine, 1e-4, 1e-2))
+    wider = with_model_error(rows)
+    assert wider.sd == pytest.approx(np.full(400, 0.5), rel=0.1)
+    assert np.max(np.abs(of(rows) - TRUTH)) > 2.0 * np.max(np.abs(of(wider) - TRUTH))
+    left = (wider.b - wider.X @ of(wider)) / wider.sd
+    assert np.sum(left**2) == pytest.approx(397.0, rel=1e-2)
