@@ -26,6 +26,8 @@ RESTED, LEVELS_AT_REST = 0.05, 8
 MOST_STEPS = 1e8  # in the range of a position that is counted
 SAME_LEVEL = 100.0  # units in the last place of a usual value: rounding makes no other level
 WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
+# The same of one that is printed with few digits, and levels that tell it from any other
+WHOLE_STEP_ROUNDED, MANY_LEVELS = 0.1, 20
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
 FILTER_RESPONSE = 8.0
 
@@ -116,18 +118,33 @@ def resolution(x: Array) -> float:
 
 
 def _step_of(levels: Array) -> float:
-    """Step whose whole multiples the levels (k,) are apart, 0 where there is none."""
+    """Step whose whole multiples the levels (k,) are apart, 0 where there is none.
+
+    Printed or stored with fewer digits they are off by a part of it: the smallest distance gives
+    the step roughly, larger ones ever better. Levels of no step would be off by anything: that
+    very many of them are within a tenth is no chance.
+    """
     if len(levels) < 2:
         return 0.0
-    span = float(levels[-1] - levels[0])
     same = SAME_LEVEL * np.spacing(np.median(np.abs(levels)))
-    levels = levels[np.diff(levels, prepend=-np.inf) > same]
-    count = span / float(np.min(np.diff(levels)))
-    if count > MOST_STEPS:
+    apart = np.diff(levels)
+    apart = np.sort(apart[apart > same])
+    span, step = float(levels[-1] - levels[0]), float(apart[0]) if len(apart) else 0.0
+    if step == 0.0 or span / step > MOST_STEPS:
         return 0.0
-    step = span / round(count)
+    reach = 1.5 * step
+    while True:
+        near = apart[: np.searchsorted(apart, reach, side="right")]
+        step = float(np.sum(near) / np.sum(np.round(near / step)))
+        if len(near) == len(apart):
+            break
+        reach *= 2.0
+    step = span / round(span / step)
     off = (levels - levels[0]) / step
-    return step if float(np.max(np.abs(off - np.round(off)))) < WHOLE_STEP else 0.0
+    off -= np.round(off)
+    most = float(np.max(np.abs(off - np.median(off))))
+    rounded = len(apart) >= MANY_LEVELS and most < WHOLE_STEP_ROUNDED
+    return step if most < WHOLE_STEP or rounded else 0.0
 
 
 def differentiate(

@@ -157,3 +157,23 @@ def test_counts_that_come_seldom_are_noise_below_the_cut_off_too(counts: int, ra
     assert np.sqrt(np.mean(off**2)) < 0.03 * w
     assert np.sqrt(np.mean(off**2)) < 2.0 * motion.v_noise < 0.1 * w
     assert motion.noise == pytest.approx(step / 12**0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4, 7])
+@pytest.mark.parametrize("of", ["decimals", "float32"])
+def test_a_counted_position_has_its_step_however_it_was_printed(digits: int, of: str) -> None:
+    """Two degrees in which the smallest distance was a rounded one: over the range of the log it
+    was off by more than a step, and the position passed for one without."""
+    step, t = 360.0 / 2800.0, 0.02 * np.arange(400)
+    counted = step * np.round(90.0 * np.sin(1.3 * t) * (1.0 + 0.3 * np.sin(0.7 * t)) / step)
+    shown = np.round(counted, digits) if of == "decimals" else np.float64(np.float32(counted))
+    assert resolution(shown) == pytest.approx(step, rel=1e-4)
+    assert resolution(np.radians(shown)) == pytest.approx(np.radians(step), rel=1e-4)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(30, 2000))
+@settings(max_examples=50, deadline=None)
+def test_a_position_with_noise_has_no_step(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    y = np.sin(0.01 * rng.uniform(0.2, 5.0) * np.arange(n)) + 1e-3 * rng.standard_normal(n)
+    assert resolution(y) == 0.0
