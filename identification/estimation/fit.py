@@ -204,7 +204,7 @@ def finished(
             start = plain_structure(forced, other)
             again = finished(start, forced, forced_rng, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
-    return as_sliding_shows(answered(found, recorded, report, quick=quick), recorded)
+    return answered(found, recorded, report, quick=quick)
 
 
 def _with_effects(prior: Plant, recorded: RecordedLogs, report: Progress) -> KarnoppFit:

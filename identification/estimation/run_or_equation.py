@@ -37,6 +37,7 @@ from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, M
 from identification.estimation.regression.motion_rows import rows_and_windows
 from identification.estimation.regression.row_fit import first_stage, rms
 from identification.estimation.regression.weighted_rows import left_unseen, stacked
+from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import values_of
 from identification.model.estimates import KarnoppFit
@@ -110,11 +111,11 @@ def answered(
         why = LOST_WHY if found.prescribed else "no free run follows these logs"
         if recorded.steps:
             raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
-        return fit_prescribed(recorded, why)
+        return as_sliding_shows(fit_prescribed(recorded, why), recorded)
     if quick and not is_adequate(found.misfit):
         fit = by_equation_if_surer(found.plant.friction, recorded)
         if fit is not None:
-            return fit
+            return as_sliding_shows(fit, recorded)
     try:
         fit = converged_fit(found.plant, recorded, found.misfit, report, quick=quick)
     except Halted:
@@ -124,12 +125,14 @@ def answered(
 
 
 def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
-    """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
-    equation than least squares do on held-out stretches: its run is not followed, or only down to a
-    noise that the equation averages out; else by `likeliest`. Source: cross-validation, Stone, J.
-    R. Stat. Soc. B 36 (1974) 111; the comparison is ours."""
+    """The fit by `likeliest`, or that of the equation of motion alone, where the fit leaves clearly
+    more of that equation than least squares do on held-out stretches: its run is not followed, or
+    only down to a noise that the equation averages out; or where it identifies less; either as
+    sliding shows it. Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the
+    comparison is ours."""
+    fit = as_sliding_shows(likeliest(fit, recorded), recorded)
     if fit.effects:
-        return likeliest(fit, recorded)
+        return fit
     left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
@@ -137,6 +140,7 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     # Windows may identify next to nothing: where they do not follow, or a measured force drifts.
     if surer or _identified(fit) < len(FIVE):
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
+        other = None if other is None else as_sliding_shows(other, recorded)
         if left is None and other is not None and is_no_run(other.chi_square):
             # Of few rows, or beside a band that takes the sliding, it leaves far more than noise.
             if not (fit.adequate or _identified(fit)):
@@ -146,7 +150,6 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             other = replace(other, adequate=fit.adequate)
             return other if left is None else _unless_unexplained(other, left)
-    fit = likeliest(fit, recorded)
     return fit if left is None else _unless_unexplained(fit, left)
 
 

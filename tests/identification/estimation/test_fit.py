@@ -257,8 +257,31 @@ def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
     recorded: Any = SimpleNamespace(plain=[log], logs=())
     monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(left, 1.0, 100.0))
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: other)
+    monkeypatch.setattr(run_or_equation, "likeliest", lambda fit, _: fit)
+    monkeypatch.setattr(run_or_equation, "as_sliding_shows", lambda fit, _: fit)
     found: Any = run_or_equation.on_the_floor(run, recorded)
     assert (found.name, found.adequate) == (by, adequate)
+
+
+def test_a_run_of_which_sliding_shows_less_than_it_states_leaves_the_equation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By one seed the run was taken for four parameters, and gave one in the end; by another the
+    equation gave four."""
+    log, known = made_log(table(1), seconds=0.5), Estimate(1.0, "N", 0.05, 0.9, 1.1)
+    near = LogFit("made", (0.0, 0.0, 0.0), 1e-9, None, 1.0)
+    run: Any = Told(table(1), True, "run", (near,), dict.fromkeys(FIVE, known))
+    none = dict.fromkeys(FIVE, Estimate(None, "N", reason="wider"))
+    recorded: Any = SimpleNamespace(plain=[log], logs=())
+    monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(1.0, 1.0, 100.0))
+    monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: replace(run, name="equation"))
+    monkeypatch.setattr(run_or_equation, "likeliest", lambda fit, _: fit)
+    monkeypatch.setattr(
+        run_or_equation, "as_sliding_shows",
+        lambda fit, _: replace(fit, estimates=none) if fit.name == "run" else fit,
+    )  # fmt: skip
+    found: Any = run_or_equation.on_the_floor(run, recorded)
+    assert found.name == "equation"
 
 
 def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch) -> KarnoppFit:
@@ -272,6 +295,7 @@ def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch)
         estimates={n: equation.estimates[n] if n in FIVE[:identified] else none for n in NAMES},
     )  # fmt: skip
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: equation)
+    monkeypatch.setattr(run_or_equation, "likeliest", lambda fit, _: fit)
     return run_or_equation.on_the_floor(run, recorded)
 
 
