@@ -36,9 +36,18 @@ class RunContender:
     misfit: float
 
 
-def contender(trial: Trial, setting: Setting) -> RunContender | None:
-    """The effect from the best of its starts, refined a little on the short logs; None where no
-    plant can have it there."""
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """A structure to contend, from the best of its starts and larger ones; begun: refined from the
+    best in a few steps."""
+
+    plants: tuple[Plant, ...]
+    begun: RunContender
+
+
+def entrant(trial: Trial, setting: Setting) -> Entrant | None:
+    """The effect from the best of its starts on the short logs; None where no plant can have it
+    there."""
     plants = []
     if trial.effect.place.elastic and is_unanchored(trial.base, setting.drive):
         trial = replace(trial, base=_that_sticks(trial.base))
@@ -55,18 +64,26 @@ def contender(trial: Trial, setting: Setting) -> RunContender | None:
         errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        at = int(np.argmin(costs))
-        found = _near(plants[at], trial.effect, setting)
-        if trial.effect.place.shows and len(trial.effect.params) == 1:
-            # The plain parameters are bent to do without it: a larger size may be the better start.
-            for other in plants[at + 1 : at + LARGER]:
-                if found.misfit <= COMPLETE:
-                    break
-                again = _near(other, trial.effect, setting)
-                found = min(found, again, key=lambda one: one.misfit)
+        at, best = int(np.argmin(costs)), plants[int(np.argmin(costs))]
+        done = refit(best, setting.short, setting.drive, prior=even(best), effort="quick")
     except UserError:  # two effects of a kind that a plant takes one of
         return None
-    return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
+    larger = trial.effect.place.shows and len(trial.effect.params) == 1
+    begun = RunContender(trial.steps, trial.effect, done.plant, done.misfit)
+    return Entrant(tuple(plants[at : at + (LARGER if larger else 1)]), begun)
+
+
+def contender(one: Entrant, setting: Setting) -> RunContender:
+    """The structure searched and refined a little on the short logs, from its starts until it
+    follows: the plain parameters are bent to do without it, so that a larger size may be better."""
+    effect = one.begun.effect
+    found = _near(one.plants[0], effect, setting)
+    for other in one.plants[1:]:
+        if found.misfit <= COMPLETE:
+            break
+        again = _near(other, effect, setting)
+        found = min(found, again, key=lambda each: each.misfit)
+    return replace(one.begun, plant=found.plant, misfit=found.misfit)
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:

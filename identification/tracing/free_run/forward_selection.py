@@ -31,12 +31,19 @@ from identification.tracing.free_run.backward_elimination import (
     only,
     with_steps,
 )
-from identification.tracing.free_run.contenders import RunContender, contender, on_whole_logs
+from identification.tracing.free_run.contenders import (
+    Entrant,
+    RunContender,
+    contender,
+    entrant,
+    on_whole_logs,
+)
 from identification.tracing.free_run.trial_structures import structures
 from identification.tracing.regression.candidates import EffectCandidate, trial
 from identification.tracing.regression.stepwise import Choice, Step, with_candidate
 
 SHORT_SECONDS = 15.0  # s of each log on which contenders are tried first
+SEARCHED = 3  # of the contenders, those that follow best after a few steps
 RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
 Report = Callable[[str, float], None]
 
@@ -65,14 +72,18 @@ def contest(
     choice: Choice, model: FittedStructure, setting: Setting, report: Report
 ) -> tuple[Choice, FittedStructure] | None:
     """The best structure of one effect more, or of another in an effect's place, if decisive."""
-    found = list[RunContender]()
-    tried = list(structures(choice, model, setting))
+    tried, entered = list(structures(choice, model, setting)), list[Entrant]()
     for i, attempt in enumerate(tried):
-        one = contender(attempt, setting)
-        found += [] if one is None else [one]
-        report("judging", (i + 1) / len(tried))
-    if not found:
+        one = entrant(attempt, setting)
+        entered += [] if one is None else [one]
+        report("judging", 0.5 * (i + 1) / len(tried))
+    if not entered:
         return None
+    entered.sort(key=lambda one: one.begun.misfit)
+    found = [one.begun for one in entered[SEARCHED:]]
+    for i, leading in enumerate(entered[:SEARCHED]):
+        found.append(contender(leading, setting))
+        report("judging", 0.5 + 0.5 * (i + 1) / SEARCHED)
     winner = min(found, key=lambda one: one.misfit)
     rivals = [one for one in found if one.effect.key != winner.effect.key]
     done = _from_equations(winner, on_whole_logs(winner, setting), setting)
