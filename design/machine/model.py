@@ -312,7 +312,7 @@ class Model:
 
     @property
     def by_equation(self) -> bool:
-        """Whether the equation of motion was fitted alone, since no free run follows the logs."""
+        """Whether the parameters are those of the equation of motion, not of a free run."""
         return all(entry.position_rms is None for entry in self.log)
 
     @property
