@@ -500,7 +500,7 @@ def test_a_model_without_a_plant_is_a_refusal(
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "refused"
     assert found["reason"].startswith("no ARX plant")
-    assert found["next"].startswith("workbench doctor short.csv --card ")
+    assert found["next"].startswith("workbench doctor LOG --card CARD")
 
 
 @pytest.fixture(scope="module")

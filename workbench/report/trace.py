@@ -178,7 +178,7 @@ def _(traced: Traced) -> View:
         lambda: _sections(traced),
         lambda: _main_chart(traced),
         advice(traced),
-        after_trace(found.verdict, found.effects, newer, "CARD", Path()),
+        after_trace(found.verdict, found.effects, traced.model, newer, "CARD", Path()),
     )
 
 
