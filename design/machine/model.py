@@ -311,6 +311,11 @@ class Model:
         return self.rig.kind == "motor" or measured
 
     @property
+    def identifies_friction(self) -> bool:
+        """Whether any of the nine is identified."""
+        return any(value.known for value in self.friction.values())
+
+    @property
     def by_equation(self) -> bool:
         """Whether the parameters are those of the equation of motion, not of a free run."""
         return all(entry.position_rms is None for entry in self.log)

@@ -41,7 +41,7 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
 
     if model.fit.adequate:
         return _design_or_run(model, logs, card, folder)
-    if not any(value.known for value in model.friction.values()):
+    if not model.identifies_friction:
         return check_of_refused(logs, card)("")
     why = "whether an" if to_the_noise_by_equation(model) else "an"
     return step(f"{why} effect is missing", "trace", *logs, "--card", card)

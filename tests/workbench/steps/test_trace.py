@@ -37,6 +37,7 @@ from identification.tracing.result import (
     TraceVerdict,
 )
 from identification.tracing.shown_against import pictures
+from identification.tracing.trace import MOVE_IT
 from tests.reported import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
@@ -158,6 +159,14 @@ def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(tracing, "trace", lambda *_, **__: found)
     with pytest.raises(BadLog, match=r"b\.csv: no row of it could be judged"):
         trace_logs(sources().logs, sources("b.csv", "b").logs, built_in())
+
+
+@pytest.mark.parametrize("on", [(), ("t",)])
+def test_where_nothing_could_be_tested_no_dependence_is_denied_or_told(on: tuple[str, ...]) -> None:
+    found = replace(trace_of("unknown", ()), next_experiment=MOVE_IT, unknown=Dependence(on, 0.3))
+    said = trace_sentence(traced(found))
+    assert "the held-out logs slide too little to test on what it depends." in said
+    assert "depends on" not in said and "no effect" not in said
 
 
 def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
