@@ -338,8 +338,9 @@ class Model:
 
     @property
     def prescribed_motion(self) -> bool:
-        """Whether the motion was prescribed by a rig: no drive of its own shows in the logs."""
-        driven = self.rig.kind == "motor" or self.actuator is not None
+        """Whether the motion was prescribed by a rig: no drive of its own shows in the logs, and no
+        run by the measured force follows them, as that of an adequate model does."""
+        driven = self.rig.kind == "motor" or self.actuator is not None or self.fit.adequate
         return self.by_equation and not driven
 
     @property
