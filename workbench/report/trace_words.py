@@ -81,7 +81,7 @@ def _verdict_sentence(traced: Traced) -> str:
         noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
         fall = f"{error.write(error.before)} -> {error.write(error.after)}"
         errors = f" {error.name} {fall}{noise}."
-    changed = ", ".join(map(_changed, found.drift))
+    changed = ", ".join(_changed(one, found) for one in found.drift)
     if found.next_experiment == MOVE_IT:  # no effect was sought, and nothing that is left tested
         return f"Unknown: {unexplained(traced)}"
     match found.verdict:
@@ -261,9 +261,18 @@ def percent(before: float, after: float) -> str:
     return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
 
 
-def _changed(change: Change) -> str:
-    """One change in words."""
+def by_regression(change: Change, found: Trace) -> bool:
+    """Whether a change is that of the regression on the equations of training and test logs, alike
+    on both, whose training value is not the reported one of the fit."""
+    reported = found.parameters_after.get(change.name)
+    return reported is None or not math.isclose(used(reported), change.before)
+
+
+def _changed(change: Change, found: Trace) -> str:
+    """One change in words; of a regression, whose values are not those reported, its share."""
     by = percent(change.before, change.after)
+    if by and by_regression(change, found):
+        return f"{change.name} by {by}"
     unit, factor = shown_unit(change.unit)
     before, after = (number(factor * value, 4) for value in (change.before, change.after))
     return f"{change.name} from {before} to {after} {unit}{f' ({by})' if by else ''}"

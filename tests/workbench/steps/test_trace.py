@@ -342,6 +342,18 @@ def test_rows_of_the_tables() -> None:
     assert differences_table(found).whole == (("F_cp", "12", "14.4 ± 0.2", "N", "+20 %"),)
 
 
+def test_changes_by_another_fit_than_the_reported_one_say_so() -> None:
+    """Of a regression on both logs, whose training value is not that of the table of parameters."""
+    reported = trace_of("drift", ())
+    assert differences_table(reported).head[0] == "parameter"
+    found = replace(reported, drift=(Change("F_cp", "N", 11.0, 14.3, 0.1),))
+    table = differences_table(found)
+    assert table.head[0] == "parameter, by regression"
+    assert table.whole == (("F_cp", "11", "14.3 ± 0.2", "N", "+30 %"),)
+    said = trace_sentence(traced(found))
+    assert "the machine changed in F_cp by +30 %;" in said and "11" not in said
+
+
 def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
     found = trace_of()
     effect = found.effects[0]
