@@ -112,6 +112,20 @@ def test_axes_go_by_the_names_of_their_headers(
         propose(tmp_path, headers, *table, axis="arm")
 
 
+@pytest.mark.parametrize("measured", ["Ms", "Len"])
+def test_axes_go_by_the_first_word_of_what_is_commanded_and_what_moves(
+    measured: str, joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    """No header speaks of a position, and the other axis has a command that is always the same."""
+    table = (T, joint["F"], 0.0 * T + 7.5, 0.0 * T, joint["y"], other["y"])
+    headers = f"Time,Boom Cmd,Stick Cmd,Swing Cmd,Boom {measured},Stick {measured}"
+    headers += "" if measured == "Ms" else ",Stick Load"
+    values = table if measured == "Ms" else (*table, other["F"])
+    found = propose(tmp_path, headers, *values, axis="Boom")
+    assert found.axes == ("boom", "stick") and found.axis == "boom"
+    assert columns(found) == {"t": "Time", "y": f"Boom {measured}", "u": "Boom Cmd"}
+
+
 @pytest.mark.parametrize("driven", [False, True])
 def test_a_current_of_the_motor_that_the_body_turns_is_no_drive(
     joint: dict[str, Array], tmp_path: Path, driven: bool
