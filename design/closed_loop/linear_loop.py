@@ -64,6 +64,15 @@ def linear_of(
     return linear, force
 
 
+def carries_design(model: Model) -> bool:
+    """Whether there is a linear plant for a design."""
+    try:
+        linear_of(model)
+    except (NotIdentifiable, BadSpecification):
+        return False
+    return True
+
+
 def periods(model: Model) -> tuple[float, ...]:
     """Sampling periods [s] of a position loop to try, the drive's own first, then multiples of it.
 

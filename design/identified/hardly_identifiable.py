@@ -31,6 +31,7 @@ BRAKED = (
     "F_vp and F_vn hold, beside friction, the braking by the voltage that the motor makes itself,"
     " k_t k_e / R = k_e force_per_command; log its current to identify friction alone"
 )
+DRIVE_IT = "log quick strokes that a command drives"
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -134,11 +135,12 @@ def _said_of_followed(name: str, share: float, unit: str) -> str:
     if unit == "A":  # which is a force: no valve's
         return (
             f"{said}: inertia is hardly identifiable, and a motor that the body turns makes such a"
-            " current by itself; log quick strokes that a command drives"
+            f" current by itself; {DRIVE_IT}"
         )
-    valve = f"{said}, as of a valve and cylinder: inertia is hardly identifiable; use kind ="
-    by_voltage = f"; of a motor by its voltage, {BRAKED}" if unit == "V" else ""
-    return f'{valve} "velocity"{by_voltage}'
+    hardly = f"{said}, as of a valve and cylinder: inertia is hardly identifiable;"
+    if unit == "V":
+        return f'{hardly} use kind = "velocity"; of a motor by its voltage, {BRAKED}'
+    return f'{hardly} of a valve, use kind = "velocity"; of a motor by its current, {DRIVE_IT}'
 
 
 def _said_of_one_way(up: float) -> str:

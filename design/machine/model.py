@@ -311,8 +311,13 @@ class Model:
         return self.rig.kind == "motor" or measured
 
     @property
+    def identifies_friction(self) -> bool:
+        """Whether any of the nine is identified."""
+        return any(value.known for value in self.friction.values())
+
+    @property
     def by_equation(self) -> bool:
-        """Whether the equation of motion was fitted alone, since no free run follows the logs."""
+        """Whether the parameters are those of the equation of motion, not of a free run."""
         return all(entry.position_rms is None for entry in self.log)
 
     @property
@@ -333,8 +338,9 @@ class Model:
 
     @property
     def prescribed_motion(self) -> bool:
-        """Whether the motion was prescribed by a rig: no drive of its own shows in the logs."""
-        driven = self.rig.kind == "motor" or self.actuator is not None
+        """Whether the motion was prescribed by a rig: no drive of its own shows in the logs, and no
+        run by the measured force follows them, as that of an adequate model does."""
+        driven = self.rig.kind == "motor" or self.actuator is not None or self.fit.adequate
         return self.by_equation and not driven
 
     @property

@@ -107,7 +107,7 @@ def respond(
     logs = [with_applied_force(one.log, rig) for one in runs]
     taken = model if left_in is None else None
     found, modes = _measured(logs, rig.kind == "motor", taken, lowest)
-    if not np.any(found.body.seen):
+    if not ranges(found.f, found.body.seen):
         raise NotIdentifiable(_nothing(runs, found))
     curves = None if model is None else curves_of(model, found.f)
     loop = _open_loop(found, curves)
@@ -199,8 +199,8 @@ def _nothing(runs: Sequence[Source], found: MachineResponses) -> str:
     follows = "the reference" if found.instrument else "the force"
     return (
         f"{names}: no frequency at which the motion follows {follows} (coherence at most"
-        f" {best:.2f}, at least 0.5 needed); log a livelier run, or lay a small multisine on the"
-        " reference"
+        f" {best:.2f}, at least 0.5 needed at {FEWEST_IN_RANGE} in a row); log a livelier run, or"
+        " lay a small multisine on the reference"
     )
 
 

@@ -25,6 +25,13 @@ def axes_of(
     if not any(map(is_position, heads)):  # of speeds, of which a position is made
         heads = [as_position(head) if head.speed else head for head in heads]
     words = [words_of(head.name) for head in heads]
+    if not any(map(is_position, heads)):  # nor of speeds: what begins as a command does
+        driven = {tuple(own[:-1]) for head, own in zip(heads, words, strict=True) if _drives(head)}
+        heads = [
+            replace(head, purpose="measured") if not head.means and tuple(own[:-1]) in driven - {()}
+            else head
+            for head, own in zip(heads, words, strict=True)
+        ]  # fmt: skip
     families: dict[tuple[str, ...], dict[str, int]] = {}
     for count in range(
         1, WORDS_OF_A_NAME + 1
@@ -54,6 +61,11 @@ def axes_of(
         named = [one for one in named if not any(one in other for other in named if other != one)]
         out[number] = named[0].replace(" ", "_") if len(named) == 1 else ""
     return out
+
+
+def _drives(head: Header) -> bool:
+    """Whether a header speaks of what drives a body."""
+    return bool({"command", "force"} & set(head.means))
 
 
 def _may_be_a_name(word: str, notation: Notation) -> bool:

@@ -41,7 +41,19 @@ def read_together(named: Sequence[tuple[str, str]], notation: Notation) -> list[
     ]
     if sum(one.unit is not None and not one.doubtful for one in heads) >= FEWEST_WITH_UNITS:
         heads = [replace(one, doubtful=False) for one in heads]  # as others end in units too
-    return _with_present(_without_letters(_without_machine(heads, notation)))
+    return _with_present(_without_letters(_without_machine(_beside_commands(heads), notation)))
+
+
+def _beside_commands(heads: Sequence[Header]) -> list[Header]:
+    """The headers, the "Ms" of "Boom Ms" beside "Boom Cmd" meaning what is measured, no unit of
+    time."""
+    commanded = {tuple(words_of(one.name)[:-1]) for one in heads if "command" in one.means}
+    return [
+        replace(one, name=one.text, unit=None, purpose="measured", doubtful=False)
+        if one.unit is not None and one.unit.card == "ms" and not one.means
+        and tuple(words_of(one.name)) in commanded - {()} else one
+        for one in heads
+    ]  # fmt: skip
 
 
 def _of_one_drive(head: Header, notation: Notation) -> Header:

@@ -20,6 +20,8 @@ MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one b
 SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
 ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
+# Gains of a controller from reference and position, apart, and shares of its output that are left.
+SAME_GAIN, NOT_OF_CONTROL, MORE_OF_BOTH = 0.1, 0.05, 0.2
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
@@ -166,6 +168,13 @@ def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
     return None
 
 
+def _left_by(X: Array, of: Array) -> tuple[Array, Array]:
+    """Least squares of columns (n, k) by X (n, m): coefficients (m, k), and the share left (k,)."""
+    found = np.asarray(np.linalg.lstsq(X, of, rcond=None)[0], dtype=np.float64)
+    left = np.var(of - X @ found, axis=0) / np.maximum(np.var(of, axis=0), 1e-300)
+    return found, left
+
+
 class Seen:
     """The other columns as a position sees them; `at` is its place among them.
 
@@ -212,6 +221,21 @@ class Seen:
         rate = np.gradient(self.smooth, axis=0)
         spread = np.sqrt(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0))
         return np.asarray(beside(rate, self.motion.v) / np.maximum(spread, 1e-300))
+
+    def is_followed_by_control(self, k: int) -> bool:
+        """Whether another column is what a controller makes of the difference between this one and
+        the position and of its derivative: then this one is the reference, whatever its name.
+
+        Neither this one nor the position alone makes as much of it, as of what one of them drives.
+        """
+        s = self.smooth - self.smooth.mean(axis=0)
+        own = [np.column_stack([s[:, i], np.gradient(s[:, i])]) for i in (k, self.at)]
+        law, left = _left_by(np.hstack(own), s)
+        alone = np.minimum(*(_left_by(one, s)[1] for one in own))
+        turned = np.abs(law[0] + law[2]) < SAME_GAIN * np.abs(law[0])
+        made = turned & (left < NOT_OF_CONTROL) & (left < MORE_OF_BOTH * alone)
+        made[[k, self.at]] = False
+        return bool(np.any(made))
 
     def moves(self, F: Array) -> Array:
         """How much more the change of F (n,), smoothed, follows each column than its follows F."""

@@ -114,7 +114,7 @@ def _are_several(one: Column, other: Column) -> bool:
 
 def _is_set_point(seen: Seen, k: int) -> bool:
     """Whether a command is where the position goes: in counts, as those of a stepper, or in the
-    size of the position, which follows it."""
+    size of the position, which follows it; or by the command that a controller makes of both."""
     one = seen.pairs.signals[k]
     unit = one.header.unit
     if unit is not None:
@@ -122,7 +122,10 @@ def _is_set_point(seen: Seen, k: int) -> bool:
         return counts and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION
     size = float(np.std(seen.y.x))
     same = abs(float(np.std(one.x)) - size) < weights.SAME_UNIT * size
-    return same and seen.lead(k).likeness > SAME_POSITION
+    like = seen.lead(k).likeness
+    if same and like > SAME_POSITION:
+        return True
+    return like > weights.CALLED_ALIKE and seen.is_followed_by_control(k)
 
 
 def _chambers(seen: Seen, own: float) -> Iterator[Way]:

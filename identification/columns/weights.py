@@ -240,7 +240,8 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     called = one.header.purpose == "reference"
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
-    if found.likeness < CALLED_ALIKE or (like < SURELY_TURNED and not called):
+    sure = called or like >= SURELY_TURNED
+    if found.likeness < CALLED_ALIKE or not (sure or seen.is_followed_by_control(k)):
         return -3.0
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
     if not called and (found.samples <= 0.3 or _of_place_alone(one.x, y.x)):

@@ -57,8 +57,8 @@ FLOOR_WHY = (
     " are not identifiable"
 )
 PREDICTS_WHY = (
-    "neither the run nor the equation of motion follows these logs to the noise; the latter"
-    " predicts their force"
+    "neither the run nor the equation of motion follows these logs to the noise; add more sliding,"
+    " at several speeds"
 )
 LIKELIEST = "sliding friction of largest likelihood"
 LIKELIEST_WHY = MinorRemark(

@@ -15,6 +15,7 @@ from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
+from identification.signals.differentiate import resolution
 from identification.signals.even_clock import (
     LONGEST_GAP,
     even_clock,
@@ -38,6 +39,8 @@ _LARGE = 0.05  # of a signal's range, from which a spike is no small one
 _MOST_CUT = 0.1  # share of a log that may be left out
 _SHORTEST_CUT = 6  # samples that are cut out at least, so that the gap is one
 _SMALL = ("y", "p_p", "p_n")  # what no machine changes for a sample or two
+# A smooth crest has no more samples at its last count than at the three before, a limit has most.
+_BESIDE_LIMIT, _AT_LIMIT = 3.5, 2.0
 _LEVELS = 10  # values that a command takes at least where its limits are looked for
 _ROUNDS = 4  # in which small spikes are looked for beside those found
 _MOVED = 20.0  # times its noise, that the position of a piece spans where it is not left out
@@ -281,10 +284,12 @@ def limits(log: Log, name: str, done: Done = "kept") -> list[BadSamples]:
     low, high = float(x.min()), float(x.max())
     if low == high or len(np.unique(x)) < _LEVELS:
         return []
-    out = []
+    out, beside = [], _BESIDE_LIMIT * resolution(x[np.isfinite(x)])
     for limit in (low, high):
         again = new == limit
-        if np.count_nonzero(again[1:] & again[:-1]) >= LONGEST_REPAIR:
+        near = int(np.count_nonzero(np.abs(new - limit) <= beside))  # the limit itself among them
+        piled = np.count_nonzero(again) > _AT_LIMIT * (near - np.count_nonzero(again))
+        if piled and np.count_nonzero(again[1:] & again[:-1]) >= LONGEST_REPAIR:
             at = x == limit
             t, count = log["t"][at], int(at.sum())
             first, last = float(t[0]), float(t[-1])

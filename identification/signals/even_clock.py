@@ -33,9 +33,10 @@ def even_clock(log: Log) -> tuple[Log, ...]:
     if not runs:  # rows in bursts, whose holes are none beside the mean period
         runs = _runs(log, _mean_period(log["t"]))
     if not runs:
+        gaps = len(gaps_in(log["t"], log.h))
         raise BadLog(
-            f"{log.name}: {len(gaps_in(log['t'], log.h))} gaps leave no run of {SHORTEST_LOG}"
-            f" samples at {log.h:.4g} s; log without gaps"
+            f"{log.name}: {gaps} gap{' leaves' if gaps == 1 else 's leave'} no run of"
+            f" {SHORTEST_LOG} samples at {log.h:.4g} s; log without gaps"
         )
     return runs
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from design.asked import Limits
@@ -483,6 +484,27 @@ def test_a_motor_is_not_fitted_by_force(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_model_of_which_nothing_is_identified_is_written_and_is_a_refusal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Strokes of one speed, which one force opposes either way: the model predicts them alone."""
+    t = 1e-2 * np.arange(4000, dtype=np.float64)
+    back, rng = (t % 4.0) >= 2.0, np.random.default_rng(0)
+    y = 1e-2 * np.cumsum(np.where(back, -1e-2, 1e-2)) + 2e-6 * rng.standard_normal(len(t))
+    F = np.where(back, -8.0, 8.0) + 0.2 * rng.standard_normal(len(t))
+    log, card = tmp_path / "strokes.csv", tmp_path / "card.toml"
+    rows = np.column_stack([t, y, F])
+    np.savetxt(log, rows, delimiter=",", header="t,y,F", comments="", fmt="%.9g")
+    units = {"t": "s", "y": "m", "F": "N"}
+    signals = "".join(f'{n} = {{ column = "{n}", unit = "{unit}" }}\n' for n, unit in units.items())
+    card.write_text(f'[card]\nname = "rig"\n[rig]\nkind = "force"\n[signals]\n{signals}')
+    out = tmp_path / "id"
+    assert main(["identify", str(log), "--card", str(card), "--out", str(out), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert all(one["value"] is None for one in found["friction"].values())
+    assert found["next"].startswith("workbench doctor ") and (out / "model.json").is_file()
+
+
 def test_a_model_without_a_plant_is_a_refusal(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -500,7 +522,7 @@ def test_a_model_without_a_plant_is_a_refusal(
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "refused"
     assert found["reason"].startswith("no ARX plant")
-    assert found["next"].startswith("workbench doctor short.csv --card ")
+    assert found["next"].startswith("workbench doctor LOG --card CARD")
 
 
 @pytest.fixture(scope="module")

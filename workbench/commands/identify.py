@@ -13,7 +13,7 @@ from workbench.steps.asked import FIT_OPTIONS, IDENTIFY_STAGES
 
 
 @options.command(
-    refusal="nothing is identifiable from the logs",
+    refusal="none of the nine parameters is identifiable from the logs",
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
 def command(
@@ -24,7 +24,7 @@ def command(
     posterior: bool = option("Sample the posterior of the parameters too."),
     seed: int = options.SEED_OPTION,
     out: Path | None = options.OUT_OPTION,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Find friction, plant and actuator of a machine from its logs.
 
     Writes model.json (every parameter with its 95 % interval, or why it is not identifiable)
@@ -37,7 +37,7 @@ def command(
     if card_of_velocity(card):
         options.refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
         _velocity(logs, card, budget, out)
-        return
+        return 0
     if wanted.drive == "force":
         _refuse_force_of_motor(card)
     with results("identify", out, check_of_refused(logs, card)) as folder:
@@ -45,6 +45,7 @@ def command(
         found.view.write(folder)
     then = after_identify(found.model, logs, card, folder.final)
     found.view.show(folder.final, then, remarks=found.found.remarks)
+    return 0 if found.model.identifies_friction else 1
 
 
 def _velocity(logs: tuple[str, ...], card: str, budget: float, out: Path | None) -> None:

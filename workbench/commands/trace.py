@@ -10,6 +10,8 @@ from workbench.signature import argument, option
 from workbench.steps.asked import TRACE_STAGES
 
 if TYPE_CHECKING:
+    from design.machine.model import Model
+    from design.machine.velocity import VelocityModel
     from workbench.report.view import View
 
 
@@ -42,22 +44,24 @@ def command(
     from workbench.report.next_steps import after_trace, check_of_refused
     from workbench.steps.trace import named_logs
 
+    model: Model | VelocityModel
     with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
         names, held_out = named_logs(logs, tests, card)
         if card_of_velocity(card):
             options.refuse_for_velocity("effects", "seed")
-            shown, verdict, named = _of_velocity(names, held_out, card, budget)
+            shown, model, verdict, named = _of_velocity(names, held_out, card, budget)
         else:
             found = trace(names, held_out or None, card, effects=effects, budget=budget, seed=seed)
-            shown, verdict, named = found.view, found.verdict, found.effects
+            shown, model = found.view, found.model
+            verdict, named = found.verdict, found.effects
         shown.write(folder)
     newer = held_out or names
-    shown.show(folder.final, after_trace(verdict, named, newer, card, folder.final))
+    shown.show(folder.final, after_trace(verdict, named, model, newer, card, folder.final))
 
 
 def _of_velocity(
     names: tuple[str, ...], held_out: tuple[str, ...], card: str, budget: float
-) -> tuple["View", str, tuple[str, ...]]:
+) -> tuple["View", "VelocityModel", str, tuple[str, ...]]:
     """The same of a rig whose velocity follows the command."""
     from design.identified.velocity import trace_velocity
     from workbench.logs.sources import read_sources
@@ -67,4 +71,4 @@ def _of_velocity(
     test = read_sources(held_out, card, velocity=True).logs if held_out else None
     with running("trace", TRACE_STAGES, budget) as course:
         found = trace_velocity(train, test, keep_going=course.keep_going)
-        return view(found), found.left.verdict, tuple(found.model.effects)
+        return view(found), found.model, found.left.verdict, tuple(found.model.effects)

@@ -100,7 +100,7 @@ def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
 def _fit_caption(model: Model) -> str:
     inverse = " The model's force is that of the inverse model: what this motion needs."
     if model.by_equation:
-        return f"No free run follows these logs, so no position is simulated.{inverse}"
+        return f"The equation of motion was fitted, so no position is simulated.{inverse}"
     if model.fit.drive == "command":
         anew = "from the start of the log; it never sees the measured position"
         if in_windows(model):
@@ -181,8 +181,8 @@ def _own_limits(model: Model, friction: Karnopp) -> str:
 def _residual_caption(model: Model) -> str:
     if model.by_equation:
         return (
-            "No free run follows these logs: this is the force that the model lacks, smoothed, with"
-            " its 95 % band, which is wide where the body rests."
+            "The equation of motion was fitted: this is the force that the model lacks, smoothed,"
+            " with its 95 % band, which is wide where the body rests."
         )
     if model.fit.adequate:
         how = times(float(np.sqrt(model.fit.chi_square)))

@@ -145,7 +145,10 @@ def _found(model: Model, missing: float | None) -> str:
     if model.assumed:
         text += f" Not identifiable: {', '.join(model.assumed)}."
     if model.fit.adequate:
-        who, more = ("free run", ", the equation of motion more") if shows else ("model", "")
+        more = "; the equation of motion leaves more" if shows else ""
+        if model.by_equation:  # its fit had a run, with parameters of more error
+            return f"{text} A free run follows the logs to the sensors' noise{more}."
+        who = "free run" if shows else "model"
         return f"{text} The {who} leaves nothing but {_noise_of(model)}{more}."
     if model.resonance is not None:
         said = two_masses_sentence(model.resonance)
@@ -171,7 +174,7 @@ def _noise_of(model: Model) -> str:
     if off is None or off <= ASTRAY * model.fit.noise_y:
         return "sensor noise"
     if any(STOP_TURNS_ON_LESS in remark for remark in model.fit.remarks):
-        return "sensor noise, and what follows where a stop turns on less than it"
+        return "sensor noise and stops that it shifts in time"
     return f"what noise of the {'command' if drive == 'command' else 'measured force'} makes"
 
 
@@ -211,7 +214,7 @@ def fit_lines(model: Model) -> list[str]:
         if e.position_rms is not None
     ]
     if model.by_equation:
-        lines.append("the equation of motion was fitted, not a free run")
+        lines.append("the parameters are those of the equation of motion, not of a free run")
     if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative
         lines.append(

@@ -35,18 +35,22 @@ def check_of_refused(logs: Sequence[str], card: str) -> Callable[[str], Step]:
 
 
 def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path) -> Step:
-    """Trace what the model lacks; design on one that leaves noise."""
+    """Trace what the model lacks; design on one that leaves noise; the run to add where none of its
+    parameters is identified, so that too little slides to test, or where it carries no design."""
     from workbench.report.model_tables import to_the_noise_by_equation
 
-    if not model.fit.adequate:
-        why = "whether an" if to_the_noise_by_equation(model) else "an"
-        return step(f"{why} effect is missing", "trace", *logs, "--card", card)
-    return step("a controller for it", "design", folder / "model.json")
+    if model.fit.adequate:
+        return _design_or_run(model, logs, card, folder)
+    if not model.identifies_friction:
+        return check_of_refused(logs, card)("")
+    why = "whether an" if to_the_noise_by_equation(model) else "an"
+    return step(f"{why} effect is missing", "trace", *logs, "--card", card)
 
 
 def after_trace(
-    verdict: str, effects: Iterable[object], logs: Sequence[str], card: str, folder: Path
-) -> Step | None:
+    verdict: str, effects: Iterable[object], model: "Model | VelocityModel", logs: Sequence[str],
+    card: str, folder: Path,
+) -> Step | None:  # fmt: skip
     """The newer logs' own model after drift, a controller where the model is as good as it gets.
 
     logs: the newer ones. None where more has to be logged or known first.
@@ -54,8 +58,25 @@ def after_trace(
     if verdict == "drift":
         return step("the machine as it is now", "identify", *logs, "--card", card)
     if verdict == "none" or list(effects):
-        return step("a controller for it", "design", folder / "model.json")
+        return _design_or_run(model, logs, card, folder)
     return None
+
+
+def _design_or_run(
+    model: "Model | VelocityModel", logs: Sequence[str], card: str, folder: Path
+) -> Step:
+    """A controller where the model carries a design, else which run to add to its logs."""
+    from design.closed_loop.linear_loop import carries_design
+    from design.controllers.velocity_loop import DESIGN_NEEDS
+    from design.machine.velocity import VelocityModel
+
+    if isinstance(model, VelocityModel):
+        carries = all(model.valve[name].known for name in DESIGN_NEEDS)
+    else:
+        carries = carries_design(model)
+    if carries:
+        return step("a controller for it", "design", folder / "model.json")
+    return check_of_refused(logs, card)("")
 
 
 def after_predict(log: str, card: str) -> Step:
@@ -65,15 +86,20 @@ def after_predict(log: str, card: str) -> Step:
 
 def without_design(model: "Model | VelocityModel", card: str | None) -> Callable[[str], Step]:
     """After a refusal to design: look over the log that the model is of."""
-    return check_of_refused([one.file for one in model.log], _card_of(model, card))
+    logs, known = _files_of(model, card)
+    return check_of_refused(logs, known)
 
 
-def _card_of(model: "Model | VelocityModel", card: str | None) -> str:
-    """The card by which the model's logs are read: given, shipped, or where it is likely to lie."""
-    if card is not None or model.card in shipped_cards():
-        return card or model.card
-    likely = (Path(model.card) / CARD_FILE, Path(CARD_FILE))
-    return str(next((path for path in likely if path.is_file()), likely[0]))
+def _files_of(model: "Model | VelocityModel", card: str | None) -> tuple[list[str], str]:
+    """The model's logs and its card: given, shipped, or where it is likely to lie; LOG and CARD of
+    those that are not there, since a model knows the names of its files alone."""
+    shipped, likely = shipped_cards(), (Path(model.card) / CARD_FILE, Path(CARD_FILE))
+    if card is None and model.card in shipped:
+        card = model.card
+    known = card or next((str(path) for path in likely if path.is_file()), "CARD")
+    names = dict.fromkeys(one.file for one in model.log)
+    found = [name for name in names if known in shipped or Path(name).is_file()]
+    return found or ["LOG"], known
 
 
 def after_design(
@@ -141,8 +167,8 @@ def after_validate(
     if "model" not in failed and plant_file is not None:
         return step("a design for that machine", "design", plant_file)
     if not model.fit.adequate and not model.effects:
-        logs = [one.file for one in model.log]
-        return step("an effect is missing", "trace", *logs, "--card", _card_of(model, card))
+        logs, known = _files_of(model, card)
+        return step("an effect is missing", "trace", *logs, "--card", known)
     words = ("design", str(model_file), *(("--card", card) if card else ()))
     alone = found.judged.removesuffix(COMPENSATED)
     if alone != found.judged and found.figures[alone]["model"].passed:

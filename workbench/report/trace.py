@@ -23,7 +23,7 @@ from workbench.report.model_tables import estimate_cells, is_left_out, reasons_o
 from workbench.report.next_steps import after_trace
 from workbench.report.response import over_frequency
 from workbench.report.trace_pictures import against_signal, free_curves, over_time, signal_chart
-from workbench.report.trace_words import advice, percent, trace_sentence, words
+from workbench.report.trace_words import advice, by_regression, percent, trace_sentence, words
 from workbench.report.view import Section, View, notes, report_notes, view
 from workbench.screen import Part, Row, more, tabled
 
@@ -131,14 +131,17 @@ def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
 
 
 def differences_table(found: Trace) -> Part:
-    """Parameters that differ between training and test logs."""
+    """Parameters that differ between training and test logs; the head says where they are not of
+    the fit whose parameters are reported."""
+    regressed = any(by_regression(c, found) for c in found.drift)
+    head = (f"parameter{', by regression' if regressed else ''}", *DRIFT_HEAD[1:])
     rows = list[Row]()
     for c in found.drift:
         unit, factor = shown_unit(c.unit)
         after = f"{number(factor * c.after, 4)} ± {number(factor * 1.96 * c.sd, 2)}"
         change = percent(c.before, c.after)
         rows.append((c.name, number(factor * c.before, 4), after, unit, change))
-    return tabled(DRIFT_HEAD, rows)
+    return tabled(head, rows)
 
 
 def trace_parts(traced: Traced) -> list[Part | str]:
@@ -178,7 +181,7 @@ def _(traced: Traced) -> View:
         lambda: _sections(traced),
         lambda: _main_chart(traced),
         advice(traced),
-        after_trace(found.verdict, found.effects, newer, "CARD", Path()),
+        after_trace(found.verdict, found.effects, traced.model, newer, "CARD", Path()),
     )
 
 

@@ -12,6 +12,7 @@ from identification.model.estimates import Estimate
 from identification.thresholds import OF_ACCOUNT
 from identification.tracing.probability import is_probable
 from identification.tracing.result import Change, Dependence, Trace
+from identification.tracing.trace import MOVE_IT
 from identification.tracing.verdict import listed
 
 FORCE_ERROR_LEFT = 0.8  # of the force error; an effect that leaves more shows in another error
@@ -80,7 +81,9 @@ def _verdict_sentence(traced: Traced) -> str:
         noise = "" if error.noise is None else f" (sensors' noise {error.write(error.noise)})"
         fall = f"{error.write(error.before)} -> {error.write(error.after)}"
         errors = f" {error.name} {fall}{noise}."
-    changed = ", ".join(map(_changed, found.drift))
+    changed = ", ".join(_changed(one, found) for one in found.drift)
+    if found.next_experiment == MOVE_IT:  # no effect was sought, and nothing that is left tested
+        return f"Unknown: {unexplained(traced)}"
     match found.verdict:
         case "unknown" if found.not_tried and not found.effects:
             return f"Open: {unexplained(traced, found.unknown.depends_on)}"
@@ -178,16 +181,19 @@ def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
     """What is left where it is far more than noise; signals: on which it depends."""
     depends = f"depends on {listed(signals)}" if signals else "depends on none of the signals"
     found, display = traced.trace, traced.model.display
+    rest = f"and it {depends}"
+    if found.next_experiment == MOVE_IT:
+        rest = "but the held-out logs slide too little to test on what it depends"
     left, off = found.after["train"].force_rms, found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
             f"the free run has an error of {display.length_text(off)} in 2 s (sensors' noise"
-            f" {display.length_text(found.noise_y)}), and it {depends}."
+            f" {display.length_text(found.noise_y)}), {rest}."
         )
     said = "an unknown part" if left is None else display.force_text(left)
     return (
         f"the model leaves {said} of force, the sensors' noise alone"
-        f" {display.force_text(found.noise_force)}, and it {depends}."
+        f" {display.force_text(found.noise_force)}, {rest}."
     )
 
 
@@ -255,9 +261,18 @@ def percent(before: float, after: float) -> str:
     return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
 
 
-def _changed(change: Change) -> str:
-    """One change in words."""
+def by_regression(change: Change, found: Trace) -> bool:
+    """Whether a change is that of the regression on the equations of training and test logs, alike
+    on both, whose training value is not the reported one of the fit."""
+    reported = found.parameters_after.get(change.name)
+    return reported is None or not math.isclose(used(reported), change.before)
+
+
+def _changed(change: Change, found: Trace) -> str:
+    """One change in words; of a regression, whose values are not those reported, its share."""
     by = percent(change.before, change.after)
+    if by and by_regression(change, found):
+        return f"{change.name} by {by}"
     unit, factor = shown_unit(change.unit)
     before, after = (number(factor * value, 4) for value in (change.before, change.after))
     return f"{change.name} from {before} to {after} {unit}{f' ({by})' if by else ''}"

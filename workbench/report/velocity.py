@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from design.controllers.velocity_loop import VelocityValidation, velocity_validation_document
+from design.controllers.velocity_loop import (
+    DESIGN_NEEDS,
+    VelocityValidation,
+    velocity_validation_document,
+)
 from design.identified.velocity import VelocityPredicted, VelocityPrediction, VelocityTraced
 from design.identified.velocity_documents import prediction_summary, velocity_trace_document
 from design.machine.readable import number
@@ -99,7 +103,7 @@ def _(found: VelocityModel | VelocityTraced | VelocityDesign | VelocityValidatio
 
 def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
     """Look for what is missing where more than noise is left; add a run; else design."""
-    if any(not model.valve[name].known for name in ("g_p", "g_n", "d_p", "d_n")):
+    if any(not model.valve[name].known for name in DESIGN_NEEDS):
         return step("with a run that identifies the rest added", "identify", *logs, "--card", card)
     if not is_noise(model.fit.position_rms_2s**2, model.fit.noise_y):
         return step("more than noise is left", "trace", *logs, "--card", card)

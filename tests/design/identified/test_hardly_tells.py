@@ -81,6 +81,8 @@ def test_a_motor_driven_by_its_voltage_is_braked_by_its_own() -> None:
     for rig in (replace(MOTOR, command_unit="A"), FORCE):
         assert braked_by_its_voltage([log], rig) == ()
         assert "k_t k_e" not in " ".join(hardly_identifiable([log.with_signals(F=voltage)], rig))
+    counts = " ".join(hardly_identifiable([log], replace(MOTOR, command_unit="1")))
+    assert "of a valve, use kind" in counts and "of a motor by its current, log quick" in counts
     by_force = Log("run", {"t": T, "y": SWING + noise(1e-6), "u": np.gradient(v, T)})
     assert braked_by_its_voltage([by_force], MOTOR) == ()
 

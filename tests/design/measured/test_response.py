@@ -270,6 +270,17 @@ def test_without_a_reference_it_says_so_and_shows_no_loop() -> None:
     assert any("the reference rests" in one for one in still.remarks)
 
 
+def test_points_apart_are_no_range_of_frequencies(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = log_of(ONE, 6.0)
+    shown = of_logs(log, model=model(ONE)).found
+    apart = np.where(np.isin(np.arange(len(shown.f)), (3, 20)), shown.body.coherence, 0.0)
+    few = replace(shown, body=replace(shown.body, coherence=apart))
+    assert np.count_nonzero(few.body.seen) == 2
+    monkeypatch.setattr("design.measured.response._measured", lambda *_: (few, None))
+    with pytest.raises(NotIdentifiable, match="needed at 3 in a row"):
+        of_logs(log, model=model(ONE))
+
+
 def test_what_shows_nothing_is_refused() -> None:
     log = log_of(ONE, 6.0)
     rng = np.random.default_rng(1)
@@ -281,11 +292,12 @@ def test_what_shows_nothing_is_refused() -> None:
     rotary = replace(model(ONE), rig=replace(model(ONE).rig, motion="rotary"))
     with pytest.raises(BadModel, match="the model is of a rotary machine"):
         of_logs(log, model=rotary)
-    prescribed = replace(
+    followed = replace(
         model(ONE), rig=Rig("force"), actuator=None,
         log=tuple(replace(one, position_rms=None) for one in model(ONE).log),
     )  # fmt: skip
-    assert prescribed.prescribed_motion
+    prescribed = replace(followed, fit=replace(followed.fit, adequate=False))
+    assert prescribed.prescribed_motion and not followed.prescribed_motion
     no_mass = {**prescribed.friction, "m": Estimate(None, "kg", reason="none shows", assumed=1.0)}
     with pytest.raises(NotIdentifiable, match="axis is prescribed by a rig"):
         of_logs(log, model=replace(prescribed, friction=no_mass))

@@ -28,3 +28,10 @@ def test_a_torque_in_small_letters_is_in_no_nanometres() -> None:
 def test_a_function_of_time_is_no_time() -> None:
     heads = read_together([("setpoint(t)", ""), ("input_u(t)", ""), ("output_y(t)", "")], NOTATION)
     assert all(one.unit is None and "time" not in one.means for one in heads)
+
+
+def test_what_is_measured_beside_a_command_is_in_no_milliseconds() -> None:
+    heads = read_together([(one, "") for one in ("Time", "Arm Ms", "Arm Cmd", "Lag ms")], NOTATION)
+    _, measured, _, lag = heads
+    assert measured.unit is None and measured.purpose == "measured" and measured.name == "Arm Ms"
+    assert lag.unit is not None and lag.unit.card == "ms"

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from identification.effects._base import Acting, Param
 from identification.effects._library import built_in
+from identification.estimation import (
+    converged_fit,
+    prescribed_motion,
+    run_or_equation,
+    shown_in_sliding,
+)
 from identification.estimation.estimates import (
+    EXCITE,
     FIXED_AT_DEFAULT,
     Events,
     effect_estimates,
@@ -35,8 +42,26 @@ DIFFERENCES = {
 }
 PARAMS = [(key, p) for key, effect in sorted(built_in().items()) for p in effect.params]
 
+REASONS = (
+    f"wider than the value; {EXCITE}",
+    run_or_equation.PREDICTS_WHY,
+    run_or_equation.STEPS_WHY,
+    converged_fit.NO_REST_WHY,
+    shown_in_sliding.TURNING_WHY,
+    shown_in_sliding.SPRING_WHY,
+    *prescribed_motion.WHY_NOT.values(),
+)
+TO_DO = ("log ", "add ", "excite ")
+
 sizes = st.one_of(st.sampled_from([0.0, 1e-9, 1e-3, 1.0]), st.floats(0.0, 1e7))
 deviations = st.one_of(st.none(), st.sampled_from([0.0, np.inf, np.nan]), st.floats(0.0, 1e8))
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_a_reason_says_why_and_then_what_to_log(reason: str) -> None:
+    """`doctor` and `identify` print what follows the semicolon as the run to add."""
+    why, _, add = reason.partition("; ")
+    assert why and add.startswith(TO_DO) and ";" not in add
 
 
 @given(

@@ -378,6 +378,18 @@ def test_a_value_that_a_logger_repeats_is_no_limit() -> None:
         assert {one.kind for one in reported} == {"saturated"}
 
 
+@pytest.mark.parametrize("grows", [0.0, 0.3])
+def test_the_crest_of_a_command_in_whole_counts_is_no_limit(grows: float) -> None:
+    """It stands at its largest count for some samples, whether or not the next crest is larger."""
+    log = sliding_log()
+    size = 100.0 * (1.0 + grows * log["t"] / log.duration)
+    u = np.round(size * np.sin(2.0 * np.pi * 0.4 * log["t"]))
+    assert np.count_nonzero(np.diff(u)[u[1:] == u.max()] == 0.0) >= 3
+    assert limits(log.with_signals(u=u), "u") == []
+    reported = limits(log.with_signals(u=np.clip(u, -80.0, 90.0)), "u")
+    assert [one.kind for one in reported] == ["saturated", "saturated"]
+
+
 def noisy_force(log: Log) -> Log:
     noise = 0.05 * np.random.default_rng(0).standard_normal(len(log))
     return log.with_signals(F=log["F"] + noise)

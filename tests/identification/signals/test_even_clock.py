@@ -40,6 +40,13 @@ def test_holes_longer_than_the_mean_period_bridges_are_gaps() -> None:
         even_clock(log_of(bursts(hole=0.2)))
 
 
+def test_one_gap_is_no_gaps() -> None:
+    t = 0.01 * np.arange(150, dtype=np.float64)
+    t[75:] += 30.0
+    with pytest.raises(BadLog, match=r"run: 1 gap leaves no run of 100 samples"):
+        even_clock(log_of(t))
+
+
 def test_a_pause_among_bursts_cuts_them() -> None:
     t = bursts()
     t[600:] += 30.0

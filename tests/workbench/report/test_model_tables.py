@@ -57,11 +57,23 @@ def test_stops_that_turn_on_noise_are_no_noise_of_the_command() -> None:
     entry = replace(model.log[0], position_rms=1e3 * model.fit.noise_y)
     fit = replace(model.fit, drive="command", adequate=True)
     for remarks, said in (
-        ((f"{WINDOWED}: {STOP_TURNS_ON_LESS}",), "sensor noise, and what follows where a stop"),
+        ((f"{WINDOWED}: {STOP_TURNS_ON_LESS}",), "sensor noise and stops that it shifts in time."),
         ((), "nothing but what noise of the command makes"),
     ):
         left = replace(model, log=(entry,), fit=replace(fit, remarks=remarks))
         assert said in summary(left, None)
+
+
+def test_parameters_of_the_equation_are_not_said_to_be_of_a_run_that_was_followed() -> None:
+    found = missing_force(["stribeck"])
+    model = by_equation(9.0, replace(EMPS, F_cp=2.0, F_cn=2.0))
+    model = replace(model, fit=replace(model.fit, adequate=True))
+    said = summary(model, found.before)
+    assert "The free run" not in said and "leaves nothing" not in said
+    assert "follows the logs to the sensors' noise; the equation of motion leaves more." in said
+    assert "A free run follows the logs to the sensors' noise." in summary(model, None)
+    (line,) = [one for one in fit_lines(model) if "free run" in one]
+    assert line == "the parameters are those of the equation of motion, not of a free run"
 
 
 WINDOWED = "the model follows the logs in windows of 2 s from measured states, but not the whole"

@@ -12,8 +12,9 @@ import pytest
 
 from design.asked import Limits
 from design.controllers.validate import validate
+from design.machine.arx_plant import ArxPlant
 from design.machine.design import Design
-from design.machine.model import Model
+from design.machine.model import Model, used
 from design.tune import Asked
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of
@@ -89,16 +90,41 @@ def test_after_identify(model: Model) -> None:
     assert then.why == "an effect is missing"
 
 
+def test_no_design_is_proposed_of_a_model_that_carries_none(model: Model) -> None:
+    massless, nothing = withheld(model, "m"), withheld(model, *model.friction)
+    arx = ArxPlant(
+        1, 1, 1, (1.0, -0.9), (0.0, 1.0), 0.01, "F", 0.0, (0.1,), (0.1,), 0.1, 0.1, 0.1, None
+    )
+    lacking = replace(nothing, fit=replace(nothing.fit, adequate=False), plant=arx)
+    for one in (massless, nothing, lacking):
+        then = after_identify(one, ["logs/a.csv"], "emps", OUT)
+        assert taken(then) == "workbench doctor logs/a.csv --card emps"
+    for verdict, effects in (("none", ()), ("effect", ("spring",))):
+        traced = after_trace(verdict, effects, massless, ["b.csv"], "emps", OUT)
+        assert taken(traced) == "workbench doctor b.csv --card emps"
+
+
+def withheld(model: Model, *names: str) -> Model:
+    """The model with these of its parameters not identified."""
+    none = {n: one.withheld("why; what to do", used(one)) for n, one in model.friction.items()}
+    return replace(
+        model, friction={n: none[n] if n in names else one for n, one in model.friction.items()}
+    )
+
+
 def test_a_model_without_design(
     model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Of files that do not lie there no path is made up: a model knows their names alone."""
     monkeypatch.chdir(tmp_path)
+    assert taken(without_design(model, None)("")) == "workbench doctor LOG --card CARD"
+    assert taken(without_design(model, "c.toml")("")) == "workbench doctor LOG --card c.toml"
+    Path("a.csv").touch()
     assert taken(without_design(model, "c.toml")("")) == "workbench doctor a.csv --card c.toml"
-    assert taken(without_design(model, None)("")).endswith("--card known/card.toml")
     Path("card.toml").touch()
     assert taken(without_design(model, None)("")).endswith("--card card.toml")
     shipped = replace(model, card="emps")
-    assert taken(without_design(shipped, None)("")).endswith("--card emps")
+    assert taken(without_design(shipped, None)("")) == "workbench doctor a.csv --card emps"
 
 
 def test_margins_that_are_missed_become_those_that_are_kept(too_fast: Design) -> None:
@@ -135,8 +161,10 @@ def test_a_controller_is_tried_in_simulation_by_the_files_at_hand(found: Design)
         ("unknown", (), None),
     ],
 )
-def test_after_trace(verdict: str, effects: tuple[str, ...], command: str | None) -> None:
-    then = after_trace(verdict, effects, ["new.csv"], "emps", OUT)
+def test_after_trace(
+    model: Model, verdict: str, effects: tuple[str, ...], command: str | None
+) -> None:
+    then = after_trace(verdict, effects, model, ["new.csv"], "emps", OUT)
     assert (then and taken(then)) == command
 
 
@@ -155,7 +183,7 @@ def test_a_loop_that_misses_a_limit(model: Model, found: Design) -> None:
     assert taken(then(Limits(tracking=1e-3))) == f"{start} --poles {1.4 * w_n:.3g},{zeta:.3g}"
     lacking = replace(model, fit=replace(model.fit, adequate=False))
     traced = then(Limits(tracking=1e-3), lacking)
-    assert taken(traced).startswith("workbench trace a.csv --card ")
+    assert taken(traced).startswith("workbench trace LOG --card CARD")
 
 
 def test_a_machine_on_which_a_design_fails_gets_its_own(model: Model, found: Design) -> None:

@@ -179,8 +179,11 @@ def test_a_model_that_carries_no_design_is_refused() -> None:
     with pytest.raises(NotIdentifiable, match="design; the mass is identified: design on it"):
         designed(heavy, source="arx")
     prescribed = replace(model.log[0], position_rms=None)
+    moved = replace(model, log=(prescribed,), actuator=None)
     with pytest.raises(NotIdentifiable, match="prescribed"):
-        designed(replace(model, log=(prescribed,), actuator=None))
+        designed(replace(moved, fit=replace(moved.fit, adequate=False)))
+    with pytest.raises(NotIdentifiable, match="no ARX plant"):  # a run by the force follows it
+        designed(moved)
 
 
 def test_another_plant_can_fail_what_the_model_passes() -> None:

@@ -112,6 +112,41 @@ def test_axes_go_by_the_names_of_their_headers(
         propose(tmp_path, headers, *table, axis="arm")
 
 
+def test_a_reference_named_u_is_known_by_the_command_that_a_controller_makes_of_it(
+    tmp_path: Path,
+) -> None:
+    """A PD loop with friction along a sweep, far behind its reference; the command is named v."""
+    h, n = 2e-3, 1500
+    t = h * np.arange(n, dtype=np.float64)
+    u = 50.0 * np.sin(2.0 * np.pi * (0.5 + 0.8 * t) * t)
+    y, command = np.zeros(n), np.zeros(n)
+    at = speed = 0.0
+    rng = np.random.default_rng(3)
+    for k in range(n):
+        y[k] = np.round(at)
+        error = u[k] - y[k]
+        command[k] = np.round(2.0 * error - 0.04 * speed + 0.5 * rng.standard_normal())
+        for _ in range(10):
+            speed += 0.1 * h * (600.0 * command[k] - 30.0 * speed - 4e3 * np.tanh(speed))
+            at += 0.1 * h * speed
+    found = propose(tmp_path, "t,u,v,theta", t, np.round(u), command, y)
+    assert columns(found) == {"t": "t", "r": "u", "y": "theta", "u": "v"}
+
+
+@pytest.mark.parametrize("measured", ["Ms", "Len"])
+def test_axes_go_by_the_first_word_of_what_is_commanded_and_what_moves(
+    measured: str, joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    """No header speaks of a position, and the other axis has a command that is always the same."""
+    table = (T, joint["F"], 0.0 * T + 7.5, 0.0 * T, joint["y"], other["y"])
+    headers = f"Time,Boom Cmd,Stick Cmd,Swing Cmd,Boom {measured},Stick {measured}"
+    headers += "" if measured == "Ms" else ",Stick Load"
+    values = table if measured == "Ms" else (*table, other["F"])
+    found = propose(tmp_path, headers, *values, axis="Boom")
+    assert found.axes == ("boom", "stick") and found.axis == "boom"
+    assert columns(found) == {"t": "Time", "y": f"Boom {measured}", "u": "Boom Cmd"}
+
+
 @pytest.mark.parametrize("driven", [False, True])
 def test_a_current_of_the_motor_that_the_body_turns_is_no_drive(
     joint: dict[str, Array], tmp_path: Path, driven: bool

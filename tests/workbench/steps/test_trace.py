@@ -37,6 +37,7 @@ from identification.tracing.result import (
     TraceVerdict,
 )
 from identification.tracing.shown_against import pictures
+from identification.tracing.trace import MOVE_IT
 from tests.reported import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
@@ -158,6 +159,14 @@ def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(tracing, "trace", lambda *_, **__: found)
     with pytest.raises(BadLog, match=r"b\.csv: no row of it could be judged"):
         trace_logs(sources().logs, sources("b.csv", "b").logs, built_in())
+
+
+@pytest.mark.parametrize("on", [(), ("t",)])
+def test_where_nothing_could_be_tested_no_dependence_is_denied_or_told(on: tuple[str, ...]) -> None:
+    found = replace(trace_of("unknown", ()), next_experiment=MOVE_IT, unknown=Dependence(on, 0.3))
+    said = trace_sentence(traced(found))
+    assert "the held-out logs slide too little to test on what it depends." in said
+    assert "depends on" not in said and "no effect" not in said
 
 
 def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
@@ -331,6 +340,18 @@ def test_rows_of_the_tables() -> None:
     plain = trace_of("none", ())
     assert len(changes_table(plain).head) == len(changes_table(plain).whole[0]) == 4
     assert differences_table(found).whole == (("F_cp", "12", "14.4 ± 0.2", "N", "+20 %"),)
+
+
+def test_changes_by_another_fit_than_the_reported_one_say_so() -> None:
+    """Of a regression on both logs, whose training value is not that of the table of parameters."""
+    reported = trace_of("drift", ())
+    assert differences_table(reported).head[0] == "parameter"
+    found = replace(reported, drift=(Change("F_cp", "N", 11.0, 14.3, 0.1),))
+    table = differences_table(found)
+    assert table.head[0] == "parameter, by regression"
+    assert table.whole == (("F_cp", "11", "14.3 ± 0.2", "N", "+30 %"),)
+    said = trace_sentence(traced(found))
+    assert "the machine changed in F_cp by +30 %;" in said and "11" not in said
 
 
 def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
