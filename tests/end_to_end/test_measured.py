@@ -85,7 +85,7 @@ def test_a_rig_that_leads_the_body_is_fitted_on_its_force(data: Path, tmp_path: 
     assert isinstance(friction, dict)
     # One way friction falls with speed; either way it is the mean over the strokes.
     assert 6.0 < friction["F_cp"]["value"] < 9.0
-    assert 4.0 < friction["F_cn"]["value"] < 6.0
+    assert 4.0 < friction["F_cn"]["assumed"] < 6.0  # three pressures, so too wide to be given
     assert friction["F_vp"]["value"] is None
     assert friction["F_vp"]["assumed"] == 0.0
     falling = model["falling"]

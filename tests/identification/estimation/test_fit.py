@@ -305,7 +305,7 @@ def test_an_equation_beside_a_lost_run_predicts_and_reports_nothing(
     found = equation_beside_a_lost_run(0, monkeypatch)
     assert found.friction.dv_p < 10.0 and found.left is not None
     assert all(found.estimates[name].value is None for name in NAMES)
-    assert "predicts their force" in str(found.estimates["m"].reason)
+    assert "neither the run nor the equation" in str(found.estimates["m"].reason)
     assert equation_beside_a_lost_run(2, monkeypatch).friction.dv_p == 10.0
 
 

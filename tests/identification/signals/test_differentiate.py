@@ -166,7 +166,8 @@ def test_a_counted_position_has_its_step_however_it_was_printed(digits: int, of:
     was off by more than a step, and the position passed for one without."""
     step, t = 360.0 / 2800.0, 0.02 * np.arange(400)
     counted = step * np.round(90.0 * np.sin(1.3 * t) * (1.0 + 0.3 * np.sin(0.7 * t)) / step)
-    shown = np.round(counted, digits) if of == "decimals" else np.float64(np.float32(counted))
+    short = np.round(counted, digits) if of == "decimals" else np.float32(counted)
+    shown = np.asarray(short, dtype=np.float64)
     assert resolution(shown) == pytest.approx(step, rel=1e-4)
     assert resolution(np.radians(shown)) == pytest.approx(np.radians(step), rel=1e-4)
 
