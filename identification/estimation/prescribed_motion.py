@@ -58,7 +58,7 @@ WHY_NOT = {
     " identify viscous friction",
     "F_c": "viscous friction alone predicts as much of these logs; add slow motion to identify"
     " Coulomb friction",
-    "stick": "no free run was fitted (see the notes), and it is not in the force equation;"
+    "stick": "no free run gives it (see the notes), and it is not in the force equation;"
     " log the body driven by a force, from rest",
 }
 FALLS_WHY = (
