@@ -69,7 +69,8 @@ def trace_logs(
         on_progress=on_progress,
         keep_going=keep_going,
     )
-    if seen and found.after["test"].force_rms is None:
+    untested = found.after["test"].force_rms is None and found.surroundings.resonance is None
+    if seen and untested:
         raise BadLog(
             f"{', '.join(dict.fromkeys(source.file for source in seen))}: no row of it could be"
             " judged, since it nowhere slides long enough; test on a log of motion like that of the"

@@ -18,7 +18,7 @@ from identification.estimation.recorded_logs import acts_directly
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.run_or_equation import STEPS_WHY
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.two_masses import of_two_masses, two_masses
+from identification.estimation.two_masses import of_two_masses, position_errors, two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.surroundings import Surroundings
@@ -29,6 +29,7 @@ from identification.thresholds import ADEQUATE, COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.judgement import judgement
+from identification.tracing.levels_refitted import LENGTH
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
 from identification.tracing.regression.stepwise import Choice
@@ -53,6 +54,11 @@ ONE_WAY_ALONE = (
 BY_HALVES = (
     "the training logs lack nothing, the test logs do: the effect is fitted on the first half of"
     " these too, and the errors are those of the second half"
+)
+ELASTIC_ERRORS = (
+    "two masses predict the position of the test logs, in windows of half a second within which the"
+    " body goes one way, within {1:.3g} {2} rms, one body within {0:.3g}; the table of errors is of"
+    " one body"
 )
 FOR_NOW = "for now, since the trace ended early"
 REST_FIRST = "first the rest of this trace, which ended early: give it more time"
@@ -105,21 +111,25 @@ def trace(
         traced = replace(traced, command_period=0.0)
     elastic = traced.verdict == "unknown" and not traced.effects and not halt.reached()
     if elastic and acts_directly(train, rig):
-        return _of_two_masses(traced, beside, train, rig)
+        return _of_two_masses(traced, beside, train, test, rig)
     return traced
 
 
 def _of_two_masses(
-    traced: Trace, beside: Surroundings, train: Sequence[Log], rig: Rig
-) -> Trace:  # fmt: skip
-    """The trace with the resonance, mass and friction of two masses, where these show."""
+    traced: Trace, beside: Surroundings, train: Sequence[Log], test: Sequence[Log], rig: Rig
+) -> Trace:
+    """The trace with the resonance, mass and friction of two masses, where these show, and what
+    one body and two leave of the position of the test logs."""
     resonance = two_masses(train, rig)
     if resonance is None:
         return traced
     plant = traced.plant
     friction, sizes = of_two_masses(resonance, plant.friction, traced.parameters_after)
+    errors = position_errors(resonance, train, test, rig) if test else None
+    said = () if errors is None else (ELASTIC_ERRORS.format(*errors, LENGTH[rig.motion]),)
     return replace(
         traced,
+        remarks=(*said, *traced.remarks),
         surroundings=replace(beside, resonance=resonance),
         plant=replace(plant, friction=friction),
         parameters_after=sizes,

@@ -8,7 +8,7 @@ from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
 from identification.estimation.two_masses import _left_of as left_by
 from identification.estimation.two_masses import _windows as windows
-from identification.estimation.two_masses import two_masses
+from identification.estimation.two_masses import position_errors, two_masses
 from identification.log import Log, Rig
 from identification.tracing.trace import trace
 
@@ -104,6 +104,7 @@ def test_a_trace_takes_mass_and_friction_of_the_two() -> None:
     assert found.parameters_after["m"].value == pytest.approx(4e-3, rel=1e-3)
     assert found.parameters_after["F_cp"].value == pytest.approx(0.05, rel=0.01)
     assert found.plant.friction.m == pytest.approx(4e-3, rel=1e-3)
+    assert any("two masses predict the position of the test logs" in one for one in found.remarks)
 
 
 def test_a_search_that_goes_astray_warns_of_nothing() -> None:
@@ -121,3 +122,17 @@ def test_one_body_is_not_two() -> None:
 def test_a_short_log_tells_nothing() -> None:
     log = log_of(1e-3, 3e-3, 18.5, damping=1e-3, seed=3)
     assert two_masses([log.part(0, 2000)], RIG) is None
+
+
+def test_both_predict_the_position_of_a_log_that_neither_has_seen() -> None:
+    """Of numbers from the training log alone, two masses down to the sensor's noise."""
+    k = (2.0 * np.pi * 25.0) ** 2 * 0.75e-3
+    train, test = (log_of(1e-3, 3e-3, k, damping=1e-3, seed=seed) for seed in (1, 2))
+    found = two_masses([train], RIG)
+    assert found is not None
+    errors = position_errors(found, [train], [test], RIG)
+    assert errors is not None
+    one_body, two = errors
+    assert two == pytest.approx(1e-5, rel=0.2) and one_body > 20.0 * two
+    still = test.with_signals(y=np.zeros(len(test)))
+    assert position_errors(found, [train], [still], RIG) is None
