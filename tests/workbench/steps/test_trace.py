@@ -159,6 +159,10 @@ def test_a_verdict_never_rests_on_no_row(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(tracing, "trace", lambda *_, **__: found)
     with pytest.raises(BadLog, match=r"b\.csv: no row of it could be judged"):
         trace_logs(sources().logs, sources("b.csv", "b").logs, built_in())
+    # A load that swings may leave no steady sliding, and is judged by its own windows.
+    swings = Resonance(*[Size(1.0, 0.01)] * 9)
+    found = replace(found, verdict="unknown", surroundings=Surroundings(resonance=swings))
+    assert trace_logs(sources().logs, sources("b.csv", "b").logs, built_in()).trace is found
 
 
 @pytest.mark.parametrize("on", [(), ("t",)])
