@@ -31,6 +31,7 @@ from identification.estimation.regression.force_terms import (
 )
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
+    are_enough,
     converged_rows,
     usual_fastest,
     without_reversals,
@@ -54,6 +55,8 @@ WIDEST_ASSUMED = 0.06  # of fast sliding, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 WHY_NOT = {
     "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
+    "as well": "the force is predicted as well without inertia: the mass is not identifiable; log"
+    " faster motion",
     "F_v": "constant friction predicts as much of these logs; add runs at other speeds to"
     " identify viscous friction",
     "F_c": "viscous friction alone predicts as much of these logs; add slow motion to identify"
@@ -155,7 +158,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     made = without_reversals(every)
     ways = np.concatenate([one.up for one in made])
     up, down = (int(np.count_nonzero(ways == way)) for way in (True, False))
-    way = _way(up / len(ways)) if len(ways) >= FEWEST_COMPARED else None
+    way = _way(up / len(ways)) if are_enough(made) else None
     if way is not None:
         every = made = [one.at(one.up == way) for one in made]
     elif min(up, down) < FEWEST_OF_DIRECTION:
@@ -289,7 +292,10 @@ def _reasoned(
                 one = replace(one, reason=why, assumed=float(value))
             out[key] = one
             continue
-        kind = key if key == "m" else "stick" if key.startswith(("dv", "F_s")) else key[:3]
+        if key == "m":  # other terms may take the place of an inertia that is of account
+            kind = "as well" if share is not None and share >= INERTIA_SHARE else "m"
+        else:
+            kind = "stick" if key.startswith(("dv", "F_s")) else key[:3]
         rests = silent_reason(key, sliding, recorded.name) if key in FIVE else None
         reason = rests or f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))

@@ -87,7 +87,7 @@ def rows_and_windows(
         for half in HALF_WIDTHS
         if SHORTEST_LOGS * half < shortest or half == HALF_WIDTHS[0]
     ]
-    found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION]
+    found = [made for made in tried if are_enough(made)]
     if not found:
         return tried[0]
     fits = [_WidthFit.of(made, logs) for made in found]
@@ -95,6 +95,11 @@ def rows_and_windows(
     least = min(one.share for one in fits)
     enough = max(NEARLY_LEAST * least, least + AS_WELL_LEFT)
     return next(one.made for one in fits if one.share <= enough)
+
+
+def are_enough(made: Sequence[MotionRows]) -> bool:
+    """Whether the rows of all logs are enough to fit the equation."""
+    return sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION
 
 
 def converged_rows(logs: Sequence[MotionLog], *, gravity: bool = False) -> list[MotionRows]:

@@ -1,7 +1,9 @@
 """Reasons of a fit by the equation of motion alone."""
 
 import numpy as np
+import pytest
 
+from identification.estimation.prescribed_motion import _reasoned as reasoned
 from identification.estimation.prescribed_motion import fit_prescribed, way_of
 from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
@@ -33,6 +35,17 @@ def test_a_wheel_of_one_speed_has_the_force_that_it_was_logged_with() -> None:
     )
     predicted = fit.friction.F_cp + 5.0 * fit.friction.F_vp
     assert abs(predicted - 0.15) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.87, "as well without"), (4e-3, "0.4% of the force")]
+)
+def test_a_mass_is_not_withheld_for_an_inertia_of_account(share: float, said: str) -> None:
+    """That inertia explains 87 % of the force was given as the reason for no mass."""
+    t = np.arange(2000, dtype=np.float64) * 2e-3
+    log = Log("lift", {"t": t, "y": 0.1 * np.sin(9.0 * t), "F": np.cos(9.0 * t)})
+    recorded = recorded_logs([log], Rig("force"), "force")
+    assert said in str(reasoned({}, np.ones(9), share, recorded)["m"].reason)
 
 
 def test_a_mass_that_the_equation_does_without_is_slight_in_any_motion() -> None:
