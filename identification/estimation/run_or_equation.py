@@ -125,32 +125,32 @@ def answered(
 
 
 def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
-    """The fit by `likeliest`, or that of the equation of motion alone, where the fit leaves clearly
-    more of that equation than least squares do on held-out stretches: its run is not followed, or
-    only down to a noise that the equation averages out; or where it identifies less; either as
+    """The fit by `likeliest`, or that of the equation of motion alone, where its run leaves clearly
+    more of that equation than least squares do on held-out stretches: it is not followed, or only
+    down to a noise that the equation averages out; or where the fit identifies less; either as
     sliding shows it. Source: cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111; the
     comparison is ours."""
-    fit = as_sliding_shows(likeliest(fit, recorded), recorded)
+    reported = as_sliding_shows(likeliest(fit, recorded), recorded)
     if fit.effects:
-        return fit
+        return reported
     left = left_by(fit.friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
     # Windows may identify next to nothing: where they do not follow, or a measured force drifts.
-    if surer or _identified(fit) < len(FIVE):
+    if surer or _identified(reported) < len(FIVE):
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
         other = None if other is None else as_sliding_shows(other, recorded)
         if left is None and other is not None and is_no_run(other.chi_square):
             # Of few rows, or beside a band that takes the sliding, it leaves far more than noise.
-            if not (fit.adequate or _identified(fit)):
+            if not (fit.adequate or _identified(reported)):
                 return withheld(other, PREDICTS_WHY)
             other = None
-        if other is not None and (surer or _identified(other) > _identified(fit)):
+        if other is not None and (surer or _identified(other) > _identified(reported)):
             # A run that is followed to the noise lacks nothing, whichever gives its parameters.
             other = replace(other, adequate=fit.adequate)
             return other if left is None else _unless_unexplained(other, left)
-    return fit if left is None else _unless_unexplained(fit, left)
+    return reported if left is None else _unless_unexplained(reported, left)
 
 
 def shown_sliding(plant: Plant) -> list[str]:

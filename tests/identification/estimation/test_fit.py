@@ -273,15 +273,22 @@ def test_a_run_of_which_sliding_shows_less_than_it_states_leaves_the_equation(
     run: Any = Told(table(1), True, "run", (near,), dict.fromkeys(FIVE, known))
     none = dict.fromkeys(FIVE, Estimate(None, "N", reason="wider"))
     recorded: Any = SimpleNamespace(plain=[log], logs=())
-    monkeypatch.setattr(run_or_equation, "left_by", lambda *_: LeftOfEquation(1.0, 1.0, 100.0))
+    compared, likelier = list[Karnopp](), replace(run, friction=table(2))
+
+    def left_by(friction: Karnopp, _: RecordedLogs) -> LeftOfEquation:
+        compared.append(friction)
+        return LeftOfEquation(1.0, 1.0, 100.0)
+
+    monkeypatch.setattr(run_or_equation, "left_by", left_by)
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: replace(run, name="equation"))
-    monkeypatch.setattr(run_or_equation, "likeliest", lambda fit, _: fit)
+    monkeypatch.setattr(run_or_equation, "likeliest", lambda *_: likelier)
     monkeypatch.setattr(
         run_or_equation, "as_sliding_shows",
         lambda fit, _: replace(fit, estimates=none) if fit.name == "run" else fit,
     )  # fmt: skip
     found: Any = run_or_equation.on_the_floor(run, recorded)
     assert found.name == "equation"
+    assert compared == [run.friction]  # its own, which the run has been followed with
 
 
 def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch) -> KarnoppFit:
