@@ -104,17 +104,19 @@ def with_model_error(rows: Rows) -> Rows:
     Natl. Bur. Stand. 87 (1982) 377.
     """
     free = len(rows.b) - rows.X.shape[1]
+    most = float(np.sum(rows.b**2)) / max(free, 1)
 
-    def more(variance: float) -> float:
+    def wider(share: float) -> Rows:
+        """The rows with so much of all of the force's square as that variance."""
+        return replace(rows, sd=np.sqrt(rows.sd**2 + share * most))
+
+    def more(share: float) -> float:
         """What is left beyond what these rows should leave, as a share of it."""
-        wider = replace(rows, sd=np.sqrt(rows.sd**2 + variance))
-        return float(solve_rows(wider).cost / free - 1.0)
+        return float(solve_rows(wider(share)).cost / free - 1.0)
 
     if free <= 0 or more(0.0) <= 0.0:
         return rows
-    most = float(np.sum(rows.b**2)) / free
-    variance = float(brentq(more, 0.0, most, rtol=CLOSE_VARIANCE)) if more(most) < 0.0 else most
-    return replace(rows, sd=np.sqrt(rows.sd**2 + variance))
+    return wider(float(brentq(more, 0.0, 1.0, rtol=CLOSE_VARIANCE)) if more(1.0) < 0.0 else 1.0)
 
 
 def least_squares(A: Array, b: Array) -> Array:

@@ -79,3 +79,5 @@ def test_the_log_of_the_finest_sensor_does_not_decide_where_the_equation_errs() 
     assert np.max(np.abs(of(rows) - TRUTH)) > 2.0 * np.max(np.abs(of(wider) - TRUTH))
     left = (wider.b - wider.X @ of(wider)) / wider.sd
     assert np.sum(left**2) == pytest.approx(397.0, rel=1e-2)
+    small = with_model_error(replace(rows, b=1e-9 * rows.b, X=1e-9 * rows.X, sd=1e-9 * rows.sd))
+    assert small.sd == pytest.approx(1e-9 * wider.sd, rel=1e-3)
