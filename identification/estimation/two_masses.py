@@ -168,7 +168,7 @@ def _one_body(cut: Sequence[_Window], h: float) -> float:
     return float(left @ left)
 
 
-def _best_lag(cut: Sequence[_Window], system: "_Linear", h: float) -> float:
+def _best_lag(cut: Sequence[_Window], system: _Linear, h: float) -> float:
     """The lag of the force in samples at which a system leaves least of all windows."""
 
     def square(lag: float) -> float:
@@ -288,9 +288,7 @@ def _drift(t: Array) -> Array:
     return np.asarray(np.column_stack([np.ones(len(t)), t]), dtype=np.float64)
 
 
-def _left(
-    cut: Sequence[_Window], system: _Linear, lag: float, h: float
-) -> tuple[Array, Array]:  # fmt: skip
+def _left(cut: Sequence[_Window], system: _Linear, lag: float, h: float) -> tuple[Array, Array]:
     """What a linear system leaves of all windows beside its free motion under a force late by `lag`
     samples, and its inputs' sizes."""
     X, b = _columns(cut, system, lag, h)
@@ -298,9 +296,7 @@ def _left(
     return np.asarray(b - X @ theta), theta
 
 
-def _columns(
-    cut: Sequence[_Window], system: _Linear, lag: float, h: float
-) -> tuple[Array, Array]:  # fmt: skip
+def _columns(cut: Sequence[_Window], system: _Linear, lag: float, h: float) -> tuple[Array, Array]:
     """What each input of unit size makes of the position in all windows, (r, 5), and the position
     (r,), both beside the system's free motion."""
     sampled: Any = cont2discrete((system.top, system.below), h, "zoh")

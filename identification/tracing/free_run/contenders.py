@@ -64,7 +64,8 @@ def entrant(trial: Trial, setting: Setting) -> Entrant | None:
         errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        at, best = int(np.argmin(costs)), plants[int(np.argmin(costs))]
+        at = int(np.argmin(costs))
+        best = plants[at]
         done = refit(best, setting.short, setting.drive, prior=even(best), effort="quick")
     except UserError:  # two effects of a kind that a plant takes one of
         return None

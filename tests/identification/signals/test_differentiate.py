@@ -178,3 +178,10 @@ def test_a_position_with_noise_has_no_step(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     y = np.sin(0.01 * rng.uniform(0.2, 5.0) * np.arange(n)) + 1e-3 * rng.standard_normal(n)
     assert resolution(y) == 0.0
+
+
+@pytest.mark.parametrize(("levels", "off"), [(400, 0.15), (12, 0.05)])
+def test_levels_far_off_a_step_or_few_of_them_show_none(levels: int, off: float) -> None:
+    rng = np.random.default_rng(5)
+    y = 0.1 * (np.arange(levels) + off * rng.choice([-1.0, 1.0], levels))
+    assert resolution(rng.permutation(y)) == 0.0
