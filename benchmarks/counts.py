@@ -10,8 +10,10 @@ others judge. Exit status 0 in any case.
 
 import argparse
 import sys
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.signals.differentiate import resolution
@@ -27,7 +29,7 @@ def motion(rng: np.random.Generator) -> Array:
     return np.asarray(wave + rng.uniform(0.0, 1.0) * t)
 
 
-def is_seen(shown: Array, step: float) -> bool:
+def is_seen(shown: NDArray[np.floating[Any]], step: float) -> bool:
     """Whether counts are seen, and their step, or a whole number of them, is found."""
     found = resolution(np.asarray(shown, dtype=np.float64)) / step
     return found > 0.0 and round(found) >= 1 and abs(found - round(found)) < RIGHT
@@ -58,8 +60,8 @@ def main() -> int:
             ):
                 missed[how] += not is_seen(shown, step)
         print(
-            f"seed {seed}: of {given.files} files missed {missed['exact']} exact, {missed['float32']} in"
-            f" float32, {missed['few']} in few decimals; {false} with noise taken for counts"
+            f"seed {seed}: of {given.files} files missed {missed['exact']} exact,"
+            f" {missed['float32']} in float32, {missed['few']} in few decimals; {false} with noise taken for counts"
         )
     return 0
 
