@@ -42,26 +42,21 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=400)
     given = parser.parse_args()
     for seed in given.seeds:
-        rng, missed, false = (
-            np.random.default_rng(seed),
-            dict.fromkeys(("exact", "32", "few"), 0),
-            0,
-        )
+        rng, false = np.random.default_rng(seed), 0
+        missed = dict.fromkeys(("exact", "float32", "few"), 0)
         for _ in range(given.files):
             y = motion(rng)
             false += resolution(y + 1e-3 * rng.standard_normal(len(y))) > 0.0
             step = rng.uniform(1e-3, 0.05)
             counted = step * np.round(y / step)
-            few = np.round(counted, int(np.ceil(-np.log10(OF_A_STEP * step))))
-            for how, shown in (
-                ("exact", counted),
-                ("32", counted.astype(np.float32)),
-                ("few", few),
-            ):
-                missed[how] += not is_seen(shown, step)
+            missed["exact"] += not is_seen(counted, step)
+            missed["float32"] += not is_seen(counted.astype(np.float32), step)
+            digits = int(np.ceil(-np.log10(OF_A_STEP * step)))
+            missed["few"] += not is_seen(np.round(counted, digits), step)
         print(
             f"seed {seed}: of {given.files} files missed {missed['exact']} exact,"
-            f" {missed['float32']} in float32, {missed['few']} in few decimals; {false} with noise taken for counts"
+            f" {missed['float32']} in float32, {missed['few']} in few decimals;"
+            f" {false} with noise taken for counts"
         )
     return 0
 
