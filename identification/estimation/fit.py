@@ -34,21 +34,19 @@ from identification.estimation.recorded_logs import (
     recorded_logs,
 )
 from identification.estimation.regression.actuator_fit import fit_actuator
-from identification.estimation.regression.row_fit import rough
 from identification.estimation.run_or_equation import answered, likeliest
 from identification.estimation.shown_in_sliding import as_sliding_shows
 from identification.estimation.structure_fit import (
     FittedStructure,
     by_exact_force,
     plain_structure,
-    searched,
 )
 from identification.estimation.surroundings import (
     surrounding_estimates,
     widened_friction,
 )
 from identification.estimation.two_masses import of_two_masses, two_masses
-from identification.estimation.windowed_run.parameters import even, is_unanchored
+from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
@@ -65,7 +63,6 @@ from identification.thresholds import (
 
 PRESCRIBED_WHY = "prescribed motion: inertia is negligible in the force"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
-SEARCHES = 2  # for the plain plant
 
 
 def fit_plant(
@@ -183,20 +180,14 @@ def finished(
     found: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
     *, by: Drive | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
-    """The fit from a plain structure: searched where more than noise is left, then converged;
-    quick: neither searched nor fitted over whole runs.
+    """The fit from a plain structure, converged; quick: not fitted over whole runs.
 
     by: the drive that was asked for; without one, a run driven by the command that a nonlinear
     actuator spoils is driven by the measured force instead.
     """
-    search, other, forced_rng = rng.spawn(3)
+    other, forced_rng = rng.spawn(2)
     if found.prescribed and is_prescribed(recorded) and not recorded.steps:
         return as_sliding_shows(fit_prescribed(recorded, PRESCRIBED_WHY), recorded)
-    # A motor's stops are searched already.
-    hopeless = is_unanchored(found.plant, recorded.drive) and rough(found.outcomes)
-    followed = found.misfit <= COMPLETE and not found.prescribed
-    if not (quick or followed or recorded.by_motor or hopeless):
-        found = searched(found, recorded, search, report, SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:

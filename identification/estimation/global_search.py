@@ -4,7 +4,6 @@ The distance between a log and a simulated run with stick and slip has many loca
 gradient stays in the nearest. The population is evaluated in blocks of lanes, on all cores.
 """
 
-import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -19,11 +18,7 @@ CONVERGED = 1e-4  # relative spread of the costs at which the population has met
 
 
 def evolved(
-    cost: Callable[[Array], Array],
-    first: Array,
-    generations: int,
-    rng: np.random.Generator,
-    on_progress: Callable[[float], None] | None = None,
+    cost: Callable[[Array], Array], first: Array, generations: int, rng: np.random.Generator
 ) -> Array:
     """The best member (d,) after at most `generations`.
 
@@ -32,11 +27,6 @@ def evolved(
     Optim. 11 (1997) 341; drawn to the best as in Zhang, Sanderson, IEEE Trans. Evol. Comput. 13
     (2009) 945.
     """
-    count = itertools.count(1)
-
-    def generated(intermediate_result: object) -> None:
-        if on_progress:
-            on_progress(next(count) / generations)
 
     def cost_of(z: Array) -> Array:
         return np.nan_to_num(cost(z.T), nan=np.inf, posinf=np.inf)
@@ -45,6 +35,6 @@ def evolved(
     found = search(
         cost_of, [(0.0, 1.0)] * first.shape[1], init=first, maxiter=generations,
         strategy="currenttobest1bin", mutation=MUTATION, recombination=CROSSOVER, tol=CONVERGED,
-        polish=False, vectorized=True, updating="deferred", callback=generated, rng=rng,
+        polish=False, vectorized=True, updating="deferred", rng=rng,
     )  # fmt: skip
     return np.asarray(found.x, dtype=np.float64)

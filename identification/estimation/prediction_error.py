@@ -46,43 +46,28 @@ class PredictionErrorFit:
     latent: LatentForces
 
     @property
-    def is_known(self) -> bool:
-        """Whether nothing of account is missing that a latent force, rather than these parameters,
-        would stand for."""
+    def is_likelier(self) -> bool:
+        """Whether the logs are significantly likelier, and nothing of account is missing that a
+        latent force, rather than these parameters, would stand for."""
         p = self.plant.friction
         share = self.latent.share(max(p.F_cp, p.F_cn))
-        return share is not None and share <= MATERIAL and bool(np.all(self._variances > 0.0))
-
-    @property
-    def is_likelier(self) -> bool:
-        """Whether they are known, and the logs significantly likelier."""
-        return self.is_known and significant(self.gain, len(self.names))
-
-    @property
-    def sd(self) -> dict[str, float]:
-        """Standard deviations by name."""
-        return dict(zip(self.names, np.sqrt(self._variances).tolist(), strict=True))
-
-    @property
-    def _variances(self) -> Array:
-        return np.diag(self.covariance)
+        known = share is not None and share <= MATERIAL and np.all(np.diag(self.covariance) > 0.0)
+        return bool(known) and significant(self.gain, len(self.names))
 
 
 def prediction_error_fit(
     plant: Plant, names: Sequence[str], logs: Sequence[MotionLog], slowest: float,
-    begun: LatentForces | None = None,
 ) -> PredictionErrorFit | None:  # fmt: skip
     """The parameters of a plant that make the position measured above a speed [m/s] likeliest, from
     those that it has; None where none of them is more than 0.
 
-    begun: what the plant lacks on these logs, where that is known. By (1): prediction-error method,
-    Ljung (1999), 7.2.
+    By (1): prediction-error method, Ljung (1999), 7.2.
     """
     own = tuple(n for n, x in zip(names, values_of(plant, names), strict=True) if abs(x) > AT_ZERO)
     if not own:
         return None
     unit = units_in(plant, own, values_of(plant, own))
-    begun = noise = begun or latent_forces(plant, logs, slowest)
+    begun = noise = latent_forces(plant, logs, slowest)
     x = values_of(plant, own) / unit
     for k in range(ROUNDS):
 

@@ -16,10 +16,8 @@ from identification.thresholds import ADEQUATE, MATERIAL, OF_ACCOUNT
 from identification.tracing.model_errors import (
     OnTest,
     errors_of,
-    follows,
     lacks,
     on_test,
-    rest_share_left,
     row_noise,
     seen_by,
     share_left,
@@ -113,17 +111,16 @@ class HeldOut:
     @cached_property
     def share(self) -> float:
         """Share of what was missing on the test logs, that is left: of the force where it was of
-        account, since a run may lose its way at a stop by chance, else of an error; of effects of
-        stops and reversals of the motion at rest, if that is less."""
+        account, since a run may lose its way at a stop by chance, else of an error."""
         plain = self.plain.model
         of_force = None if plain is self.model else self._force_left(self.missing)
         if of_force is not None:
-            return min(of_force**2, self._of_rest)
+            return of_force**2
         if self._of_equation is not None:
-            return min(self._of_equation, self._of_rest)
+            return self._of_equation
         runs = plain is not self.model and not plain.prescribed and not self.model.prescribed
         by_run = runs and plain.misfit > ADEQUATE
-        return min(share_left(self.was, self.now, self.noise, by_run), self._of_rest)
+        return share_left(self.was, self.now, self.noise, by_run)
 
     @cached_property
     def _of_equation(self) -> float | None:
@@ -145,16 +142,6 @@ class HeldOut:
         if not significant(2.0 * missing.gained, sizes):
             return None
         return max(now**2 - noise**2, 0.0) / (was**2 - noise**2)
-
-    @cached_property
-    def _of_rest(self) -> float:
-        """Share that effects of stops and reversals leave of the motion at rest, infinite of others
-        and where none is seen."""
-        steps = self.choice.steps
-        if not any(step.candidate.effect.place.at_rest for step in steps):
-            return np.inf
-        left = rest_share_left(self.model.stage, steps, self.unseen)
-        return np.inf if left is None else left
 
     @cached_property
     def drift(self) -> ParameterDrift:
@@ -281,14 +268,11 @@ class HeldOut:
 
     @property
     def evidence(self) -> Evidence:
-        """Of the effects found, by the share of the missing force that they leave: none where the
-        run leaves nothing but noise; of those that act in stops alone, of which the force while
-        sliding says nothing, by the error if that is less, and by it where hardly any force was
-        missing. Of a machine that changed between the logs with what has changed in both models,
-        since no effect is to explain that."""
+        """Of the effects found, by the share of the missing force that they leave; of those that
+        act in stops alone, of which the force while sliding says nothing, by the error if that is
+        less, and by it where hardly any force was missing. Of a machine that changed between the
+        logs with what has changed in both models, since no effect is to explain that."""
         steps = self.choice.steps
-        if follows(self.was, self.now):
-            return evidence(0.0, len(steps))
         of_error = float(np.sqrt(self.share))
         missing = self._missing(self.changed) if self.changed and steps else self.missing
         of_force = self._force_left(missing)

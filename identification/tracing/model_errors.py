@@ -10,7 +10,6 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
-    REST,
     MotionLog,
 )
 from identification.estimation.regression.row_fit import RowFit, rms
@@ -103,28 +102,6 @@ def share_left(before: OnTest, after: OnTest, noise: Errors, by_run: bool = Fals
 def _beyond_noise(before: float, after: float, least: float) -> float | None:
     """Share of a mean square beyond noise (1) that is left; None where no more than `least` was."""
     return max(after - 1.0, 0.0) / (before - 1.0) if before > least else None
-
-
-def rest_share_left(
-    stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]
-) -> float | None:
-    """Share of the motion seen at rest that effects leave, beyond the position's noise; None where
-    none is seen, as of a rigid contact. stage: that of the model with the effects."""
-    before, after = (
-        stacked(seen_by(replace(stage, chosen=chosen), steps, logs).parts[REST])
-        for chosen in ((), stage.chosen)
-    )
-    if not len(before.b):
-        return None
-    was, now = (float(np.mean((rows.b / rows.sd) ** 2)) for rows in (before, after))
-    return _beyond_noise(was, now, ASTRAY)
-
-
-def follows(before: OnTest, after: OnTest) -> bool:
-    """Whether the run leaves nothing but noise of the position, where it had left more."""
-    if before.misfit is None or after.misfit is None:
-        return False
-    return before.misfit > ADEQUATE and after.misfit <= COMPLETE
 
 
 def predicted(left: OnTest, noise: Errors) -> bool:

@@ -39,8 +39,7 @@ EXPERIMENT_OPTIONS = options_of(
 )
 
 IDENTIFY_STAGES = {
-    "refining": (0.0, 0.4),
-    "searching": (0.4, 0.6),
+    "refining": (0.0, 0.5),
     "weighing": (0.5, 0.95),
     "posterior": (0.6, 1.0),
 }
@@ -51,7 +50,6 @@ TRACE_STAGES = {
     "refitting": (0.55, 0.75),
     "judging": (0.75, 0.9),
     "converging": (0.45, 0.5),
-    "searching": (0.5, 0.7),
     "weighing": (0.6, 0.95),
     "reporting": (0.95, 1.0),
 }

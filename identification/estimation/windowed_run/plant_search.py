@@ -21,7 +21,6 @@ from identification.estimation.windowed_run.windows import Freed, compared, star
 from identification.model.estimates import Drive
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Plant
-from identification.progress import Progress
 from identification.simulation.karnopp_lanes import WIDTH
 
 POPULATION, GENERATIONS = 64, 150
@@ -96,9 +95,8 @@ class PlantCost:
 
 
 def searched_plant(
-    plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
-    report: Progress,
-) -> Plant:  # fmt: skip
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator
+) -> Plant:
     """The plant of one global search for the nine parameters, without intervals.
 
     plant: the first one, whose actuator stays. Raises Halted where the logs' `halt` says so.
@@ -111,5 +109,5 @@ def searched_plant(
         return cost_of(box.nine(z))
 
     first = box.around(plant.friction.array, POPULATION, rng)
-    best = evolved(cost, first, GENERATIONS, rng, lambda share: report("searching", share))
+    best = evolved(cost, first, GENERATIONS, rng)
     return replace(plant, friction=Karnopp.from_array(box.nine(best[np.newaxis])[0]))

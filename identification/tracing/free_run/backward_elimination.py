@@ -11,8 +11,8 @@ import numpy as np
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
-from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
-from identification.estimation.structure_fit import FittedStructure, band, fitted_structure
+from identification.estimation.regression.row_fit import RowFit, mean_square
+from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.progress import Halt
@@ -72,25 +72,11 @@ def fitted(choice: Choice, setting: Setting) -> FittedStructure:
 
 
 def _model(choice: Choice, setting: Setting) -> FittedStructure:
-    plain = setting.plain.model
-    near = None if plain.prescribed else plain.plant.friction
-    model = fitted_structure(
-        choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
-    )  # fmt: skip
+    model = fitted_structure(choice.end, choice.base, choice.effects, setting.recorded, setting.rng)
     if setting.halt.reached() and not model.prescribed:
         keys = ", ".join(step.candidate.effect.key for step in choice.steps)
         setting.halt.left_out(f"the refinement of {keys} on the free run, to its end")
     return model
-
-
-def with_band(choice: Choice, setting: Setting) -> Choice:
-    """The choice beside the band of its run, above which its equations are to hold, where these do
-    beside any and the run is followed."""
-    model = _of_explained(choice, setting)
-    if model is None or model.prescribed or model.misfit > ASTRAY:
-        return choice
-    end = replace(choice.end, band=band(model))
-    return replace(choice, end=end, base=base_fits(end))
 
 
 def suffices(choice: Choice, setting: Setting) -> bool:

@@ -27,7 +27,6 @@ from identification.tracing.free_run.backward_elimination import (
     earned,
     enough,
     equations_explained,
-    fitted,
     only,
     with_steps,
 )
@@ -86,7 +85,7 @@ def contest(
         report("judging", 0.5 + 0.5 * (i + 1) / SEARCHED)
     winner = min(found, key=lambda one: one.misfit)
     rivals = [one for one in found if one.effect.key != winner.effect.key]
-    done = _from_equations(winner, on_whole_logs(winner, setting), setting)
+    done = on_whole_logs(winner, setting)
     if done.misfit > decisive(model.misfit, rivals):
         return None
     bare = on_whole_logs(without_effect(winner), setting)
@@ -135,18 +134,8 @@ def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> Mot
     return shortened(one, seconds, int(begins[np.argmax(sums[begins + size] - sums[begins])]))
 
 
-def _from_equations(winner: RunContender, done: Refit, setting: Setting) -> Refit | FittedStructure:
-    """The winner as refined, or from what the equations make of the body beside its effect, if that
-    is followed better: the plain plant's numbers are bent to do without it."""
-    if done.misfit <= COMPLETE or not is_unanchored(winner.plant, setting.drive):
-        return done
-    choice, _ = _taken(winner, done, (), setting, setting.plain.model.misfit)
-    again = fitted(choice, setting)
-    return again if not again.prescribed and again.misfit < done.misfit else done
-
-
 def _taken(
-    winner: RunContender, done: Refit | FittedStructure, rivals: Sequence[RunContender],
+    winner: RunContender, done: Refit, rivals: Sequence[RunContender],
     setting: Setting, before: float,
 ) -> tuple[Choice, FittedStructure]:  # fmt: skip
     """The choice with the winner as its last step, and the model; before: misfit without it."""

@@ -32,8 +32,9 @@ def from_plant(p: Plant, seed: int = 0) -> PredictionErrorFit:
 
 def off(found: PredictionErrorFit) -> list[float]:
     """Errors of the five in their deviations."""
-    pairs = ((getattr(found.plant.friction, n) - getattr(table(1), n), n) for n in found.names)
-    return [error / found.sd[name] for error, name in pairs]
+    p, sd = found.plant.friction, np.sqrt(np.diag(found.covariance)).tolist()
+    errors = (getattr(p, name) - getattr(table(1), name) for name in found.names)
+    return [error / s for error, s in zip(errors, sd, strict=True)]
 
 
 def test_bent_parameters_give_way_to_those_of_the_plant() -> None:
@@ -41,7 +42,7 @@ def test_bent_parameters_give_way_to_those_of_the_plant() -> None:
     found = from_plant(Plant(replace(p, m=1.03 * p.m, F_cp=0.97 * p.F_cp, F_vn=1.05 * p.F_vn)))
     assert found.is_likelier and found.gain > 100.0
     assert np.max(np.abs(off(found))) < 4.0
-    assert found.sd["m"] < 0.01 * p.m
+    assert found.covariance[0, 0] ** 0.5 < 0.01 * p.m
     assert found.plant.friction.F_sp == p.F_sp  # of which sliding says nothing
 
 

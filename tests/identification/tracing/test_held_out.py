@@ -152,9 +152,8 @@ def latent(force: float, sd: float) -> LatentForces:
     ],
 )
 def test_where_hardly_any_force_was_missing_the_error_says_how_probable_an_effect_is(
-    force: float, sd: float, expected: float, monkeypatch: pytest.MonkeyPatch
+    force: float, sd: float, expected: float
 ) -> None:
-    monkeypatch.setattr(held_out, "follows", lambda *_: False)
     evaluated, n = replace(judged()), np.ones(8)
     sliding = Residual("mechanical", n, n, n, n, n, {})
     left = MissingForce(latent(force, sd), latent(0.5 * force, 0.5 * sd), sliding)

@@ -2,22 +2,17 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from identification.effects._library import built_in
-from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure
 from identification.tracing.model_errors import (
     OnTest,
-    follows,
     lacks,
     predicted,
-    rest_share_left,
     share_left,
 )
 from identification.tracing.result import Errors
-from tests.identification.motor_logs import H, made, plant, seen, strokes
+from tests.identification.motor_logs import plant
 from tests.identification.test_thresholds import stage
 
 
@@ -57,34 +52,6 @@ def test_a_run_that_lacks_much_comes_before_an_equation_that_lacks_little() -> N
     assert share_left(left_of(1.0, 1.5, 21.0), left_of(1.0, 1.5, 6.0), noise) == 0.25
     assert share_left(left_of(1.0, 2.5, 21.0), left_of(1.0, 2.5, 6.0), noise) == 1.0
     assert share_left(left_of(1.0, 1.5, 1.4), left_of(1.0, 1.5, 1.0), noise) == 1.0
-
-
-def test_bristles_explain_the_motion_seen_at_rest_of_which_a_rigid_body_has_none() -> None:
-    swung = 0.3 * np.sin(2.0 * np.pi * H * np.arange(4000))  # at rest, below breakaway
-    command = np.concatenate([strokes(6000, 4), np.zeros(500), swung])
-    effect, values = built_in()["presliding"], {"sigma_0": 2e4}
-    on_bristles, rigid = (
-        [seen(made(4, own, len(command), command=command))]
-        for own in ({"presliding": values}, None)
-    )
-    start, _ = first_stage(on_bristles, False)
-    right, weak = (
-        replace(start, chosen=((effect, {"sigma_0": sigma_0}),)) for sigma_0 in (2e4, 4e4)
-    )
-    of_right, of_weak = (rest_share_left(own, (), on_bristles) for own in (right, weak))
-    assert of_right is not None and of_right < 0.02
-    assert of_weak is not None and 0.1 < of_weak < 0.5
-    assert rest_share_left(right, (), rigid) is None
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "expected"),
-    [(21.0, 1.05, True), (21.0, 1.2, False), (1.4, 1.0, False), (None, 1.0, False)],
-)
-def test_a_run_follows_that_leaves_noise_where_more_had_been_left(
-    before: float | None, after: float, expected: bool
-) -> None:
-    assert follows(left_of(1.0, None, before), left_of(1.0, None, after)) == expected
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
-from identification.progress import Halt, Halted, quiet
+from identification.progress import Halt, Halted
 from tests.identification.plants import made_log, table
 
 RIG = Rig("force")
@@ -41,7 +41,7 @@ def test_the_truth_costs_least(drive: Drive) -> None:
 def test_a_search_comes_near_enough_for_a_refinement(drive: Drive) -> None:
     recorded = recorded_logs([made_log(table(1), seed=1)], RIG, drive)
     first, rng = first_plant(recorded), np.random.default_rng(0)
-    found = searched_plant(first, recorded.logs, drive, rng, quiet)
+    found = searched_plant(first, recorded.logs, drive, rng)
     left = misfit(found, recorded.logs, drive)
     assert left < 0.2 * misfit(first, recorded.logs, drive) or left < 5.0
     assert found.actuator == first.actuator
@@ -51,4 +51,4 @@ def test_a_search_is_halted() -> None:
     recorded = recorded_logs([made_log(table(1), seed=1, seconds=3.0)], RIG)
     logs = [replace(one, halt=Halt(lambda: False)) for one in recorded.logs]
     with pytest.raises(Halted):
-        searched_plant(first_plant(recorded), logs, "command", np.random.default_rng(0), quiet)
+        searched_plant(first_plant(recorded), logs, "command", np.random.default_rng(0))

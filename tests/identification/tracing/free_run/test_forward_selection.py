@@ -3,8 +3,6 @@
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.parameters import even
 from identification.thresholds import COMPLETE
-from identification.tracing.free_run import contenders, forward_selection
+from identification.tracing.free_run import contenders
 from identification.tracing.free_run.backward_elimination import Setting, equations_explained
 from identification.tracing.free_run.contenders import Entrant, RunContender, less_load
 from identification.tracing.free_run.forward_selection import (
@@ -157,7 +155,6 @@ def test_those_that_follow_best_after_a_few_steps_are_searched(
     monkeypatch.setattr(f"{place}.entrant", lambda *_: next(waiting))
     monkeypatch.setattr(f"{place}.contender", contender)
     monkeypatch.setattr(f"{place}.on_whole_logs", lambda *_: lost)
-    monkeypatch.setattr(f"{place}._from_equations", lambda *_: lost)
     assert contest(none, lost, setting, lambda _s, _p: None) is None
     assert searched == [2.0, 5.0, 6.0]
 
@@ -218,32 +215,6 @@ def test_no_contest_where_sliding_itself_is_not_explained() -> None:
     assert not equations_explained(shown.base)
     clean, none = first_stage([seen(shaken)], False)
     assert equations_explained(choose(clean, none, {}, rng, lambda _s, _p: None).base)
-
-
-@pytest.mark.parametrize(("left", "again", "better"), [(20.0, 3.0, True), (20.0, 30.0, False)])
-def test_a_winner_begins_from_the_equations_too(
-    left: float, again: float, better: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The plain plant's body is bent to do without the effect: of a motor behind play the right
-    one, from it, was followed too badly to be named."""
-    true = plant({"backlash": {"width": 4e-4}})
-    winner: Any = SimpleNamespace(plant=true)
-    setting: Any = SimpleNamespace(
-        drive="command", plain=SimpleNamespace(model=SimpleNamespace(misfit=40.0))
-    )
-    done, anew = SimpleNamespace(misfit=left), SimpleNamespace(misfit=again, prescribed=False)
-    monkeypatch.setattr(forward_selection, "_taken", lambda *_: (None, None))
-    monkeypatch.setattr(forward_selection, "fitted", lambda *_: anew)
-    found: Any = forward_selection._from_equations(winner, done, setting)  # type: ignore[arg-type]
-    assert (found is anew) == better
-
-
-def test_what_follows_to_the_noise_begins_nowhere_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(forward_selection, "_taken", None)
-    done: Any = SimpleNamespace(misfit=0.9)
-    winner: Any = SimpleNamespace(plant=plant())
-    setting: Any = SimpleNamespace(drive="command")
-    assert forward_selection._from_equations(winner, done, setting) is done
 
 
 def test_a_bristle_begins_with_limits_above_sliding_friction() -> None:
