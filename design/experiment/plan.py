@@ -43,8 +43,8 @@ from identification.errors import BadModel, NotIdentifiable, UserError
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.windowed_run.parameters import names_of, values_of
+from identification.estimation.windowed_run.run_errors import Judge
 from identification.experiment.information import (
-    Errors,
     Information,
     information,
     log_errors,
@@ -104,7 +104,7 @@ class Bench:
         """A log as the estimator takes it."""
         return recorded_logs([log], self.model.rig, self.drive)
 
-    def errors(self, plant: Plant, run: LoopRun) -> Errors:
+    def errors(self, plant: Plant, run: LoopRun) -> Judge:
         """Errors of plants along a run without noise; where the measured force drives a fit's runs,
         with the noise that it would have."""
         log, fit = self.log(run), self.model.fit

@@ -106,8 +106,9 @@ def taken_in(
             pairs[i] += 1
         last[i], last_variance[i] = float(change[i]), float(own[i])
     return DriftState(
-        state.model, state.names, _tuple(mean), _tuple(weight), tuple(map(_tuple, spread)),
-        tuple(last), tuple(last_variance), tuple(squares), tuple(pairs), state.logs + 1,
+        state.model, state.names, tuple(mean.tolist()), tuple(weight.tolist()),
+        tuple(map(tuple, spread.tolist())), tuple(last), tuple(last_variance), tuple(squares),
+        tuple(pairs), state.logs + 1,
     )  # fmt: skip
 
 
@@ -118,11 +119,11 @@ def mean_change(state: DriftState, model: Array, margin: float) -> Change:
     While few logs have been seen only a part of the weight is reached: change and error are those
     of the part.
     """
-    at = np.flatnonzero(np.array(state.weight) > 0)
+    at = np.flatnonzero(state.weight)
     w, grid = np.array(state.weight)[at], np.ix_(at, at)
     covariance = np.array(state.covariance)[grid] / np.outer(w, w) + model[grid]
-    numbers = tuple(int(i) for i in at)
-    return Change(numbers, np.array(state.mean)[at] / w, covariance, np.full(len(at), margin))
+    names = tuple(state.names[i] for i in at)
+    return Change(names, np.array(state.mean)[at] / w, covariance, margin)
 
 
 def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
@@ -154,7 +155,3 @@ def mean_run(parameters: int, smoothing: float, square: float) -> float:
     chance = np.diff(below, axis=1, prepend=0.0)
     runs = np.linalg.solve(np.eye(RINGS + 1) - chance, np.ones(RINGS + 1))
     return float(runs[0])
-
-
-def _tuple(values: Array) -> tuple[float, ...]:
-    return tuple(float(v) for v in values)

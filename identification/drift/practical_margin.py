@@ -21,13 +21,13 @@ from identification.thresholds import CHANCE_LEVEL
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Changes (k,) of the parameters numbered `at`, their covariance (k, k), and the margin (k,)
-    within which each does not matter."""
+    """Changes (k,) of the parameters `names`, their covariance (k, k), and the margin within which
+    each does not matter."""
 
-    at: tuple[int, ...]
+    names: tuple[str, ...]
     change: Array
     covariance: Array
-    margin: Array
+    margin: float
 
     @cached_property
     def square(self) -> float:
@@ -46,7 +46,7 @@ class Change:
         brings the distance down most, as long as it does so surely; then those are taken back that
         the rest makes needless. Parameters that a log cannot separate do not all move.
         """
-        d, left = len(self.at), self.square
+        d, left = len(self.names), self.square
         chosen: list[int] = []
         while left > 0.0 and len(chosen) < d:
             tried = {i: self.without((*chosen, i)) for i in range(d) if i not in chosen}
@@ -73,12 +73,10 @@ class Change:
         surely = beyond >= self._sure * np.diag(self.covariance)
         sure = tuple(i for i in chosen if surely[i])
         unsure = [i for i in chosen if not surely[i]]
-        left = self.without(chosen)
-        d = range(len(self.at))
-        group = {*unsure, *(i for i in d if unsure and surely[i] and i not in sure)}
-        for i, j in product(unsure, d):
+        left, group = self.without(chosen), set(unsure)
+        for i, j in product(unsure, set(range(len(self.names))) - set(chosen)):
             other = (*(k for k in chosen if k != i), j)
-            if j not in chosen and self.without(other) - left < self._sure:
+            if surely[j] or self.without(other) - left < self._sure:
                 group.add(j)
         return sure, tuple(sorted(group))
 
@@ -91,14 +89,12 @@ class Change:
     @property
     def _sure(self) -> float:
         """Gain in square distance of one entry of k that is no chance (Bonferroni)."""
-        return float(chi2.isf(CHANCE_LEVEL / max(len(self.at), 1), 1))
+        return float(chi2.isf(CHANCE_LEVEL / len(self.names), 1))
 
     def _nearest(self, free: tuple[int, ...]) -> tuple[float, Array]:
         """Least (change - x)' covariance^-1 (change - x) over x with |x| <= margin, unbounded in
         the entries `free`, and that x (k,)."""
-        if not len(self.change):
-            return 0.0, np.zeros(0)
-        bound = np.array(self.margin, dtype=np.float64)
+        bound = np.full(len(self.change), self.margin)
         bound[list(free)] = np.inf
         inside = np.clip(self.change, -bound, bound)
         if np.array_equal(inside, self.change):

@@ -52,14 +52,13 @@ class OwnLogs:
 class ReferenceModel:
     """A machine's model against which its new logs are tested, in SI.
 
-    names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
-    key.name; not_identifiable: those that the model does not identify, with the reason. drive: what
+    names (d,): parameters that it identifies, in the order of `values` (d,) and `covariance`
+    (d, d), effects' as key.name; not_identifiable: its others, with the reason. drive: what
     drove its fit; chi_square: what the fit left, 1 for the sensors' noise; prescribed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is evaluated, 0
     where it is not known. own_logs: how far its own logs lie from it, None where a single one
     leaves noise alone, or that is not known. key: names the model in a `DriftState`.
     force_relative: share of the force that the equation of motion leaves, None where not known.
-    Raises BadModel where sizes differ.
     """
 
     plant: Plant
@@ -77,14 +76,8 @@ class ReferenceModel:
     force_relative: float | None = None
 
     def __post_init__(self) -> None:
-        d = len(self.names)
         object.__setattr__(self, "values", frozen(self.values))
         object.__setattr__(self, "covariance", frozen(self.covariance))
-        if self.values.shape != (d,) or self.covariance.shape != (d, d):
-            raise BadModel(
-                f"active model: {d} names, values {self.values.shape}, covariance"
-                f" {self.covariance.shape}; one value a name and a square covariance needed"
-            )
 
     @property
     def scales(self) -> Array:

@@ -208,7 +208,7 @@ def _files(found: Drifted, verdict: str) -> str:
 
 
 def _changed(shift: Shift) -> str:
-    change, low, high = (signed_percent(x) for x in (shift.change, shift.low, shift.high))
+    change, low, high = map(signed_percent, (shift.change, *shift.interval))
     return f"{shift.name} {change} ({low} to {high})"
 
 
@@ -246,7 +246,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = list[Row]()
     for shift in one.test.shifts.values():
-        change, low, high = map(signed_percent, (shift.change, shift.low, shift.high))
+        change, low, high = map(signed_percent, (shift.change, *shift.interval))
         pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
         values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
         unit, factor = shown_unit(shift.unit)

@@ -64,7 +64,7 @@ def test_a_parameter_that_no_log_judges_is_not_in_the_mean() -> None:
     judged = np.array([True, False, True])
     state = taken_in(fresh_state("model", NAMES), np.full(3, 0.5), OWN, judged, 0.2, VARIED)
     mean = mean_change(state, np.zeros((3, 3)), 0.02)
-    assert mean.at == (0, 2)
+    assert mean.names == ("a", "c")
     assert state.mean[1] == 0.0
 
 
