@@ -45,12 +45,6 @@ def test_the_fewest_that_explain_a_change_are_named() -> None:
     assert of(np.array([0.1, 0.08]), TOGETHER).moved() == (0, 1)
 
 
-def test_the_size_is_that_with_the_others_in_the_margin() -> None:
-    size, covariance = of(np.array([0.1, 0.0]), 1e-4 * np.eye(2)).explained((0,))
-    assert size == pytest.approx([0.1])
-    assert covariance == pytest.approx(np.array([[1e-4]]))
-
-
 @given(
     st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3),
     st.floats(-0.9, 0.9),
