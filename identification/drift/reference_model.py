@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.arrays import Array, frozen
+from identification.arrays import Array
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive
@@ -74,10 +74,6 @@ class ReferenceModel:
     fastest: float = 0.0
     own_logs: OwnLogs | None = None
     force_relative: float | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values))
-        object.__setattr__(self, "covariance", frozen(self.covariance))
 
     @property
     def scales(self) -> Array:

@@ -63,8 +63,10 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
     if known is None:
         return {}
     own = range(len(known.names) - len(rivals))
-    place = {one.key: len(own) + i for i, one in enumerate(rivals)}
-    return {key: float(np.sqrt(discriminated(known.matrix, at, own))) for key, at in place.items()}
+    return {
+        one.key: float(np.sqrt(discriminated(known.matrix, at, own)))
+        for at, one in enumerate(rivals, len(own))
+    }
 
 
 def _information(

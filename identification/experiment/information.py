@@ -17,7 +17,6 @@ from identification.arrays import Array, IntArray
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.estimation.gauss_newton import jacobian
-from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.windowed_run.parameters import (
     even,
     names_of,
@@ -25,8 +24,8 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, Judge, judge, soft
-from identification.estimation.windowed_run.windows import RUN_WINDOW, longest_window
+from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, Judge, soft
+from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
@@ -119,13 +118,6 @@ def lasting_jacobian(
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
     by_chance = np.any(~lasts & ~(apart * LASTING_STEP < BY_CHANCE), axis=1)
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(by_chance))
-
-
-def log_errors(plant: Plant, recorded: RecordedLogs) -> Judge:
-    """Errors of plants like this one along recorded logs, in the windows in which a fit would
-    follow them: whole runs where the command alone drives them."""
-    logs, drive = recorded.logs, recorded.drive
-    return judge(plant, logs, drive, longest_window(plant, logs, drive))
 
 
 def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Judge:

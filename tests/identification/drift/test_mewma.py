@@ -1,4 +1,4 @@
-"""The chart over the logs: its run length, its mean, and what it learns of a machine's variation."""
+"""The chart over the logs: run length, mean, and what it learns of a machine's variation."""
 
 from dataclasses import replace
 
