@@ -80,22 +80,18 @@ class ReferenceModel:
         """Size (d,) that a relative change refers to: the value, or what is small beside friction.
 
         A force below a tenth of the largest friction force is compared with that tenth; so is
-        a viscous one, at the fastest speed of the model's logs.
+        a viscous one, at the fastest speed of the model's logs. An effect's asymmetry is a share by
+        itself.
         """
-        size = np.maximum(np.abs(self.values), [self._least(name) for name in self.names])
+        force = SMALL_BESIDE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
+        viscous = force / self.fastest if self.fastest > 0 else 0.0
+        least = dict.fromkeys(FORCES, force) | dict.fromkeys(VISCOUS_NAMES, viscous)
+        for acting in self.plant.effects:
+            for p in acting.effect.params:
+                small = 1.0 if p.name == "asymmetry" else SMALL_BESIDE * abs(p.typical)
+                least[f"{acting.key}.{p.name}"] = small
+        size = np.maximum(np.abs(self.values), [least.get(name, 0.0) for name in self.names])
         return np.where(size > 0, size, 1.0)
-
-    def _least(self, name: str) -> float:
-        """Size below which a parameter is small; an effect's asymmetry is a share by itself."""
-        key, _, own = name.partition(".")
-        if own:
-            effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
-            param = next(p for p in effect.params if p.name == own)
-            return 1.0 if own == "asymmetry" else SMALL_BESIDE * abs(param.typical)
-        least = SMALL_BESIDE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
-        if name in VISCOUS_NAMES:
-            return least / self.fastest if self.fastest > 0 else 0.0
-        return least if name in FORCES else 0.0
 
     @property
     def relative_covariance(self) -> Array:
