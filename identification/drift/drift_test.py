@@ -118,11 +118,12 @@ def estimate_under_test(
     varied = variation(state, settings.variation)
     sd = np.sqrt(np.diag(own + of_model) + varied)
     reasons = _inconclusive(model, found, log, sd, settings.widest)
+    untested = replace(untested, inconclusive=reasons)
     identifiable = np.array([name not in reasons for name in model.names])
     if not np.any(identifiable):
         first = next(iter(reasons.values()), "")
         why = f"{log}: none of the model's parameters is identifiable; {first}"
-        return replace(untested, reason=why, inconclusive=reasons)
+        return replace(untested, reason=why)
     at = np.flatnonzero(identifiable)
     here = LogChange(
         tuple(model.names[i] for i in at), found.change[at], (own + of_model)[np.ix_(at, at)],
