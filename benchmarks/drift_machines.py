@@ -67,8 +67,10 @@ def turned(seed: int, number: int, drifted: float = 1.0, seconds: float = 4.0) -
 def active(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> ReferenceModel:
     """A fit as the active model; fastest [m/s]: speed in its logs, 0 if unknown."""
     plant = Plant(fit.friction, fit.actuator, fit.effects)
+    at = [i for i, name in enumerate(fit.free) if fit.estimates[name].known]
+    names = tuple(fit.free[i] for i in at)
     return ReferenceModel(
-        plant, fit.free, values_of(plant, fit.free), fit.covariance, rig, fit.drive,
+        plant, names, values_of(plant, names), fit.covariance[np.ix_(at, at)], rig, fit.drive,
         chi_square=fit.chi_square, prescribed=fit.prescribed,
         not_identifiable={
             name: one.reason or "" for name, one in fit.estimates.items() if not one.known

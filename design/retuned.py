@@ -17,7 +17,7 @@ from design.machine.documents import design_document, model_document
 from design.machine.model import Model
 from design.machine.slip_of_scale import moved_between, no_wear
 from design.machine.source import MachineLogs, Source
-from identification.drift.readings import Moved, Reading
+from identification.drift.drift_result import Shift
 from identification.effects._library import Library
 from identification.errors import BadLog, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
@@ -37,12 +37,12 @@ class Drift:
 
     verdict: TestedDrift
     reason: str
-    moved: tuple[Moved, ...] = ()
+    moved: tuple[Shift, ...] = ()
     p_value: float | None = None
     state: Mapping[str, Any] = field(default_factory=dict)
     unsure: tuple[str, ...] = ()
     could_have_seen: Mapping[str, float | None] = field(default_factory=dict)
-    parameters: tuple[Reading, ...] = ()
+    parameters: tuple[Shift, ...] = ()
 
 
 # A test of a new log against the active model; of the state of the log before under it, empty at

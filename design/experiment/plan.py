@@ -43,11 +43,11 @@ from identification.errors import BadModel, NotIdentifiable, UserError
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.estimation.windowed_run.parameters import names_of, values_of
+from identification.estimation.windowed_run.run_errors import Judge, judge
+from identification.estimation.windowed_run.windows import longest_window
 from identification.experiment.information import (
-    Errors,
     Information,
     information,
-    log_errors,
     rests_of,
     run_errors,
     unknowns,
@@ -104,9 +104,9 @@ class Bench:
         """A log as the estimator takes it."""
         return recorded_logs([log], self.model.rig, self.drive)
 
-    def errors(self, plant: Plant, run: LoopRun) -> Errors:
+    def errors(self, plant: Plant, run: LoopRun) -> Judge:
         """Errors of plants along a run without noise; where the measured force drives a fit's runs,
-        with the noise that it would have."""
+        with the noise that it would have, in the windows in which a fit would follow them."""
         log, fit = self.log(run), self.model.fit
         if self.by_command:
             at = rests_of(run.v, float(run.t[1]))
@@ -116,7 +116,8 @@ class Bench:
             key: log[key] + sd * rng.standard_normal(len(log))
             for key, sd in (("y", fit.noise_y), ("F", fit.noise_F))
         }
-        return log_errors(self.fitted(plant), self.recorded(log.with_signals(**noisy)))
+        own, logs = self.fitted(plant), self.recorded(log.with_signals(**noisy)).logs
+        return judge(own, logs, self.drive, longest_window(own, logs, self.drive))
 
     def machine(self, plant: Plant, rivals: tuple[Acting, ...] = ()) -> Machine:
         """The plant as the search takes it, and what a run identifies of it and of these rivals."""

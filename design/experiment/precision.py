@@ -131,8 +131,7 @@ def worth(information: Information, asked: IntArray) -> float:
     """How well a run identifies the asked parameters: minus the log of their mean (geometric)
     relative deviation, and of the largest."""
     mean = 0.5 * log_det(information.matrix, asked) / len(asked)
-    spread = np.sqrt(np.diag(information.covariance)[asked]) / information.unit[asked]
-    least = -float(np.log(min(float(np.max(spread)), NO_IDEA)))
+    least = -float(np.log(min(float(np.max(information.deviations[asked])), NO_IDEA)))
     return mean + least
 
 

@@ -26,14 +26,14 @@ from identification.estimation.regression.standstill import (
     rest_stretches,
 )
 from identification.estimation.regression.three_step import first_estimate
-from identification.experiment.identifiability import Tellable, identifiability, tellable_effects
+from identification.experiment.identifiability import identifiability, tellable_effects
 from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Drive, Estimate, KarnoppFit
 from identification.model.karnopp import NAMES
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
-from identification.thresholds import EVENTS_NEEDED
+from identification.thresholds import EVENTS_NEEDED, HALF
 from identification.velocity.fit import fit
 from identification.velocity.record import recorded
 from identification.velocity.valve_estimates import units, valve_estimates
@@ -147,7 +147,7 @@ def identifiable_by_log(
 
 
 def _identifiable(
-    name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None,
+    name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: float | None,
     *, prescribed: bool,
 ) -> Identifiable:  # fmt: skip
     """By what a parameter is identified, and within what share of it."""
@@ -156,7 +156,7 @@ def _identifiable(
     if fit.prescribed:
         which = "the force equation" if prescribed else "the equation of motion alone"
         return Identifiable(name, True, f"to {half:.1%} by {which}", within=half)
-    within = run.within if run is not None and run.can else half
+    within = run if run is not None and run <= HALF else half
     why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"
     return Identifiable(name, True, why, within=within)
 

@@ -64,5 +64,5 @@ def _number(shift: Shift) -> dict[str, Any]:
         "name": shift.name,
         "before": as_number(reported_estimate(shift.before, shift.unit, shift.before_sd)),
         "after": as_number(reported_estimate(shift.after, shift.unit, shift.after_sd)),
-        "change": as_number(Estimate(shift.change, "1", shift.sd, shift.low, shift.high)),
+        "change": as_number(Estimate(shift.change, "1", shift.sd, *shift.interval)),
     }

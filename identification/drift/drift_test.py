@@ -12,18 +12,17 @@ drift. "None" is said only where the test has a minimum detectable change below 
 the Coulomb levels; else the log is inconclusive.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array
-from identification.drift.drift_result import DriftTest, DriftVerdict, FoundBy, Shift, Statistic
-from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
+from identification.drift.drift_result import Z_95, DriftTest, FoundBy, Shift, Statistic
+from identification.drift.log_estimate import LogEstimate, allowed_misfit, estimate_log
 from identification.drift.mewma import (
     DriftState,
-    chart_limit,
     fresh_state,
     mean_change,
     taken_in,
@@ -37,8 +36,6 @@ from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
 from identification.model.karnopp import COULOMB_NAMES
 from identification.thresholds import SEEN
-
-Z_95 = float(norm.isf(0.025))
 
 
 @dataclass(frozen=True)
@@ -86,126 +83,103 @@ def drift_test(
 ) -> DriftTest:
     """The verdict on a new log, and the state to be given with the next one.
 
-    state: what the log before gave; None, or of another model, begins anew. Raises BadLog where
-    a signal is missing.
+    state: what the log before gave of this model; None begins anew. Raises BadLog where a signal is
+    missing.
     """
-    settings = settings or DriftSettings()
-    if state is None or state.model != model.key or state.names != model.names:
-        state = fresh_state(model.key, model.names)
+    state = state or fresh_state(model.key, model.names)
     try:
         found = estimate_log(model, log, rng)
     except NotIdentifiable as error:
-        return _silent(log.name, "not_judged", str(error), {}, None, state)
-    if not found.follows:
-        reason = (
-            f"{log.name}: no parameters of the model's structure follow this log (chi-square"
-            f" {found.chi_square:.3g}, at most {found.allowed:.3g} allowed); trace it"
-        )
-        return _silent(log.name, "structure", reason, {}, found, state)
-    return estimate_under_test(model, found, log.name, state, settings)
+        return DriftTest("not_judged", state, str(error))
+    return estimate_under_test(model, found, log.name, state, settings or DriftSettings())
 
 
 def estimate_under_test(
     model: ReferenceModel, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""
-    change, own = relative_change(model, found)
-    misfit = own_misfit(model)
+    allowed, misfit = allowed_misfit(model.chi_square), own_misfit(model)
+    untested = DriftTest("not_judged", state, chi_square=found.chi_square, allowed=allowed)
+    if not (found.as_usual or found.chi_square <= allowed):
+        why = (
+            f"{log}: no parameters of the model's structure follow this log (chi-square"
+            f" {found.chi_square:.3g}, at most {allowed:.3g} allowed); trace it"
+        )
+        return replace(untested, verdict="structure", reason=why)
     if misfit.has_lost_its_way(found.chi_square):
         why = (
             f"{log}: its fit leaves {found.chi_square:.3g}, fits of the model's own logs at most"
             f" {misfit.left:.3g}: it has lost its way, and says nothing of the parameters; log"
             " another run, or trace this one"
         )
-        return _silent(log, "not_judged", why, {}, found, state)
-    own = misfit.of_log(own, found.chi_square)
+        return replace(untested, reason=why)
+    own = misfit.of_log(found.covariance, found.chi_square)
     of_model = misfit.of_model(model.relative_covariance)
     varied = variation(state, settings.variation)
-    measured = own + of_model
-    sd = np.sqrt(np.diag(measured) + varied)
+    sd = np.sqrt(np.diag(own + of_model) + varied)
     reasons = _inconclusive(model, found, log, sd, settings.widest)
+    untested = replace(untested, inconclusive=reasons)
     identifiable = np.array([name not in reasons for name in model.names])
     if not np.any(identifiable):
         first = next(iter(reasons.values()), "")
         why = f"{log}: none of the model's parameters is identifiable; {first}"
-        return _silent(log, "not_judged", why, reasons, found, state)
+        return replace(untested, reason=why)
     at = np.flatnonzero(identifiable)
     here = LogChange(
-        tuple(at.tolist()), change[at], measured[np.ix_(at, at)], varied[at], settings.margin
-    )
-    after = taken_in(state, change, own, identifiable, settings.smoothing, varied)
+        tuple(model.names[i] for i in at), found.change[at], (own + of_model)[np.ix_(at, at)],
+        varied[at], settings.margin,
+    )  # fmt: skip
+    after = taken_in(state, found.change, own, identifiable, settings.smoothing, varied)
     over = mean_change(after, of_model, settings.margin)
-    tests = _tests(here, over, settings)
-    by = tests.found_by
-    which, unsure = _moved(model, over if by == "mean" else here.nearer, here) if by else ((), ())
-    seen = tests.could_have_seen(model.names)
-    coarse = "" if by else too_coarse(model, seen, log, settings)
-    return DriftTest(
-        log=log,
-        verdict="drift" if by else ("not_judged" if coarse else "none"),
-        moved=which,
-        shifts=_shifts(model, here.beyond_usual),
-        inconclusive=reasons,
-        single=tests.single,
-        mean=tests.mean,
-        found_by=by,
-        chi_square=found.chi_square,
-        allowed=found.allowed,
-        reason=coarse,
-        # A jump would stay in the mean long after it has been repaired.
-        state=state if by == "log" else after,
-        alone=tests.alone,
-        unsure=unsure,
-        could_have_seen=seen,
-    )
+    return _tested(untested, model, log, here, over, after, settings)
 
 
-@dataclass(frozen=True, eq=False)
-class _Tests:
-    """The three statistics of a log: of all parameters, of the largest one, of the mean."""
+def _tested(
+    untested: DriftTest, model: ReferenceModel, log: str, here: LogChange, over: Change,
+    after: DriftState, settings: DriftSettings,
+) -> DriftTest:  # fmt: skip
+    """What the three statistics say; after: the state with this log taken in.
 
-    here: LogChange
-    over: Change
-    single: Statistic
-    alone: Statistic
-    mean: Statistic
-
-    @property
-    def found_by(self) -> FoundBy | None:
-        """What alarms, the log itself first."""
-        if self.single.alarm or self.alone.alarm:
-            return "log"
-        return "mean" if self.mean.alarm else None
-
-    def could_have_seen(self, names: Sequence[str]) -> dict[str, float]:
-        """Smallest change of each parameter of the log that one of the three sees."""
-        here, over, square = self.here, self.over, self.single.threshold
-        together = np.maximum(
-            detectable_together(here.beyond_margin, square),
-            detectable_together(here.beyond_usual, square),
-        )
-        of_log = np.minimum(here.detectable_alone(self.alone.threshold), together)
-        lasting = dict(zip(over.at, detectable_together(over, self.mean.threshold), strict=True))
-        return {
-            names[i]: float(min(size, lasting.get(i, np.inf)))
-            for i, size in zip(here.at, of_log, strict=True)
-        }
-
-
-def _tests(here: LogChange, over: Change, settings: DriftSettings) -> _Tests:
-    """The statistics: half of the false alarms are the mean's, a quarter each of the others'."""
-    d, quarter = len(here.at), 0.25 / settings.run_length
+    Half of the false alarms are the mean's, a quarter each of the others'. A run without one is the
+    longer for it that means of neighbouring logs go together (Royen, Far East J. Theor. Stat. 48
+    (2014) 139: the chance that no log alarms is at least the product of each one's).
+    """
+    d, quarter = len(here.names), 0.25 / settings.run_length
     largest = float(np.max(here.alone) ** 2)
     p_value = min(1.0, d * float(chi2.sf(largest, 1)))
     alone = Statistic(largest, float(chi2.isf(quarter / d, 1)), p_value, d)
-    limit = chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
-    single = _statistic(here.nearer, float(chi2.isf(quarter, d)))
-    return _Tests(here, over, single, alone, _statistic(over, limit))
+    single, mean = _statistic(here.nearer, quarter), _statistic(over, 2.0 * quarter)
+    by: FoundBy | None = "mean" if mean.alarm else None
+    if single.alarm or alone.alarm:
+        by = "log"
+    found, shifts = over if by == "mean" else here.nearer, _shifts(model, here.beyond_usual)
+    moved, unsure = _moved(found, shifts, _shifts(model, found)) if by else ((), ())
+    by_mean = detectable_together(over, mean.threshold).tolist()
+    lasting = dict(zip(over.names, by_mean, strict=True))
+    of_log = here.detectable(alone.threshold, single.threshold).tolist()
+    seen = {n: min(size, lasting[n]) for n, size in zip(here.names, of_log, strict=True)}
+    coarse = "" if by else too_coarse(model, seen, log, settings)
+    return replace(
+        untested,
+        verdict="drift" if by else ("not_judged" if coarse else "none"),
+        # A jump would stay in the mean long after it has been repaired.
+        state=untested.state if by == "log" else after,
+        reason=coarse,
+        moved=moved,
+        unsure=unsure,
+        shifts=shifts,
+        could_have_seen=seen,
+        single=single,
+        alone=alone,
+        mean=mean,
+        found_by=by,
+    )
 
 
-def _statistic(found: Change, threshold: float) -> Statistic:
-    d = len(found.at)
-    return Statistic(found.square, threshold, float(chi2.sf(found.square, d)), d)
+def _statistic(found: Change, chance: float) -> Statistic:
+    """Of all parameters together, with the chance of a false alarm."""
+    d, square = len(found.names), found.square
+    return Statistic(square, float(chi2.isf(chance, d)), float(chi2.sf(square, d)), d)
 
 
 def too_coarse(
@@ -217,9 +191,7 @@ def too_coarse(
     to be seen, or of a model with neither at least one parameter.
     """
     limit = settings.to_be_seen
-    asked = [
-        name for name in COULOMB_NAMES if name in model.names and name not in model.not_identifiable
-    ]
+    asked = [name for name in COULOMB_NAMES if name in model.names]
     if max([seen.get(name, np.inf) for name in asked] or [min(seen.values())]) <= limit:
         return ""
     said = ", ".join(
@@ -238,76 +210,48 @@ def _inconclusive(
 ) -> dict[str, str]:
     """Parameters on which this log is inconclusive, with the reason; deviations (d,) of their
     changes, and the widest that is allowed."""
-    out: dict[str, str] = {}
+    out = dict(model.not_identifiable)
     for name, sd in zip(model.names, deviations, strict=True):
-        if name in model.not_identifiable:
-            out[name] = f"not identified in the active model ({model.not_identifiable[name]})"
-        elif name in found.not_identifiable:
+        if name in found.not_identifiable:
             out[name] = found.not_identifiable[name]
-        elif name not in found.names:
-            out[name] = f"{log}: not identifiable from this log"
         elif not sd <= widest:
             out[name] = (
                 f"{log}: a change of it is known to {100 * sd:.2g} % only, at most"
                 f" {100 * widest:.2g} % needed; excite it more, or log for longer"
             )
-    return {**{n: r for n, r in model.not_identifiable.items() if n not in model.names}, **out}
+    return out
 
 
 def _moved(
-    model: ReferenceModel, found: Change, log: LogChange
+    found: Change, here: Mapping[str, Shift], mean: Mapping[str, Shift]
 ) -> tuple[tuple[Shift, ...], tuple[str, ...]]:
-    """Parameters that surely changed, largest first, by how much on this log; and the names of
-    those that may have.
+    """Parameters that surely changed, largest first; and the names of those that may have.
 
-    The mean over the logs, where that found it, lags behind what drifts: it names the parameters,
-    and sizes them only where this log is inconclusive on them or shows less.
+    By how much on this log; or by the mean over the logs, which lags behind what drifts, where this
+    log is inconclusive on one of them or shows less.
     """
-    chosen = found.moved()
-    sure, unsure = found.discriminated(chosen)
-    names, all_moved = ({found.at[k] for k in some} for some in (sure, chosen))
-    here, mean = (
-        dict(zip(one.at, np.abs(one.change).tolist(), strict=True)) for one in (log.nearer, found)
-    )
-    sized = log.nearer if all(here.get(i, 0.0) >= mean[i] for i in names) else found
-    explain = tuple(k for k, i in enumerate(sized.at) if i in all_moved)
-    size, covariance = sized.explained(explain)
-    out = [
-        _shift(model, sized.at[k], *each)
-        for k, *each in zip(explain, size.tolist(), _deviations(covariance), strict=True)
-        if sized.at[k] in names
-    ]
-    shifts = tuple(sorted(out, key=lambda one: -abs(one.change)))
-    return shifts, tuple(model.names[found.at[k]] for k in unsure)
+    sure, unsure = found.discriminated(found.moved())
+    names, log = [found.names[k] for k in sure], here
+    if any(n not in here or abs(here[n].change) < abs(mean[n].change) for n in names):
+        log = mean
+    shifts = tuple(sorted((log[n] for n in names), key=lambda one: -abs(one.change)))
+    return shifts, tuple(found.names[k] for k in unsure)
 
 
 def _shifts(model: ReferenceModel, found: Change) -> dict[str, Shift]:
     """Every tested parameter by itself."""
-    each = zip(found.at, found.change.tolist(), _deviations(found.covariance), strict=True)
-    return {model.names[i]: _shift(model, i, change, sd) for i, change, sd in each}
+    sd = np.sqrt(np.diag(found.covariance)).tolist()
+    each = zip(found.names, found.change.tolist(), sd, strict=True)
+    return {name: _shift(model, name, *one) for name, *one in each}
 
 
-def _deviations(covariance: Array) -> list[float]:
-    return [float(sd) for sd in np.sqrt(np.diag(covariance))]
-
-
-def _shift(model: ReferenceModel, i: int, change: float, sd: float) -> Shift:
-    """The shift of parameter i, of relative change and deviation."""
-    name, before = model.names[i], float(model.values[i])
-    scale, before_sd = float(model.scales[i]), float(np.sqrt(model.covariance[i, i]))
-    after = before + (-scale if before < 0 else scale) * change
+def _shift(model: ReferenceModel, name: str, change: float, sd: float) -> Shift:
+    """The shift of a parameter, of relative change and deviation."""
+    i = model.names.index(name)
+    before, scale = float(model.values[i]), float(model.scales[i])
+    after, after_sd = before + (-scale if before < 0 else scale) * change, scale * sd
     return Shift(
-        name, model.units[name], before, before_sd, after, scale * sd, change, sd,
-        low=change - Z_95 * sd, high=change + Z_95 * sd,
-    )  # fmt: skip
-
-
-def _silent(
-    log: str, verdict: DriftVerdict, reason: str, inconclusive: Mapping[str, str],
-    found: LogEstimate | None, state: DriftState,
-) -> DriftTest:  # fmt: skip
-    """A verdict without changes; the state stays as it was."""
-    return DriftTest(
-        log, verdict, (), {}, dict(inconclusive), None, None, None,
-        found.chi_square if found else None, found.allowed if found else None, reason, state,
+        name, model.units[name], before, float(np.sqrt(model.covariance[i, i])), after, after_sd,
+        low=after - Z_95 * after_sd, high=after + Z_95 * after_sd, change=change, sd=sd,
+        p_value=float(2.0 * norm.sf(abs(change) / sd)),
     )  # fmt: skip

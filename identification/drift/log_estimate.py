@@ -21,26 +21,20 @@ from identification.thresholds import ADEQUATE, ASTRAY, TWICE
 
 @dataclass(frozen=True, eq=False)
 class LogEstimate:
-    """Parameters of one log: values (d,) and covariance (d, d) by `names`.
+    """What one log says of the parameters (d,) of the active model.
 
-    not_identifiable: parameters that the log does not identify, with the reason; they are among
-    `names` all the same. chi_square: what the best fit leaves per value; allowed: up to which the
-    structure fits. as_usual: the equation of motion of a motor, whose run is not followed, leaves
-    about as much as that of the model's logs.
+    change (d,): of each in its scale, positive where the size grows, 0 of what the log's fit does
+    not have; covariance (d, d): of its errors, without the model's own. not_identifiable:
+    parameters that the log does not identify, with the reason. chi_square: what the best fit leaves
+    per value; as_usual: the equation of motion of a motor, whose run is not followed, leaves about
+    as much as that of the model's logs.
     """
 
-    names: tuple[str, ...]
-    values: Array
+    change: Array
     covariance: Array
     not_identifiable: Mapping[str, str]
     chi_square: float
-    allowed: float
     as_usual: bool = False
-
-    @property
-    def follows(self) -> bool:
-        """Whether the structure of the active model follows the log."""
-        return self.as_usual or self.chi_square <= self.allowed
 
 
 def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> LogEstimate:
@@ -57,33 +51,18 @@ def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> L
                 " only; trace this log together with those of the model"
             )
         recorded = recorded_logs([log], model.rig, drive)
-        found = fit_prescribed(recorded, "as the active model")
-        return _of_fit(found, allowed_misfit(model.chi_square))
+        return _beside(model, fit_prescribed(recorded, "as the active model"))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
     if not found.prescribed:
-        return _of_fit(found, allowed_misfit(model.chi_square))
+        return _beside(model, found)
     # The equation has less error, or no run of this structure is followed.
     recorded = recorded_logs([log], model.rig, drive)
     own = Plant(found.friction, model.plant.actuator, found.effects)
     left = min(misfit(one, recorded.logs, recorded.drive) for one in (own, model.plant))
-    estimate = _of_fit(replace(found, chi_square=left), allowed_misfit(model.chi_square))
-    usual = model.force_relative
+    estimate, usual = _beside(model, replace(found, chi_square=left)), model.force_relative
     if not recorded.zoh or usual is None or found.left is None:
         return estimate
     return replace(estimate, as_usual=found.left[0] <= TWICE * usual)
-
-
-def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array]:
-    """Change (d,) of the model's parameters in their scales, positive where the size grows, and its
-    covariance (d, d) without the model's own error; 0 of what the log's fit does not have."""
-    change, covariance = np.zeros(len(model.names)), np.zeros((len(model.names),) * 2)
-    rows = [i for i, name in enumerate(model.names) if name in found.names]
-    columns = [found.names.index(model.names[i]) for i in rows]
-    factor = np.where(model.values[rows] < 0, -1.0, 1.0) / model.scales[rows]
-    change[rows] = (found.values[columns] - model.values[rows]) * factor
-    own = found.covariance[np.ix_(columns, columns)]
-    covariance[np.ix_(rows, rows)] = own * np.outer(factor, factor)
-    return change, covariance
 
 
 def allowed_misfit(active: float) -> float:
@@ -91,10 +70,17 @@ def allowed_misfit(active: float) -> float:
     return ADEQUATE if active <= ADEQUATE else ASTRAY * active
 
 
-def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:
-    plant = Plant(found.friction, found.actuator, found.effects)
-    not_identifiable = {name: e.reason or "" for name, e in found.estimates.items() if not e.known}
-    values = values_of(plant, found.free)
-    return LogEstimate(
-        found.free, values, found.covariance, not_identifiable, found.chi_square, allowed
-    )
+def _beside(model: ReferenceModel, found: KarnoppFit) -> LogEstimate:
+    """A log's fit in the scales of the active model."""
+    change, covariance = np.zeros(len(model.names)), np.zeros((len(model.names),) * 2)
+    rows = [i for i, name in enumerate(model.names) if name in found.free]
+    columns = [found.free.index(model.names[i]) for i in rows]
+    factor = np.where(model.values[rows] < 0, -1.0, 1.0) / model.scales[rows]
+    values = values_of(Plant(found.friction, found.actuator, found.effects), found.free)
+    change[rows] = (values[columns] - model.values[rows]) * factor
+    own = found.covariance[np.ix_(columns, columns)]
+    covariance[np.ix_(rows, rows)] = own * np.outer(factor, factor)
+    why = f"{found.logs[0].log}: not identifiable from this log"
+    not_identifiable = {name: why for name in model.names if name not in found.free}
+    not_identifiable |= {n: e.reason or "" for n, e in found.estimates.items() if not e.known}
+    return LogEstimate(change, covariance, not_identifiable, found.chi_square)

@@ -2,23 +2,19 @@
 
 The mean of the last logs is known better than one log, so a small lasting change shows in it.
 What does not average out is kept apart: the error of the active model itself, and a margin
-below which a change does not matter. The limit is computed for the asked run length by the Markov
-chain of the chart's radius, not taken from a textbook's table. Sources: Lowry, Woodall, Champ and
-Rigdon, Technometrics 34 (1992); Runger and Prabhu, Biometrika 83 (1996).
+below which a change does not matter. Source: Lowry, Woodall, Champ and Rigdon, Technometrics 34
+(1992).
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
 
 from identification.arrays import Array, BoolArray
 from identification.drift.practical_margin import Change
 from identification.errors import BadModel
 
-RINGS = 60  # states of the Markov chain
 CAUTION = 2.0  # deviations by which a learnt variance is taken larger
 PRIOR_LOGS = 10.0  # logs that the stated variation counts as beside those seen
 LEAST_VARIATION = 0.002  # relative sd below which a machine is not believed to repeat itself
@@ -106,8 +102,9 @@ def taken_in(
             pairs[i] += 1
         last[i], last_variance[i] = float(change[i]), float(own[i])
     return DriftState(
-        state.model, state.names, _tuple(mean), _tuple(weight), tuple(map(_tuple, spread)),
-        tuple(last), tuple(last_variance), tuple(squares), tuple(pairs), state.logs + 1,
+        state.model, state.names, tuple(mean.tolist()), tuple(weight.tolist()),
+        tuple(map(tuple, spread.tolist())), tuple(last), tuple(last_variance), tuple(squares),
+        tuple(pairs), state.logs + 1,
     )  # fmt: skip
 
 
@@ -118,43 +115,8 @@ def mean_change(state: DriftState, model: Array, margin: float) -> Change:
     While few logs have been seen only a part of the weight is reached: change and error are those
     of the part.
     """
-    at = np.flatnonzero(np.array(state.weight) > 0)
+    at = np.flatnonzero(state.weight)
     w, grid = np.array(state.weight)[at], np.ix_(at, at)
     covariance = np.array(state.covariance)[grid] / np.outer(w, w) + model[grid]
-    numbers = tuple(int(i) for i in at)
-    return Change(numbers, np.array(state.mean)[at] / w, covariance, np.full(len(at), margin))
-
-
-def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
-    """Square distance that the chart passes once in `run_length` logs on average without a change.
-
-    parameters: number of them; smoothing: the weight of the newest log. Of a chart whose logs have
-    unit covariance; a margin only makes alarms rarer.
-    """
-    low, high = (float(chi2.isf(x, parameters)) for x in (0.5, 1e-3 / run_length))
-
-    def too_long(square: float) -> float:
-        return float(np.log(mean_run(parameters, smoothing, square) / run_length))
-
-    return float(brentq(too_long, low, high, rtol=1e-4))
-
-
-def mean_run(parameters: int, smoothing: float, square: float) -> float:
-    """Mean number of logs up to an alarm of a chart with the limit `square`, without a change.
-
-    The radius of the mean is a Markov chain, since the next one depends on it alone: its square
-    is noncentral chi-square. Source: Runger and Prabhu 1996, in control.
-    """
-    radius = np.sqrt(square * smoothing / (2.0 - smoothing))
-    width = 2.0 * radius / (2 * RINGS + 1)
-    middle = width * np.arange(RINGS + 1)
-    edge = width * (np.arange(RINGS + 1) + 0.5)
-    away = ((1.0 - smoothing) * middle / smoothing) ** 2
-    below = ncx2.cdf((edge[None, :] / smoothing) ** 2, parameters, away[:, None] + 1e-12)
-    chance = np.diff(below, axis=1, prepend=0.0)
-    runs = np.linalg.solve(np.eye(RINGS + 1) - chance, np.ones(RINGS + 1))
-    return float(runs[0])
-
-
-def _tuple(values: Array) -> tuple[float, ...]:
-    return tuple(float(v) for v in values)
+    names = tuple(state.names[i] for i in at)
+    return Change(names, np.array(state.mean)[at] / w, covariance, margin)

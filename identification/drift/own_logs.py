@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification.arrays import Array
-from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
+from identification.drift.log_estimate import LogEstimate, estimate_log
 from identification.drift.reference_model import OwnLogs, ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.log import Log
@@ -56,26 +56,15 @@ def own_logs_of(
     """How far the estimates of a model's own logs, two at least, lie from it."""
     changes, apart = [], []
     for one in found:
-        change, own = relative_change(model, one)
-        without = {*one.not_identifiable, *model.not_identifiable}
-        identifiable = np.array(
-            [n in one.names and n not in without for n in model.names], dtype=np.bool_
-        )
-        at = np.flatnonzero(identifiable)
-        both = (own + model.relative_covariance)[np.ix_(at, at)]
-        square = float(change[at] @ np.linalg.solve(both, change[at])) if len(at) else 0.0
+        silent = [name in one.not_identifiable for name in model.names]
+        at = np.flatnonzero(np.logical_not(silent))
+        both = (one.covariance + model.relative_covariance)[np.ix_(at, at)]
+        square = float(one.change[at] @ np.linalg.solve(both, one.change[at]))
         apart.append(square / max(len(at), 1))
-        changes.append(np.where(identifiable, change, np.nan))
+        changes.append(np.ma.array(one.change, mask=silent))
+    scatter = np.ma.sqrt(np.ma.mean(np.ma.array(changes) ** 2, axis=0))
     left = tuple(one.chi_square for one in found)
-    return OwnLogs(model.names, _root_mean_square(changes), tuple(apart), left, parts)
-
-
-def _root_mean_square(rows: Sequence[Array]) -> tuple[float | None, ...]:
-    """Over the rows (d,) that are known, None where none is."""
-    known = np.isfinite(rows)
-    square = np.sum(np.where(known, np.square(rows), 0.0), axis=0)
-    count = np.sum(known, axis=0)
-    return tuple(float(np.sqrt(s / n)) if n else None for s, n in zip(square, count, strict=True))
+    return OwnLogs(model.names, tuple(scatter.tolist()), tuple(apart), left, parts)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,13 +21,13 @@ from identification.thresholds import CHANCE_LEVEL
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Changes (k,) of the parameters numbered `at`, their covariance (k, k), and the margin (k,)
-    within which each does not matter."""
+    """Changes (k,) of the parameters `names`, their covariance (k, k), and the margin within which
+    each does not matter."""
 
-    at: tuple[int, ...]
+    names: tuple[str, ...]
     change: Array
     covariance: Array
-    margin: Array
+    margin: float
 
     @cached_property
     def square(self) -> float:
@@ -36,17 +36,28 @@ class Change:
         return self.without(())
 
     def without(self, free: tuple[int, ...]) -> float:
-        """The same where these entries may be of any size."""
-        return self._nearest(free)[0]
+        """The same where these entries may be of any size: least (change - x)' covariance^-1
+        (change - x) over x with |x| <= margin, unbounded in them."""
+        bound = np.full(len(self.change), self.margin)
+        bound[list(free)] = np.inf
+        if np.all(np.abs(self.change) <= bound):
+            return 0.0
+        A = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        if not np.any(bound):
+            return float(np.sum((A @ self.change) ** 2))
+        # A margin of no width is a box all the same to the solver, if a very thin one.
+        bound = np.maximum(bound, 1e-12)
+        found = lsq_linear(A, A @ self.change, bounds=(-bound, bound), method="bvls", tol=1e-12)
+        return 2.0 * float(found.cost)
 
     def moved(self) -> tuple[int, ...]:
         """The fewest entries that explain the change, largest gain first.
 
         The others may lie anywhere within the margin. One at a time is set free, the one that
-        brings the distance down most, as long as it does so surely; then those are taken back that
-        the rest makes needless. Parameters that a log cannot separate do not all move.
+        brings the distance down most, as long as it does so surely. Parameters that a log cannot
+        separate do not all move.
         """
-        d, left = len(self.at), self.square
+        d, left = len(self.names), self.square
         chosen: list[int] = []
         while left > 0.0 and len(chosen) < d:
             tried = {i: self.without((*chosen, i)) for i in range(d) if i not in chosen}
@@ -55,12 +66,6 @@ class Change:
                 break
             chosen.append(best)
             left = tried[best]
-        for i in tuple(chosen):
-            rest = tuple(j for j in chosen if j != i)
-            more = self.without(rest)
-            if rest and more - left < self._sure:
-                chosen.remove(i)
-                left = more
         return tuple(chosen)
 
     def discriminated(self, chosen: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -73,40 +78,14 @@ class Change:
         surely = beyond >= self._sure * np.diag(self.covariance)
         sure = tuple(i for i in chosen if surely[i])
         unsure = [i for i in chosen if not surely[i]]
-        left = self.without(chosen)
-        d = range(len(self.at))
-        group = {*unsure, *(i for i in d if unsure and surely[i] and i not in sure)}
-        for i, j in product(unsure, d):
+        left, group = self.without(chosen), set(unsure)
+        for i, j in product(unsure, set(range(len(self.names))) - set(chosen)):
             other = (*(k for k in chosen if k != i), j)
-            if j not in chosen and self.without(other) - left < self._sure:
+            if surely[j] or self.without(other) - left < self._sure:
                 group.add(j)
         return sure, tuple(sorted(group))
-
-    def explained(self, chosen: tuple[int, ...]) -> tuple[Array, Array]:
-        """Change (c,) of the chosen entries and its covariance (c, c), the others in the margin."""
-        at = list(chosen)
-        precision = np.linalg.inv(self.covariance)[np.ix_(at, at)]
-        return self._nearest(chosen)[1][at], np.linalg.inv(precision)
 
     @property
     def _sure(self) -> float:
         """Gain in square distance of one entry of k that is no chance (Bonferroni)."""
-        return float(chi2.isf(CHANCE_LEVEL / max(len(self.at), 1), 1))
-
-    def _nearest(self, free: tuple[int, ...]) -> tuple[float, Array]:
-        """Least (change - x)' covariance^-1 (change - x) over x with |x| <= margin, unbounded in
-        the entries `free`, and that x (k,)."""
-        if not len(self.change):
-            return 0.0, np.zeros(0)
-        bound = np.array(self.margin, dtype=np.float64)
-        bound[list(free)] = np.inf
-        inside = np.clip(self.change, -bound, bound)
-        if np.array_equal(inside, self.change):
-            return 0.0, inside
-        A = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        if not np.any(bound):
-            return float(np.sum((A @ self.change) ** 2)), inside
-        # A margin of no width is a box all the same to the solver, if a very thin one.
-        bound = np.maximum(bound, 1e-12)
-        found = lsq_linear(A, A @ self.change, bounds=(-bound, bound), method="bvls", tol=1e-12)
-        return float(np.sum((A @ (self.change - found.x)) ** 2)), np.asarray(found.x)
+        return float(chi2.isf(CHANCE_LEVEL / len(self.names), 1))

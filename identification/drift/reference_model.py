@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.arrays import Array, frozen
+from identification.arrays import Array
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive
@@ -52,14 +52,13 @@ class OwnLogs:
 class ReferenceModel:
     """A machine's model against which its new logs are tested, in SI.
 
-    names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
-    key.name; not_identifiable: those that the model does not identify, with the reason. drive: what
+    names (d,): parameters that it identifies, in the order of `values` (d,) and `covariance`
+    (d, d), effects' as key.name; not_identifiable: its others, with the reason. drive: what
     drove its fit; chi_square: what the fit left, 1 for the sensors' noise; prescribed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is evaluated, 0
     where it is not known. own_logs: how far its own logs lie from it, None where a single one
     leaves noise alone, or that is not known. key: names the model in a `DriftState`.
     force_relative: share of the force that the equation of motion leaves, None where not known.
-    Raises BadModel where sizes differ.
     """
 
     plant: Plant
@@ -76,37 +75,23 @@ class ReferenceModel:
     own_logs: OwnLogs | None = None
     force_relative: float | None = None
 
-    def __post_init__(self) -> None:
-        d = len(self.names)
-        object.__setattr__(self, "values", frozen(self.values))
-        object.__setattr__(self, "covariance", frozen(self.covariance))
-        if self.values.shape != (d,) or self.covariance.shape != (d, d):
-            raise BadModel(
-                f"active model: {d} names, values {self.values.shape}, covariance"
-                f" {self.covariance.shape}; one value a name and a square covariance needed"
-            )
-
     @property
     def scales(self) -> Array:
         """Size (d,) that a relative change refers to: the value, or what is small beside friction.
 
         A force below a tenth of the largest friction force is compared with that tenth; so is
-        a viscous one, at the fastest speed of the model's logs.
+        a viscous one, at the fastest speed of the model's logs. An effect's asymmetry is a share by
+        itself.
         """
-        size = np.maximum(np.abs(self.values), [self._least(name) for name in self.names])
+        force = SMALL_BESIDE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
+        viscous = force / self.fastest if self.fastest > 0 else 0.0
+        least = dict.fromkeys(FORCES, force) | dict.fromkeys(VISCOUS_NAMES, viscous)
+        for acting in self.plant.effects:
+            for p in acting.effect.params:
+                small = 1.0 if p.name == "asymmetry" else SMALL_BESIDE * abs(p.typical)
+                least[f"{acting.key}.{p.name}"] = small
+        size = np.maximum(np.abs(self.values), [least.get(name, 0.0) for name in self.names])
         return np.where(size > 0, size, 1.0)
-
-    def _least(self, name: str) -> float:
-        """Size below which a parameter is small; an effect's asymmetry is a share by itself."""
-        key, _, own = name.partition(".")
-        if own:
-            effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
-            param = next(p for p in effect.params if p.name == own)
-            return 1.0 if own == "asymmetry" else SMALL_BESIDE * abs(param.typical)
-        least = SMALL_BESIDE * max(abs(getattr(self.plant.friction, one)) for one in FORCES)
-        if name in VISCOUS_NAMES:
-            return least / self.fastest if self.fastest > 0 else 0.0
-        return least if name in FORCES else 0.0
 
     @property
     def relative_covariance(self) -> Array:

@@ -7,7 +7,6 @@ a first plant may be far off, so what is promised is wider than the information 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from identification.experiment.information import Information, information
 from identification.experiment.structures import discriminated, sought
 from identification.model.estimates import NORMAL_95
 from identification.model.plant import Plant
-from identification.thresholds import GATE_MARGIN, HALF
+from identification.thresholds import GATE_MARGIN
 
 # Half intervals over the value, below which nothing is promised: what a fit gives that loses a
 # stop, where an actuator's command brings the run back to the log, and where nothing does
@@ -33,33 +32,20 @@ NO_SURER = {
 NO_SURER_CHAOTIC = {"m": 0.1, "F_c": 0.03, "F_v": 0.04, "dv_": 0.12, "F_s": 0.01}
 
 
-@dataclass(frozen=True)
-class Tellable:
-    """Half the 95 % interval, over the value, that a fit should give at most; infinite where the
-    run says nothing. can: whether that is narrow enough to be identified at all."""
+def identifiability(recorded: RecordedLogs) -> dict[str, float]:
+    """How well logs can identify each of the nine, and k1 and k2 where a command drives their runs:
+    half the 95 % interval, over the value, that a fit should give at most.
 
-    name: str
-    within: float
-
-    @property
-    def can(self) -> bool:
-        """Whether an estimate of it would be given."""
-        return self.within <= HALF
-
-
-def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
-    """How well logs can identify each of the nine, and k1 and k2 where a command drives their runs.
-
-    Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
+    Infinite where the run says nothing. Raises NotIdentifiable where nothing moves. Empty where no
+    run of a first plant can be followed.
     """
     known = _information(first_plant(recorded), recorded)
     if known is None:
         return {}
-    relative = np.sqrt(np.diag(known.covariance)) / known.unit
     least = NO_SURER if recorded.by_command else NO_SURER_CHAOTIC
     return {
-        name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]]))
-        for name, sd in zip(known.names, relative, strict=True)
+        name: max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]])
+        for name, sd in zip(known.names, known.deviations, strict=True)
     }
 
 
@@ -77,8 +63,10 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
     if known is None:
         return {}
     own = range(len(known.names) - len(rivals))
-    place = {one.key: len(own) + i for i, one in enumerate(rivals)}
-    return {key: float(np.sqrt(discriminated(known.matrix, at, own))) for key, at in place.items()}
+    return {
+        one.key: float(np.sqrt(discriminated(known.matrix, at, own)))
+        for at, one in enumerate(rivals, len(own))
+    }
 
 
 def _information(

@@ -17,7 +17,6 @@ from identification.arrays import Array, IntArray
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.estimation.gauss_newton import jacobian
-from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.windowed_run.parameters import (
     even,
     names_of,
@@ -25,14 +24,13 @@ from identification.estimation.windowed_run.parameters import (
     units_in,
     values_of,
 )
-from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, judge, soft
-from identification.estimation.windowed_run.windows import RUN_WINDOW, longest_window
+from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, Judge, soft
+from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
 
-Errors = Callable[[Plant], Array]
 NO_INFORMATION = 1e-9  # of the largest, an eigenvalue of the information that is rounding
 LEAST_NOISE = 1e-12  # N or m, of a signal that is taken to be exact
 LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to be counted on
@@ -47,45 +45,31 @@ NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which 
 class Information:
     """What runs identify of a plant's parameters `names` (d,).
 
-    unit (d,): sizes in which the parameters are counted; matrix (d, d): J'J in these units;
-    chaotic: share of the samples in which the run is sensitive to chance. Runs of their own add up.
+    matrix (d, d): J'J in sizes of the parameters; chaotic: share of the samples in which the run is
+    sensitive to chance. The matrices of runs of their own add up.
     """
 
     names: tuple[str, ...]
-    unit: Array
     matrix: Array
     chaotic: float = 0.0
 
-    def __add__(self, other: "Information") -> "Information":
-        """Of both runs together, in the units of this one; they have the same names."""
-        ratio = self.unit / other.unit
-        both = self.matrix + other.matrix * np.outer(ratio, ratio)
-        return Information(self.names, self.unit, both, max(self.chaotic, other.chaotic))
-
     @property
-    def covariance(self) -> Array:
-        """Least covariance (d, d) of the parameters' errors, in their units squared; infinite on
-        the diagonal where the runs say nothing."""
+    def deviations(self) -> Array:
+        """Least standard deviations (d,) of the parameters' errors, in their sizes; infinite where
+        the runs say nothing."""
         size = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
         silent = size <= 0.0
         scale = np.where(silent, 1.0, size)
         values, vectors = np.linalg.eigh(self.matrix / np.outer(scale, scale))
         kept = values > NO_INFORMATION * max(float(values[-1]), 1e-300)
-        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+        variance = np.sum(vectors[:, kept] ** 2 / values[kept], axis=1)
         # A direction without information makes every parameter in it unknown.
         lost = silent | (np.sum(vectors[:, ~kept] ** 2, axis=1) > NO_INFORMATION)
-        out = inverse * np.outer(self.unit / scale, self.unit / scale)
-        out[lost, lost] = np.inf
-        return np.asarray(out)
-
-    @property
-    def sd(self) -> dict[str, float]:
-        """Least standard deviations by name, infinite where the runs say nothing."""
-        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return np.where(lost, np.inf, np.sqrt(variance) / scale)
 
 
 def information(
-    plant: Plant, errors_of: Errors, drive: Drive, rivals: Sequence[Acting] = (), *,
+    plant: Plant, errors_of: Judge, drive: Drive, rivals: Sequence[Acting] = (), *,
     lost: float = NOT_FOLLOWED,
 ) -> Information:  # fmt: skip
     """What the runs with these errors (n,), in units of the sensors' noise, identify of the plant,
@@ -106,7 +90,7 @@ def information(
         changed = np.where(np.isfinite(changed), changed, 0.0)
         columns.append(soft(changed, FAR_CHANGE)[:, np.newaxis])
     both, every = np.hstack(columns), (*names, *(one.key for one in rivals))
-    return Information(every, np.append(unit, np.ones(len(rivals))), both.T @ both, chaotic)
+    return Information(every, both.T @ both, chaotic)
 
 
 def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:
@@ -136,14 +120,7 @@ def lasting_jacobian(
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(by_chance))
 
 
-def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:
-    """Errors of plants like this one along recorded logs, in the windows in which a fit would
-    follow them: whole runs where the command alone drives them."""
-    logs, drive = recorded.logs, recorded.drive
-    return judge(plant, logs, drive, longest_window(plant, logs, drive))
-
-
-def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Errors:
+def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Judge:
     """Errors of runs by the command, begun anew at rests, in units of the noise [m], [N].
 
     log: without noise; body (n,): its position [m], of which y is what the transducer shows; rests

@@ -170,15 +170,15 @@ def demo() -> Iterator[Screen]:
 
 def drift() -> Iterator[Screen]:
     source = traced(trace_of()).train[0]
-    shift = {n: Shift(n, "N", 12.0, 0.1, 14.4, 0.1, 0.2, 0.01, 0.18, 0.22) for n in NAMES[:4]}
+    shift = {n: Shift(n, "N", 12.0, 0.1, 14.4, 0.1, 14.2, 14.6, 0.2, 0.01, 0.0) for n in NAMES[:4]}
     reasons, none = dict.fromkeys(NAMES[4:], WHY), Statistic(3.0, 12.0, 0.5, 9)
     state: Any = None
     for verdict in ("none", "drift", "structure", "not_judged"):
-        test = DriftTest("a", verdict, tuple(shift.values()), shift, reasons, none, none, "mean",
-                         1.0, 2.0, f"{WHY} {WHY}", state, none, NAMES[4:])  # fmt: skip
+        test = DriftTest(verdict, state, f"{WHY} {WHY}", 1.0, 2.0, tuple(shift.values()),
+                         NAMES[4:], shift, reasons, {}, none, none, none, "mean")  # fmt: skip
         tests = tuple(
             OneTested(replace(source, file=log, log=replace(source.log, name=log)),
-                   replace(test, log=log, reason=f"{log}: {WHY}"), False)
+                   replace(test, reason=f"{log}: {WHY}"), False)
             for log in LOGS
         )  # fmt: skip
         settings: Any = SimpleNamespace(margin=0.02, run_length=1e3, variation=0.01, to_be_seen=1.0)

@@ -9,7 +9,7 @@ from design.measured import axis_lights
 from design.measured.axis_lights import LAST_ON_PAGE, few_sound_logs, history, left_out
 from design.measured.axis_limits import FEWEST_EARLIER, MEANING_OF
 from design.measured.axis_test import Earlier
-from identification.drift.readings import Reading
+from identification.drift.drift_result import Shift
 from identification.model.estimates import Estimate
 from workbench.documents.reading import Stored
 from workbench.documents.result_files import read_model
@@ -73,9 +73,9 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
 
 
-def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
+def by_quantity(shifts: Sequence[Shift]) -> dict[str, Estimate]:
     """This log's parameters as the drift test has them, by quantity."""
-    found = axis_lights.by_quantity(vars(one) for one in readings)
+    found = axis_lights.by_quantity(vars(one) for one in shifts)
     return {
         name: Estimate(value, unit, None, low, high)
         for name, (unit, value, low, high) in found.items()

@@ -18,7 +18,6 @@ from design.measured.drift_document import detectable_sizes
 from design.measured.drift_of_logs import Stream, drift_of
 from design.retuned import Drift, DriftJudge, Retuning
 from identification.drift.mewma import DriftState
-from identification.drift.readings import moved_by, reading_of
 from identification.effects._library import Library
 from identification.errors import BadModel
 from workbench.cards.own_effects import library as installed
@@ -48,12 +47,12 @@ def drift_by_chart(
     return Drift(
         verdict=found.verdict,
         reason=reason_sentence(worst, found.settings.to_be_seen),
-        moved=tuple(moved_by(one) for one in worst.moved),
+        moved=worst.moved,
         p_value=min((one.p_value for one in statistics), default=None),
         state=state_now,
         unsure=worst.unsure,
         could_have_seen=detectable_sizes(worst),
-        parameters=tuple(reading_of(one) for one in worst.shifts.values()),
+        parameters=tuple(worst.shifts.values()),
     )
 
 

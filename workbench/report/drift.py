@@ -146,7 +146,7 @@ def drift_sentence(found: Drifted) -> str:
             if found.slip:
                 return f"In {_files(found, 'drift')}: {found.slip}."
             by = ", by the mean over the logs" if last.found_by == "mean" else ""
-            parts = [", ".join(map(_changed, _as_in_table(last))) + by] if last.moved else []
+            parts = [", ".join(map(_changed, last.moved)) + by] if last.moved else []
             if last.unsure:
                 first = "something more" if parts else "something changed"
                 names = ", ".join(last.unsure)
@@ -189,7 +189,7 @@ def _all_that_moved(test: DriftTest) -> str:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
     moved = []
-    for one in _as_in_table(test):
+    for one in test.moved:
         unit, factor = shown_unit(one.unit)
         before, after = (number(factor * value, 4) for value in (one.before, one.after))
         moved.append(f"{one.name} {before} -> {after} {unit}")
@@ -208,15 +208,8 @@ def _files(found: Drifted, verdict: str) -> str:
 
 
 def _changed(shift: Shift) -> str:
-    change, low, high = (signed_percent(x) for x in (shift.change, shift.low, shift.high))
+    change, low, high = map(signed_percent, (shift.change, *shift.interval))
     return f"{shift.name} {change} ({low} to {high})"
-
-
-def _as_in_table(test: DriftTest) -> list[Shift]:
-    """What has moved, with the numbers of the log's table; by the mean over the logs with its
-    own."""
-    own = {} if test.found_by == "mean" else test.shifts
-    return [own.get(one.name, one) for one in test.moved]
 
 
 def signed_percent(value: float) -> str:
@@ -246,7 +239,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = list[Row]()
     for shift in one.test.shifts.values():
-        change, low, high = map(signed_percent, (shift.change, shift.low, shift.high))
+        change, low, high = map(signed_percent, (shift.change, *shift.interval))
         pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
         values = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
         unit, factor = shown_unit(shift.unit)

@@ -70,7 +70,7 @@ def test_table_2_to_table_3_is_found_from_one_log() -> None:
     for shift in found.moved:
         truth = getattr(table(3), shift.name)
         assert shift.after == pytest.approx(truth, rel=0.01)
-        assert shift.low < truth / getattr(NINE, shift.name) - 1.0 < shift.high
+        assert shift.low < truth < shift.high
     # A jump that is repaired leaves nothing behind.
     assert found.state.logs == 0
 
@@ -146,15 +146,6 @@ def test_what_a_log_does_not_show_is_inconclusive() -> None:
     assert "F_vp" in found.shifts
 
 
-@pytest.mark.slow
-def test_a_state_of_another_model_begins_anew() -> None:
-    last = verdict_on(made_log(NINE, seed=2))
-    other = replace(model(), key="second")
-    found = drift_test(other, made_log(NINE, seed=3), np.random.default_rng(2), state=last.state)
-    assert found.state.model == "second"
-    assert found.state.logs == 1
-
-
 def two(correlation: float) -> tuple[ReferenceModel, LogEstimate]:
     """A model and a log in which m and F_vp both look 5.5 % larger, known to 1 % each."""
     values = np.array([NINE.m, NINE.F_vp])
@@ -163,7 +154,7 @@ def two(correlation: float) -> tuple[ReferenceModel, LogEstimate]:
     known = ReferenceModel(
         Plant(NINE, ACTUATOR), ("m", "F_vp"), values, 1e-6 * np.diag(sd**2), FORCE, "command"
     )
-    return known, LogEstimate(("m", "F_vp"), 1.055 * values, together, {}, 1.0, 2.0)
+    return known, LogEstimate(np.full(2, 0.055), together / np.outer(values, values), {}, 1.0)
 
 
 def test_errors_that_go_together_are_one_accident_and_not_two() -> None:
@@ -185,11 +176,12 @@ def test_the_models_own_error_counts() -> None:
 def coulomb(sd: float, changed: float, *names: str) -> tuple[ReferenceModel, LogEstimate]:
     """A model and a log that tell these to a deviation `sd`, all of them changed by a share."""
     values = np.array([getattr(NINE, name) for name in names])
-    covariance = np.diag((sd * values) ** 2)
+    covariance = 1e-6 * np.diag((sd * values) ** 2)
     known = ReferenceModel(
-        Plant(NINE, ACTUATOR), names, values, 1e-6 * covariance, FORCE, "command", key="one"
+        Plant(NINE, ACTUATOR), names, values, covariance, FORCE, "command", key="one"
     )
-    return known, LogEstimate(names, (1.0 + changed) * values, covariance, {}, 1.0, 2.0)
+    own = sd**2 * np.eye(len(names))
+    return known, LogEstimate(np.full(len(names), changed), own, {}, 1.0)
 
 
 def test_ten_logs_that_could_not_detect_a_drift_of_ten_percent_do_not_judge() -> None:
@@ -231,8 +223,8 @@ def test_what_is_seen_is_found() -> None:
     size = estimate_under_test(known, quiet, "log", state, DriftSettings()).could_have_seen["F_cp"]
     rng, alarms = np.random.default_rng(1), 0
     for _ in range(100):
-        factor = 1.0 + 0.003 * rng.standard_normal(3) + size * np.array([0.0, 1.0, 0.0])
-        log = replace(quiet, values=factor * known.values)
+        change = 0.003 * rng.standard_normal(3) + size * np.array([0.0, 1.0, 0.0])
+        log = replace(quiet, change=change)
         found = estimate_under_test(known, log, "log", state, DriftSettings())
         alarms += found.verdict == "drift"
     assert alarms >= 85
@@ -240,10 +232,8 @@ def test_what_is_seen_is_found() -> None:
 
 def test_of_parameters_that_cannot_be_distinguished_none_is_named() -> None:
     known, log = coulomb(0.05, 0.0, "F_cp", "F_vp")
-    together = np.array([[1.0, -0.999], [-0.999, 1.0]]) * np.outer(
-        0.05 * known.values, 0.05 * known.values
-    )
-    log = replace(log, values=known.values * np.array([1.045, 1.045]), covariance=together)
+    together = 0.05**2 * np.array([[1.0, -0.999], [-0.999, 1.0]])
+    log = replace(log, change=np.full(2, 0.045), covariance=together)
     found = estimate_under_test(known, log, "log", fresh_state("one", known.names), DriftSettings())
     assert found.verdict == "drift"
     assert found.moved == ()

@@ -27,24 +27,31 @@ LEFT = 30.0
 
 def estimate(rng: np.random.Generator, factor: Array, left: float = LEFT) -> LogEstimate:
     """What a log of a machine changed by `factor` (9,) gives under a model that lacks something."""
-    values = NINE.array * factor * (1.0 + TRUE * rng.standard_normal(9))
-    covariance = np.diag((SAID * NINE.array) ** 2)
-    return LogEstimate(NAMES, values, covariance, {}, left, 1e9)
+    change = factor * (1.0 + TRUE * rng.standard_normal(9)) - 1.0
+    return LogEstimate(change, SAID**2 * np.eye(9), {}, left, as_usual=True)
 
 
 def model(rng: np.random.Generator, logs: int = 3) -> ReferenceModel:
     """The mean of its logs, with a misfit of them."""
     own = [estimate(rng, np.ones(9)) for _ in range(logs)]
-    values = np.mean([one.values for one in own], axis=0)
-    covariance = np.diag((SAID * NINE.array) ** 2) / logs
+    middle = np.mean([one.change for one in own], axis=0)
+    values, covariance = (1.0 + middle) * NINE.array, np.diag((SAID * NINE.array) ** 2) / logs
     found = ReferenceModel(
         Plant(NINE, ACTUATOR), NAMES, values, covariance, Rig("force"), "force", chi_square=LEFT
     )
-    return replace(found, own_logs=own_logs_of(found, own))
+    return replace(found, own_logs=own_logs_of(found, [beside(found, one) for one in own]))
+
+
+def beside(known: ReferenceModel, log: LogEstimate) -> LogEstimate:
+    """The same from the model's values instead of the machine's."""
+    share = NINE.array / known.values
+    change = share * (1.0 + log.change) - 1.0
+    return replace(log, change=change, covariance=log.covariance * np.outer(share, share))
 
 
 def verdict(known: ReferenceModel, log: LogEstimate) -> DriftTest:
-    return estimate_under_test(known, log, "log", fresh_state("", known.names), DriftSettings())
+    state = fresh_state("", known.names)
+    return estimate_under_test(known, beside(known, log), "log", state, DriftSettings())
 
 
 def worn() -> Array:

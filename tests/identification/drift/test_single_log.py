@@ -6,13 +6,14 @@ import pytest
 from identification.drift.practical_margin import Change
 from identification.drift.single_log import LogChange, detectable_together
 
+NAMES = ("m", "F_cp", "F_cn")
 MEASURED = 1e-6 * np.array([[4.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 25.0]])
 VARIED = np.full(3, 1e-4)
 SQUARE = 16.0
 
 
 def of(change: list[float], varied: float = 1e-4) -> LogChange:
-    return LogChange((0, 1, 2), np.array(change), MEASURED, np.full(3, varied), 0.02)
+    return LogChange(NAMES, np.array(change), MEASURED, np.full(3, varied), 0.02)
 
 
 def test_a_change_within_the_margin_is_none_however_little_the_machine_varies() -> None:
@@ -46,14 +47,13 @@ def test_the_smallest_change_is_seen_as_often_as_is_said() -> None:
 def test_all_together_see_the_smallest_change_at_least_as_often() -> None:
     rng = np.random.default_rng(2)
     errors = rng.multivariate_normal(np.zeros(3), MEASURED, 200)
-    margin = np.full(3, 0.02)
-    sizes = detectable_together(Change((0, 1, 2), np.zeros(3), MEASURED, margin), SQUARE)
+    sizes = detectable_together(Change(NAMES, np.zeros(3), MEASURED, 0.02), SQUARE)
     for i, size in enumerate(sizes):
         changed = size * np.eye(3)[i]
-        squares = [Change((0, 1, 2), changed + error, MEASURED, margin).square for error in errors]
+        squares = [Change(NAMES, changed + error, MEASURED, 0.02).square for error in errors]
         assert np.mean(np.array(squares) > SQUARE) > 0.86
 
 
 def test_a_change_that_nothing_shows_is_never_seen() -> None:
-    blind = Change((0,), np.zeros(1), np.array([[1e4]]), np.array([0.02]))
+    blind = Change(("m",), np.zeros(1), np.array([[1e4]]), 0.02)
     assert detectable_together(blind, SQUARE)[0] == np.inf

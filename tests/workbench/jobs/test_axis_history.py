@@ -12,7 +12,7 @@ from design.machine.documents import model_document
 from design.machine.effect_values import written_effect
 from design.machine.source import Source
 from design.simulated.record import record
-from identification.drift.readings import Reading
+from identification.drift.drift_result import Shift
 from identification.effects._library import built_in
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
@@ -123,9 +123,9 @@ def test_a_machine_that_is_not_there_is_refused(registry: Registry) -> None:
 def test_readings_of_the_drift_test_by_quantity() -> None:
     found = by_quantity(
         [
-            Reading("F_sn", "N", -21.0, -20.0, -21.5, -18.5, 0.0, 0.1),
-            Reading("backlash.width", "m", 1e-4, 2e-4, 1e-4, 3e-4, 0.0, 0.1),
-            Reading("stribeck.F_s", "N", 1.0, 1.0, 0.9, 1.1, 0.0, 0.1),
+            Shift("F_sn", "N", -21.0, 0.1, -20.0, 0.8, -21.5, -18.5, 0.0, 0.1, 1.0),
+            Shift("backlash.width", "m", 1e-4, 1e-5, 2e-4, 5e-5, 1e-4, 3e-4, 0.0, 0.1, 1.0),
+            Shift("stribeck.F_s", "N", 1.0, 0.1, 1.0, 0.05, 0.9, 1.1, 0.0, 0.1, 1.0),
         ]
     )
     assert set(found) == {"F_sn", "backlash"}

@@ -83,7 +83,7 @@ def test_what_could_not_have_been_seen_is_status_0_and_loud(
 
 def test_an_older_log_is_no_comfort_for_a_newer_one_that_could_see_nothing() -> None:
     state = fresh_state("k", ())
-    blank = DriftTest("a", "none", (), {}, {}, None, None, None, None, None, "", state)
+    blank = DriftTest("none", state)
     tested = replace(blank, single=Statistic(0.0, 1.0, 1.0, 1))
     silent = replace(blank, verdict="not_judged")
     coarse = replace(tested, verdict="not_judged")
@@ -102,15 +102,19 @@ def test_an_older_log_is_no_comfort_for_a_newer_one_that_could_see_nothing() -> 
 
 def test_a_change_has_the_number_that_the_table_has() -> None:
     def shift(change: float) -> Shift:
-        return Shift("F_cp", "N", 16.0, 0.1, 16.0 * (1.0 + change), 0.1, change, 0.01, 0.0, 0.3)
+        after = 16.0 * (1.0 + change)
+        return Shift("F_cp", "N", 16.0, 0.1, after, 0.1, after, after, change, 0.01, 0.0)
 
     one = Statistic(20.0, 12.0, 1e-6, 1)
     state, source = fresh_state("k", ()), identified().sources[0]
-    by_log = DriftTest("a", "drift", (shift(0.103),), {"F_cp": shift(0.105)}, {}, one, one, "log",
-                       1.0, 2.0, "", state)  # fmt: skip
+    by_log = DriftTest(
+        "drift", state, moved=(shift(0.105),), shifts={"F_cp": shift(0.105)}, single=one, mean=one,
+        found_by="log",
+    )  # fmt: skip
+    by_mean = replace(by_log, moved=(shift(0.103),), found_by="mean")
     for test, said in (
         (by_log, "F_cp +10.5 % ("),
-        (replace(by_log, found_by="mean"), "F_cp +10.3 % (+0.00 % to +30.0 %), by the mean over"),
+        (by_mean, "F_cp +10.3 % (+8.34 % to +12.3 %), by the mean over"),
     ):
         runs = (OneRun(source, test, False),)
         found = Drifted(identified().model, "k", DriftSettings(), runs, Stream(state, ()), ())
