@@ -73,6 +73,8 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
     name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
     if logged is None:
         return
+    if of_command and (rig.force_per_command or 0.0) < 0.0:
+        logged = -logged
     whole = low_pass(logged, log.h, motion.cutoff) if np.ptp(logged) > 0.0 else logged
     drive = whole[sure]
     yield from _against_stops(log["y"], whole, sure, name, Display.of(rig))
@@ -80,6 +82,8 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
         yield _said_of_coasting(name, np.abs(v))
         return
     work = None if one_way else work_share(log["y"], logged)
+    if work is not None and of_command and rig.force_per_command is None:
+        work = abs(work)  # which way the command acts is not known
     if _bears_place_alone(drive, y, v, a, rotary=rig.motion == "rotary"):
         yield (
             f"the {name} depends on position alone, as a weight's or a spring's, and does not"

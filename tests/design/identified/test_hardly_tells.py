@@ -64,6 +64,17 @@ def test_nearly_one_way_is_reported_by_its_share() -> None:
     assert "nearly one way (9" in said(FORCE, T, y + 1e-3 * np.sin(T), np.gradient(y) + noise(1e-6))
 
 
+@pytest.mark.parametrize("constant", [-2.0, None])
+def test_a_command_of_the_other_sign_does_its_work(constant: float | None) -> None:
+    """What counts is the force; where its constant is not known, nor is its sign."""
+    found = machine(np.random.default_rng(0), T, KINDS["choose"][0])
+    log = Log("run", {"t": T, "y": found["y"], "u": -found["F"]})
+    rig = replace(MOTOR, force_per_command=constant, command_unit="1")
+    assert "hardly any work" not in " ".join(hardly_identifiable([log], rig))
+    turned = replace(rig, force_per_command=2.0)
+    assert "hardly any work" in " ".join(hardly_identifiable([log], turned))
+
+
 def test_where_nothing_is_said_no_run_is_needed() -> None:
     assert hardly_identifiable([], FORCE) == ()
 
