@@ -49,6 +49,7 @@ from workbench.report.trace import (
     effects_table,
     errors_table,
     rivals_table,
+    trace_parts,
 )
 from workbench.report.trace_pictures import axis_of
 from workbench.report.trace_words import advice, percent, trace_sentence
@@ -339,6 +340,9 @@ def test_rows_of_the_tables() -> None:
         "nonlinear viscous",
         "cogging",
     ]
+    early = traced(replace(found, not_tried=("effects",)))
+    said = "the values are for now, as the trace ended early:"
+    assert said in trace_parts(early) and said not in trace_parts(traced(found))
     changed = {row[0]: row[-1] for row in changes_table(found).whole}
     assert changed["F_cp"] == "-8.3 %" and changed["m"] == "0 %"
     assert len(changes_table(found).head) == len(changes_table(found).whole[0])
