@@ -108,3 +108,12 @@ def test_intervals_of_a_law_that_lacks_something_are_said_to_be_its_own() -> Non
     for left, said in ((1.0, False), (22.0, True)):
         lines = " ".join(fit_lines(by_equation(left)))
         assert ("the 95 % intervals hold for this law only" in lines) == said
+
+
+def test_without_a_mass_no_noise_of_the_acceleration_is_in_the_force() -> None:
+    model = by_equation(22.0)
+    model = replace(model, fit=replace(model.fit, force_relative=0.3))
+    blank = replace(model.friction["m"], value=None, sd=None, assumed=1.0, reason="too slow")
+    without = replace(model, friction={**model.friction, "m": blank})
+    assert "the noise of the acceleration in it" in " ".join(fit_lines(model))
+    assert "the noise of the acceleration in it" not in " ".join(fit_lines(without))
