@@ -138,7 +138,7 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
         change[max(k - JUMP_NEAR, 0) : k + JUMP_NEAR] = 0.0
     size = np.abs([jump_size(y, int(k)) for k in found])
     sudden = size > SUDDEN_SHARE * float(np.max(change))
-    return found[sudden & (y[found + 1] != y[found])]
+    return np.asarray(found[sudden & (y[found + 1] != y[found])])
 
 
 def beside_gaps(t: Array) -> NDArray[np.bool_]:

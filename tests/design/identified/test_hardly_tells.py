@@ -112,3 +112,12 @@ def test_a_body_that_a_step_brings_to_speed_is_driven() -> None:
 def test_runs_that_go_one_way_each_go_both_ways_together() -> None:
     assert "one direction" in " ".join(hardly_identifiable(steps(1.0, 0.8), MOTOR))
     assert "one direction" not in " ".join(hardly_identifiable(steps(1.0, -0.8), MOTOR))
+
+
+def test_turns_that_an_encoders_step_hides_are_counted() -> None:
+    """A relay's swing of two counts; a longer one, or a finer encoder, hides none."""
+    swing = np.sin(8.0 * np.pi * T) * (1.0 + 0.2 * np.sin(3.0 * T))
+    for size, count, hidden in ((1.4, 1.0, True), (340.0, 1.0, False), (1.4, 1e-3, False)):
+        y = 0.0175 * count * np.round(size * swing / count)
+        text = said(MOTOR, T, y, np.cos(8.0 * np.pi * T))
+        assert ("so much counts as rest" in text) == hidden, text
