@@ -13,6 +13,10 @@ class BadLog(UserError):
     """A log that cannot be read or cannot be what its card says."""
 
 
+class ShortLog(BadLog):
+    """A log with too few samples in a row, which is left out beside others."""
+
+
 class BadModel(UserError):
     """A model, design or parameter set outside what the equations allow."""
 

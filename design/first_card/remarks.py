@@ -158,6 +158,9 @@ def no_body(columns: Columns) -> BadLog:
             " too: reference and position alone identify no friction"
         )
     unsigned = f"; {reason}" if (reason := without_sign(columns.signals)) else ""
+    clock = columns.clock
+    if "time" not in clock.header.means:
+        unsigned += f"; {clock.shown} is taken for the clock as it goes up: is it one?"
     there = ", ".join(one.shown for one in columns.signals) or "none"
     left_out = "; ".join(
         f"left out: column {one.shown}: {why}"

@@ -62,8 +62,8 @@ def kind_guess(roles: Roles, other: Roles | None) -> RigGuess:
     sure = bool(roles.ahead >= SURE and roles.odds[DRIVEN_THROUGH[roles.kind][0]] >= SURE)
     why = DRIVEN_BY[roles.kind]
     if not sure and other is not None:
-        why += f", by {_drive_columns(roles)}; a {other.kind} rig would be driven by"
-        why += f" {_drive_columns(other)}"
+        why += f", by {_drive_columns(roles)}; a rig of kind {other.kind} would be driven"
+        why += f" by {_drive_columns(other)}"
     return RigGuess("kind", roles.kind, "", sure, why, "" if sure or other is None else other.kind)
 
 

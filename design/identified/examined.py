@@ -15,7 +15,7 @@ from design.machine.model import Identifiable
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
-from identification.signals.clean import limits
+from identification.signals.clean import left_out, limits
 from identification.signals.delays import Delay, delays_of, exchanged_columns
 from identification.signals.sensor_state import Clock, SensorState, sensor_state
 
@@ -105,10 +105,11 @@ def examined(found: CheckedLog, units: Sequence[str], *, effects: bool = False) 
     delays = delays_of(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else exchanged_columns(delays, sensors, log.h)
     remarks = [*([exchanged] if exchanged else []), *units, *remarks]
+    reason = "; ".join([seen.reason, *left_out(remarks)]) if seen.reason else ""
     known = {
         **vars(seen),
         **vars(found),
-        "refused": found.refused or seen.reason,
+        "refused": found.refused or reason,
         "remarks": tuple(dict.fromkeys([*remarks, *seen.remarks])),
     }
     return Examined(

@@ -11,11 +11,13 @@ import numpy as np
 from design.machine.readable import Display
 from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
+from identification.estimation.regression.motion_log import SURE_OF_DIRECTION
 from identification.log import Log, Rig
 from identification.signals.check import work_share
-from identification.signals.differentiate import differentiate, low_pass
+from identification.signals.differentiate import Motion, differentiate, low_pass, resolution
 from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
+from identification.signals.steps import white_noise
 from identification.thresholds import ASTRAY, HALF
 
 INFORMATIVE_RATE = 50.0  # Hz, below which starts and stops lie between two samples
@@ -32,6 +34,8 @@ BRAKED = (
     " k_t k_e / R = k_e force_per_command; log its current to identify friction alone"
 )
 DRIVE_IT = "log quick strokes that a command drives"
+FEWEST_TURNS = 10  # of a position, from which it counts how many of them its step hides
+MORE_THAN_ONE = 1.5  # counts of an encoder, that a stroke has at least
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -64,6 +68,7 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
             " friction is not identifiable; log a run with strokes in both directions"
         )
         return
+    yield from _turns_hidden(log["y"], motion, Display.of(rig))
     up = float(np.mean(v > 0.0))
     one_way = min(up, 1.0 - up) < NEARLY_ONE_WAY
     ends = (one["y"][-1] - one["y"][0] for one in others)
@@ -73,6 +78,8 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
     name, logged = ("command", log["u"]) if of_command else ("force", log.signals.get("F"))
     if logged is None:
         return
+    if of_command and (rig.force_per_command or 0.0) < 0.0:
+        logged = -logged
     whole = low_pass(logged, log.h, motion.cutoff) if np.ptp(logged) > 0.0 else logged
     drive = whole[sure]
     yield from _against_stops(log["y"], whole, sure, name, Display.of(rig))
@@ -80,6 +87,8 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
         yield _said_of_coasting(name, np.abs(v))
         return
     work = None if one_way else work_share(log["y"], logged)
+    if work is not None and of_command and rig.force_per_command is None:
+        work = abs(work)  # which way the command acts is not known
     if _bears_place_alone(drive, y, v, a, rotary=rig.motion == "rotary"):
         yield (
             f"the {name} depends on position alone, as a weight's or a spring's, and does not"
@@ -95,6 +104,24 @@ def _of_motion(log: Log, rig: Rig, others: Sequence[Log]) -> Iterator[str]:
         return
     if rig.kind == "motor" and (share := derivative(motion, logged).share) > ALL_FOLLOWED:
         yield _said_of_followed(name, share, rig.command_unit)
+
+
+def _turns_hidden(y: Array, motion: Motion, display: Display) -> Iterator[str]:
+    """A line where most of the way of a position that a sensor counts is too short for its step:
+    the noise of the velocity, which that makes, hides it."""
+    count, step = resolution(y), np.diff(y)
+    if not 0.0 < white_noise(y) <= count:
+        return
+    hidden = np.abs(motion.v[1:]) < SURE_OF_DIRECTION * motion.v_noise
+    step, way = step[step != 0.0], np.abs(step)
+    strokes = np.add.reduceat(step, np.flatnonzero(np.diff(np.sign(step), prepend=0.0)))
+    turns = int(np.sum(np.abs(strokes) > MORE_THAN_ONE * count)) - 1
+    if turns > FEWEST_TURNS and np.sum(way[hidden]) > HALF * np.sum(way):
+        yield (
+            f"the position turns {turns} times by more than its step of"
+            f" {display.length_text(count)}, and goes most of its way too slowly to stand out of"
+            " it: so much counts as rest; log longer strokes, or use a finer encoder"
+        )
 
 
 def _against_stops(

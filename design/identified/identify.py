@@ -16,7 +16,7 @@ from design.asked import Options
 from design.machine.active_model import active_model
 from design.machine.arx_plant import ArxPlant, ArxTests
 from design.machine.effect_values import relabelled
-from design.machine.model import FitSummary, LogEntry, Model, ParameterCorrelation
+from design.machine.model import FAST, FitSummary, LogEntry, Model, ParameterCorrelation
 from design.machine.readable import Display
 from design.machine.source import Source
 from design.machine.versions import versions
@@ -45,7 +45,6 @@ from identification.signals.differentiate import differentiate
 Orders = tuple[int, int, int]
 
 SPLIT = 0.6
-FAST = 0.99
 ORDERS = OrderRange(4, 4, 4, min_nk=1)  # tried where none are given
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop

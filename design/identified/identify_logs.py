@@ -19,6 +19,7 @@ from design.machine.surrounding_lines import surrounding_lines, unequal_friction
 from identification.errors import NotIdentifiable
 from identification.model.estimates import KarnoppFit
 from identification.progress import KeepGoing, Progress, quiet, without_end
+from identification.signals.clean import left_out
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
@@ -65,7 +66,7 @@ def identify_logs(
         )
     except NotIdentifiable as error:
         said = looks_like_velocity(runs, rig)
-        raise NotIdentifiable("; ".join([str(error), *said])) from error
+        raise NotIdentifiable("; ".join([str(error), *said, *left_out(logs.remarks)])) from error
     gate = identifiability_of_runs(runs, rig, options.drive, fit=fit)
     now = logs.present(model.period)
     model = replace(

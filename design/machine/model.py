@@ -33,6 +33,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE, MATERIAL
 
 FALLING_NAMES = (*COULOMB_NAMES, *VISCOUS_NAMES)
+FAST = 0.99  # quantile of the measured speeds, that counts as a log's
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from design.machine.model import Model, used
+from design.machine.model import FAST, Model, used
 from identification.arrays import Array, IntArray
 from identification.effects._base import Acting
 from identification.errors import BadLog, BadModel
@@ -30,6 +30,7 @@ from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.inverse_dynamics import force_needed, of_body, with_motor_force
 
 RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
+FASTER_THAN_FITTED = 1.1  # times the speed of a model's logs, above which it is extrapolated
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit that does not follow its logs whole
 
 
@@ -66,6 +67,12 @@ class Prediction:
     def force_predicted_rms(self) -> float | None:
         """Root mean square of applied less predicted force on sliding samples; None without any."""
         return _rms_where((self.force_applied - self.force_predicted)[self.sliding])
+
+    @property
+    def force_applied_rms(self) -> float | None:
+        """Root mean square of the applied force on the same samples: the error of predicting none;
+        None without any."""
+        return _rms_where(self.force_applied[self.sliding])
 
     @property
     def force_simulated_rms(self) -> float | None:
@@ -116,6 +123,7 @@ def predict(
         refused=refused,
         remarks=(
             *_assumed(model, ran=run is not None),
+            *_faster(model, float(np.quantile(np.abs(motion.v), FAST))),
             *([f"force, simulated: {other}"] if other else []),
         ),
     )
@@ -172,6 +180,17 @@ def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
     what = "force and run" if ran else "force"
     said = f"{what} by assumed values of what is not identifiable: {', '.join(names)}"
     return (said,) if names else ()
+
+
+def _faster(model: Model, speed: float) -> tuple[str, ...]:
+    """A line where the body moves faster [m/s] than in the logs that the model is fitted on."""
+    if model.speed is None or speed <= FASTER_THAN_FITTED * model.speed:
+        return ()
+    here, there = (f"{model.display.length_text(one)}/s" for one in (speed, model.speed))
+    return (
+        f"faster than the logs of the model ({here}, they {there}): a fit holds for the speeds that"
+        " it has seen",
+    )
 
 
 def default_drive(model: Model, log: Log) -> Drive:

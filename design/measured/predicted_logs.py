@@ -13,10 +13,14 @@ from identification.model.estimates import Drive
 
 @dataclass(frozen=True)
 class Predicted:
-    """The predictions of a log's runs, and what is said of them together, as `--json` prints it."""
+    """The predictions of a log's runs, and what is said of them together, as `--json` prints it.
+
+    inertia: whether the predicted force has that of an identified mass in it.
+    """
 
     runs: tuple[Prediction, ...]
     summary: Mapping[str, Any]
+    inertia: bool = True
 
 
 def predict_logs(
@@ -37,7 +41,7 @@ def predict_logs(
     found = tuple(predict(model, s.log, drive=drive, window=window) for s in logs.runs)
     of_runs = dict.fromkeys(line for one in found for line in one.remarks)
     refused = dict.fromkeys(one.refused for one in found if one.refused is not None)
-    names = ("position_rms", "force_predicted_rms", "force_simulated_rms")
+    names = ("position_rms", "force_predicted_rms", "force_applied_rms", "force_simulated_rms")
     other = []
     if model.card != logs.card:
         other = [f"the model is of {model.card}, the log of {logs.card}"]
@@ -51,4 +55,5 @@ def predict_logs(
             "run_refused": "; ".join(refused) or None,
             "remarks": (*model.read, *logs.remarks, *other, *of_runs),
         },
+        model.friction["m"].known,
     )

@@ -19,6 +19,7 @@ MOST_BODIES, MOST_CHAMBERS = 8, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 SAME_POSITION = 0.95  # correlation with the position, that no command has
+SAME_ENDS = 0.05  # of the travel, within which a body stops at the ends of its set point
 EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
 MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
 HEADER_SAYS = 2.0  # log-odds by a header, without which no role is sure
@@ -114,7 +115,8 @@ def _are_several(one: Column, other: Column) -> bool:
 
 def _is_set_point(seen: Seen, k: int) -> bool:
     """Whether a command is where the position goes: in counts, as those of a stepper, or in the
-    size of the position, which follows it; or by the command that a controller makes of both."""
+    size of the position, which follows it, or goes on to both its ends; or by the command that a
+    controller makes of both."""
     one = seen.pairs.signals[k]
     unit = one.header.unit
     if unit is not None:
@@ -124,6 +126,9 @@ def _is_set_point(seen: Seen, k: int) -> bool:
     same = abs(float(np.std(one.x)) - size) < weights.SAME_UNIT * size
     like = seen.lead(k).likeness
     if same and like > SAME_POSITION:
+        return True
+    low, high = one.x.min() - seen.y.x.min(), one.x.max() - seen.y.x.max()
+    if like > weights.CALLED_ALIKE and max(abs(low), abs(high)) < SAME_ENDS * np.ptp(seen.y.x):
         return True
     return like > weights.CALLED_ALIKE and seen.is_followed_by_control(k)
 

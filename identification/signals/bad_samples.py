@@ -45,7 +45,7 @@ class BadSamples:
         if self.last > self.first:
             when += f" to {self.last:.6g} s"
         size = "" if self.size is None else f", {self.size:.3g} at most"
-        many = f" ({self.samples} samples{size})"
+        many = f" ({self.samples} sample{'s' * (self.samples > 1)}{size})"
         if self.kind == "saturated" and self.signal == "u":
             return f"{self.log}: the command is at its limit in {self.samples} samples, {when}"
         if self.kind == "saturated":

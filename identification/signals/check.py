@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.errors import BadLog, NotIdentifiable
+from identification.errors import BadLog, NotIdentifiable, ShortLog
 from identification.log import Log, Rig
 from identification.signals.frozen import noise_shows, within
 from identification.signals.jumps import Jumps, jumps
@@ -117,7 +117,7 @@ def _check_steps(logs: Sequence[Log]) -> None:
     raise NotIdentifiable(
         f"{logs[0].name}: the applied force is constant ({said}), so friction and mass are not"
         " distinguishable from it; log a force that changes, or steps of several sizes in each"
-        " direction, and check the force's columns in the card"
+        " direction, and name all their logs together; check the force's columns in the card"
     )
 
 
@@ -138,7 +138,7 @@ def _check_moving_force(log: Log) -> None:
 def check_time(log: Log, first_row: int = 1) -> None:
     """Pass a log of at least `SHORTEST_LOG` samples whose time is finite and increases."""
     if len(log) < SHORTEST_LOG:
-        raise BadLog(
+        raise ShortLog(
             f"{log.name}: {len(log)} samples, at least {SHORTEST_LOG} needed; give a longer run"
         )
     t = log["t"]

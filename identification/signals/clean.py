@@ -4,6 +4,7 @@
 A longer run of missing values is never invented: the log is cut there.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,12 +27,14 @@ from identification.signals.even_clock import (
 from identification.signals.frozen import clipped, frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.signals.offsets import unwrapped, without_jumps
-from identification.signals.renewal import hold_length, new_values
 from identification.signals.steps import beside_gaps, small_spikes, white_noise
 
 LONGEST_REPAIR = 3
 """Missing samples in a row that are put back, by interpolation or as lost rows; at a longer run
 the log is cut."""
+
+SHORT_OR_STILL = f"of under {SHORTEST_LOG} rows or at rest left out"  # of runs
+LOG_LEFT_OUT = ": left out"  # of a log
 
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
 _TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
@@ -89,9 +92,10 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         said.append(f"{log.name}: {clock}, resampled every {1e3 * runs[0].h:.3g} ms")
     if len(runs) > 1 or lost > LONGEST_GAP * runs[0].h:
         hours = hours_in_words(gaps_in(log["t"], log.h), log.h)
-        said.append(
-            f"{log.name}: in {len(runs)} runs; {lost:.4g} s in gaps or short runs left out{hours}"
-        )
+        away = len(gaps_in(log["t"], runs[0].h)) + 1 - len(runs)
+        short = f" and {away} run{'s' * (away > 1)} {SHORT_OR_STILL}" if away else " left out"
+        kept = f"in {len(runs)} run{'s' * (len(runs) > 1)}"
+        said.append(f"{log.name}: {kept}; {lost:.4g} s in gaps{short}{hours}")
     return Prepared(runs, (*remarks, *said), bad)
 
 
@@ -102,6 +106,11 @@ def _moving(runs: tuple[Log, ...]) -> tuple[Log, ...]:
         if "y" not in run or np.ptp(run["y"]) > _MOVED * white_noise(run["y"])
     )  # fmt: skip
     return found or runs
+
+
+def left_out(remarks: Sequence[str]) -> list[str]:
+    """The remarks on runs and logs that are left out, which a refusal of the rest names."""
+    return [one for one in remarks if SHORT_OR_STILL in one or one.endswith(LOG_LEFT_OUT)]
 
 
 def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
@@ -276,22 +285,23 @@ def limits(log: Log, name: str, done: Done = "kept") -> list[BadSamples]:
     """Where a signal stands at its largest or smallest value for several samples, a finding each.
 
     Of a sensor of a force or pressure that is its range's end; a position may rest there. Of a
-    signal that the logger holds only new values count: the next has to be the same.
+    signal that the logger holds a value counts as often as it stays for longer than the usual one.
     """
     x = log[name]
-    step = hold_length(x)
-    new = x if step == 1 else x[new_values(x, step)]
     low, high = float(x.min()), float(x.max())
     if low == high or len(np.unique(x)) < _LEVELS:
         return []
+    starts = np.flatnonzero(np.diff(x, prepend=np.nan) != 0.0)
+    held = np.diff(starts, append=len(x))  # samples, of each value
+    again = held / np.median(held) - 1.0
     out, beside = [], _BESIDE_LIMIT * resolution(x[np.isfinite(x)])
     for limit in (low, high):
-        again = new == limit
-        near = int(np.count_nonzero(np.abs(new - limit) <= beside))  # the limit itself among them
-        piled = np.count_nonzero(again) > _AT_LIMIT * (near - np.count_nonzero(again))
-        if piled and np.count_nonzero(again[1:] & again[:-1]) >= LONGEST_REPAIR:
-            at = x == limit
-            t, count = log["t"][at], int(at.sum())
+        at = x == limit
+        count = int(at.sum())
+        near = int(np.count_nonzero(np.abs(x - limit) <= beside))  # the limit itself among them
+        piled = count > _AT_LIMIT * (near - count)
+        if piled and np.sum(again[x[starts] == limit]) >= LONGEST_REPAIR:
+            t = log["t"][at]
             first, last = float(t[0]), float(t[-1])
             out.append(BadSamples(log.name, name, "saturated", first, last, count, None, done))
     return out

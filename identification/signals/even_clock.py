@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.errors import BadLog
+from identification.errors import ShortLog
 from identification.log import Log
 from identification.signals.check import SHORTEST_LOG
 from identification.signals.differentiate import resolution
@@ -27,14 +27,14 @@ def even_clock(log: Log) -> tuple[Log, ...]:
     by which such gaps may be none. Of such a one the command `u` and two-valued signals are held
     (the last value at the middle of the new period); the rest follows a piecewise cubic that keeps
     monotone stretches monotone, so that a step neither rings nor spreads over more than one sample.
-    Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
+    Runs under `SHORTEST_LOG` samples are left out. Raises ShortLog where none is left.
     """
     runs = _runs(log, log.h)
     if not runs:  # rows in bursts, whose holes are none beside the mean period
         runs = _runs(log, _mean_period(log["t"]))
     if not runs:
         gaps = len(gaps_in(log["t"], log.h))
-        raise BadLog(
+        raise ShortLog(
             f"{log.name}: {gaps} gap{' leaves' if gaps == 1 else 's leave'} no run of"
             f" {SHORTEST_LOG} samples at {log.h:.4g} s; log without gaps"
         )

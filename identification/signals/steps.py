@@ -125,7 +125,8 @@ def _roughness(x: Array, side: int) -> Array:
 def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
     """Samples (k,) after which the position y (n,) goes on from another place, in order.
 
-    t [s], (n,): beside a gap of the clock none is looked for.
+    t [s], (n,): beside a gap of the clock none is looked for. A sample that repeats the one before
+    was read twice, so all that stays behind is the clock.
     """
     if len(y) < 4 * JUMP_NEAR:
         return np.zeros(0, dtype=np.intp)
@@ -136,7 +137,8 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
     for k in found.tolist():
         change[max(k - JUMP_NEAR, 0) : k + JUMP_NEAR] = 0.0
     size = np.abs([jump_size(y, int(k)) for k in found])
-    return found[size > SUDDEN_SHARE * float(np.max(change))]
+    sudden = size > SUDDEN_SHARE * float(np.max(change))
+    return np.asarray(found[sudden & (y[found + 1] != y[found])])
 
 
 def beside_gaps(t: Array) -> NDArray[np.bool_]:

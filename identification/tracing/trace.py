@@ -25,6 +25,7 @@ from identification.model.surroundings import Surroundings
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.remarks import MinorRemark
 from identification.signals.check import are_steps, check_driven
+from identification.signals.weak_form import WeakWindows
 from identification.thresholds import ADEQUATE, COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, only
 from identification.tracing.held_out import HeldOut
@@ -43,10 +44,8 @@ from identification.tracing.structure_search import (
 )
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
-MOVE_IT = (
-    "a held-out run in which the body slides for longer: in this one too little, so nothing can be"
-    " tested"
-)
+MOVE_IT = "a held-out run in which the body slides for longer in one direction at a time"
+FEW_WINDOWS = ": {} windows of {:.2g} s of such sliding found in one, {} needed to test an effect"
 ONE_WAY_ALONE = (
     "motion in one direction, in which only cogging is distinguishable from friction and a constant"
     " force"
@@ -104,7 +103,9 @@ def trace(
     if (traced.verdict == "unknown" or nothing_found) and by_command and not halt.reached():
         traced = _by_force(traced, train, test, rig, library, rng, report, halt)
     if still:
-        traced = replace(traced, verdict="unknown", complete=False, next_experiment=MOVE_IT)
+        slid = max((_sliding(log, rig) for log in test), key=lambda one: len(one.start))
+        few = FEW_WINDOWS.format(len(slid.start), slid.length * test[0].h, FEWEST_ROWS)
+        traced = replace(traced, verdict="unknown", complete=False, next_experiment=MOVE_IT + few)
     if not beside.none:
         traced = with_surroundings(traced, beside, *recorded_as, rig)
     if beside.sampled:  # a measured current, which no period holds
@@ -227,8 +228,12 @@ def _by_halves(
 
 def _slides(log: Log, rig: Rig) -> bool:
     """Whether the body slides in a log, for long enough to judge."""
-    one = motion_log(log, zoh=rig.kind == "motor", by_command=False)
-    return len(one.sliding.start) >= FEWEST_ROWS
+    return len(_sliding(log, rig).start) >= FEWEST_ROWS
+
+
+def _sliding(log: Log, rig: Rig) -> WeakWindows:
+    """The windows of a log in which the body slides."""
+    return motion_log(log, zoh=rig.kind == "motor", by_command=False).sliding
 
 
 def _chosen(

@@ -204,6 +204,7 @@ def experiment() -> Iterator[Screen]:
 def predict() -> Iterator[Screen]:
     summary = {
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
+        "force_applied_rms": 0.5,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
     yield view(Predicted((), summary), Display(), LOGS[0]).screen(OUT)

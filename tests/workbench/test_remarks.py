@@ -15,7 +15,7 @@ LOGS = tuple(f"run{n}.csv" for n in range(40))
 SAID = (
     "uneven clock, resampled every {:.3g} ms",
     "isolated spikes of 'y' in {} samples interpolated (at most 3 in a row), first in row {}",
-    "in {} runs; {} s in gaps or short runs left out",
+    "in {} runs; {} s in gaps left out",
     "the command is at its limit in {} samples, t = {} s to 9 s",
 )
 NUMBERS = st.integers(-5, 5) | st.floats(-1e6, 1e6).map(lambda x: round(x, 3))

@@ -10,9 +10,10 @@ from pathlib import Path
 
 from design.machine.nearest import nearest
 from design.machine.source import MachineLogs, Source
-from identification.errors import BadCard, BadLog
+from identification.errors import BadCard, BadLog, ShortLog
 from identification.log import Rig
 from identification.signals.bad_samples import BadSamples
+from identification.signals.clean import LOG_LEFT_OUT
 from workbench.cards.card import Card, load_card, present_of_card
 from workbench.cards.card_tables import FileEntry
 from workbench.cards.headers import log_remarks
@@ -66,7 +67,8 @@ def card_of_velocity(card_name: str) -> bool:
 
 
 def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = False) -> Sources:
-    """As `read_sources`, of a card that is read, and of logs that may be no files."""
+    """As `read_sources`, of a card that is read, and of logs that may be no files; of several, one
+    that is too short is left out."""
     if not velocity:
         card.refuse_velocity()
     found: list[tuple[Path, Source]] = []
@@ -78,11 +80,17 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
         if whole in rigs:
             raise BadLog(f"{path.name}: given twice; name every log once")
         rigs[whole] = card.rig(path.name)
-        if isinstance(one, Recorded):
-            prepared, name, digest = runs_of(one.table, path, card), one.name, one.sha256
-        else:
-            prepared = read_runs(path, card)
-            name, digest = shown_name(path), sha256_of(path)
+        try:
+            if isinstance(one, Recorded):
+                prepared, name, digest = runs_of(one.table, path, card), one.name, one.sha256
+            else:
+                prepared = read_runs(path, card)
+                name, digest = shown_name(path), sha256_of(path)
+        except ShortLog as short:
+            if len(logs) == len(rigs) and not found:
+                raise
+            remarks.append(str(short).partition("; ")[0] + LOG_LEFT_OUT)
+            continue
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)
         for run in prepared.runs:

@@ -218,8 +218,13 @@ def fit_lines(model: Model) -> list[str]:
     if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative
         lines.append(
-            f"force while sliding: {share:.2f} % unexplained from sample to sample, the noise of"
-            " the acceleration in it"
+            f"force while sliding: {share:.2f} % unexplained from sample to sample"
+            + (", the noise of the acceleration in it" if model.friction["m"].known else "")
+        )
+    known = any(one.sd is not None for one in model.friction.values())
+    if known and not (model.fit.adequate or to_the_noise_by_equation(model)):
+        lines.append(
+            "the 95 % intervals hold for this law only: what it leaves beyond noise is not in them"
         )
     runs = runs_to_add(model)
     if runs:

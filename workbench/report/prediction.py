@@ -25,11 +25,6 @@ FORCE_COLUMNS: Columns = (
     ("force_predicted", "model", "predicted: inverse model"),
     ("force_simulated", "other", "simulated"),
 )
-FORCE_ERRORS = {
-    "force_predicted_rms": "force, inverse model: error {} rms while sliding, the acceleration's"
-    " noise in it",
-    "force_simulated_rms": "force, simulated: error {} rms",
-}
 
 
 def error_lines(found: Predicted, display: Display) -> list[str]:
@@ -44,9 +39,17 @@ def error_lines(found: Predicted, display: Display) -> list[str]:
         lines.append(f"position ({start}, driven by {by}): error {rms} rms")
     if summary["run_refused"] is not None:
         lines.append(f"position: {summary['run_refused']}")
-    for key, said in FORCE_ERRORS.items():
-        if summary[key] is not None:
-            lines.append(said.format(display.force_text(summary[key])))
+    off, none = summary["force_predicted_rms"], summary["force_applied_rms"]
+    if off is not None:
+        noise = ", the acceleration's noise in it" if found.inertia else ""
+        worse = f": worse than none, whose error is the force, {display.force_text(none)} rms"
+        lines.append(
+            f"force, inverse model: error {display.force_text(off)} rms while sliding{noise}"
+            f"{worse if off > none else ''}"
+        )
+    if summary["force_simulated_rms"] is not None:
+        rms = display.force_text(summary["force_simulated_rms"])
+        lines.append(f"force, simulated: error {rms} rms")
     return lines
 
 

@@ -33,6 +33,7 @@ SAME_HEAD = ("parameter", "value", "unit", "95 % interval")
 CHANGE_HEAD = ("parameter", "before", "after", "unit", "95 % interval after", "change")
 DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
 FLOOR = 1.0 / (DRAWS + 1)  # least chance that draws can show
+FOR_THE_TIME_BEING = "the values are for now, as the trace ended early:"
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
     " transducer shows: only the free run identifies it, no residual of an equation."
@@ -155,6 +156,7 @@ def trace_parts(traced: Traced) -> list[Part | str]:
         effects_table(found, traced.model.rig, logs),
         *map(more, effect_lines(found)),
         more(rivals_table(found, display)),
+        *([FOR_THE_TIME_BEING] if found.not_tried else []),
         changes_table(found, logs),
         differences_table(found),
         notes((*traced.remarks, *found.remarks), logs),
@@ -229,7 +231,7 @@ def _sections(traced: Traced) -> list[Section]:
     plain = "Parameters before and after" if found.effects else "Parameters"
     tables = {
         "Rivals, by the force that they leave": rivals_table(found, display),
-        plain: changes_table(found),
+        f"{plain}{', for now' if found.not_tried else ''}": changes_table(found),
         "Drift between training and test logs": differences_table(found),
     }
     sections += [Section(title, one) for title, one in tables.items() if one.whole]

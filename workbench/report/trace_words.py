@@ -19,6 +19,7 @@ FORCE_ERROR_LEFT = 0.8  # of the force error; an effect that leaves more shows i
 MOST = 1000.0  # change shown [%]
 CERTAIN = 0.99  # probability above which digits say nothing
 FOLLOWS_NOT = 10.0  # times the position's noise, from which a free run follows no log
+NO_DEPENDENCE = "shows no dependence on a signal"  # which is not that there is none
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -82,7 +83,7 @@ def _verdict_sentence(traced: Traced) -> str:
         fall = f"{error.write(error.before)} -> {error.write(error.after)}"
         errors = f" {error.name} {fall}{noise}."
     changed = ", ".join(_changed(one, found) for one in found.drift)
-    if found.next_experiment == MOVE_IT:  # no effect was sought, and nothing that is left tested
+    if found.next_experiment.startswith(MOVE_IT):  # nothing was sought or tested
         return f"Unknown: {unexplained(traced)}"
     match found.verdict:
         case "unknown" if found.not_tried and not found.effects:
@@ -145,7 +146,7 @@ def _partly(traced: Traced, names: str, errors: str) -> str:
             f"Unknown: what is missing acts like {names}.{share_explained(traced)}{errors} It is"
             " rather an effect that the library lacks."
         )
-    rest = _on_signals(unknown) if unknown.depends_on else "depends on none of the signals"
+    rest = _on_signals(unknown) if unknown.depends_on else NO_DEPENDENCE
     return (
         f"Found in part: {names}.{errors} What is left {rest}, and no effect of the library"
         " explains that."
@@ -169,7 +170,7 @@ def share_explained(traced: Traced) -> str:
     )
     if found.complete:
         return f" {it} all of what was missing {where}, down to the sensors' noise."
-    rest = "the rest depends on none of the signals"
+    rest = f"the rest {NO_DEPENDENCE}"
     if found.verdict == "effect" and found.drift:
         rest = "the machine has changed beside"
     elif found.left.depends_on:
@@ -179,11 +180,12 @@ def share_explained(traced: Traced) -> str:
 
 def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
     """What is left where it is far more than noise; signals: on which it depends."""
-    depends = f"depends on {listed(signals)}" if signals else "depends on none of the signals"
+    depends = f"depends on {listed(signals)}" if signals else NO_DEPENDENCE
     found, display = traced.trace, traced.model.display
     rest = f"and it {depends}"
-    if found.next_experiment == MOVE_IT:
-        rest = "but the held-out logs slide too little to test on what it depends"
+    if found.next_experiment.startswith(MOVE_IT):
+        few = found.next_experiment.removeprefix(MOVE_IT)
+        rest = f"but the held-out logs slide too little to test on what it depends{few}"
     left, off = found.after["train"].force_rms, found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
@@ -222,7 +224,7 @@ def nothing_missing(found: Trace, display: Display) -> str:
         )
     return (
         f"No effect is missing that these logs show: what is left ({display.force_text(left)},"
-        f" sensors' noise {noise}) depends on none of their signals."
+        f" sensors' noise {noise}) {NO_DEPENDENCE}."
     )
 
 

@@ -64,6 +64,17 @@ def test_nearly_one_way_is_reported_by_its_share() -> None:
     assert "nearly one way (9" in said(FORCE, T, y + 1e-3 * np.sin(T), np.gradient(y) + noise(1e-6))
 
 
+@pytest.mark.parametrize("constant", [-2.0, None])
+def test_a_command_of_the_other_sign_does_its_work(constant: float | None) -> None:
+    """What counts is the force; where its constant is not known, nor is its sign."""
+    found = machine(np.random.default_rng(0), T, KINDS["choose"][0])
+    log = Log("run", {"t": T, "y": found["y"], "u": -found["F"]})
+    rig = replace(MOTOR, force_per_command=constant, command_unit="1")
+    assert "hardly any work" not in " ".join(hardly_identifiable([log], rig))
+    turned = replace(rig, force_per_command=2.0)
+    assert "hardly any work" in " ".join(hardly_identifiable([log], turned))
+
+
 def test_where_nothing_is_said_no_run_is_needed() -> None:
     assert hardly_identifiable([], FORCE) == ()
 
@@ -101,3 +112,12 @@ def test_a_body_that_a_step_brings_to_speed_is_driven() -> None:
 def test_runs_that_go_one_way_each_go_both_ways_together() -> None:
     assert "one direction" in " ".join(hardly_identifiable(steps(1.0, 0.8), MOTOR))
     assert "one direction" not in " ".join(hardly_identifiable(steps(1.0, -0.8), MOTOR))
+
+
+def test_turns_that_an_encoders_step_hides_are_counted() -> None:
+    """A relay's swing of two counts; a longer one, or a finer encoder, hides none."""
+    swing = np.sin(8.0 * np.pi * T) * (1.0 + 0.2 * np.sin(3.0 * T))
+    for size, count, hidden in ((1.4, 1.0, True), (340.0, 1.0, False), (1.4, 1e-3, False)):
+        y = 0.0175 * count * np.round(size * swing / count)
+        text = said(MOTOR, T, y, np.cos(8.0 * np.pi * T))
+        assert ("so much counts as rest" in text) == hidden, text

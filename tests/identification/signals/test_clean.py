@@ -378,6 +378,14 @@ def test_a_value_that_a_logger_repeats_is_no_limit() -> None:
         assert {one.kind for one in reported} == {"saturated"}
 
 
+def test_a_short_log_of_a_held_command_has_no_limit_either() -> None:
+    """Of a few held values, the largest is no limit for being repeated."""
+    t = 0.01 * np.arange(180)
+    u = np.repeat(np.round(np.sin(0.4 * np.arange(23)), 2), 8)[:180]
+    assert limits(Log("short", {"t": t, "u": u}), "u") == []
+    assert limits(Log("short", {"t": t, "u": np.clip(u, -0.8, 0.8)}), "u") != []
+
+
 @pytest.mark.parametrize("grows", [0.0, 0.3])
 def test_the_crest_of_a_command_in_whole_counts_is_no_limit(grows: float) -> None:
     """It stands at its largest count for some samples, whether or not the next crest is larger."""

@@ -88,7 +88,7 @@ def test_a_lasting_jump_is_taken_out_and_the_log_cut_there(size: float) -> None:
     assert (found.signal, found.kind, found.done) == ("y", "jump", "offset removed")
     assert found.first == found.last == log["t"][7000]
     assert found.size == pytest.approx(abs(size), abs=5e-5)
-    assert "'y' has a jump that stays at t = 7 s" in found.line
+    assert "'y' has a jump that stays at t = 7 s (1 sample, " in found.line
 
 
 def test_a_jump_near_another_is_taken_out_without_a_cut() -> None:

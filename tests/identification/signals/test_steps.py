@@ -33,6 +33,13 @@ def test_a_small_jump_is_found_in_motion_and_in_reversals(at: int, size: float) 
     assert jump_size(y, at - 1) == pytest.approx(size * NOISE, abs=4.0 * NOISE)
 
 
+@pytest.mark.parametrize("at", [2000, 3100])
+def test_a_sample_that_was_read_twice_is_no_jump(at: int) -> None:
+    """The body stays for a sample where it was and goes on: no offset of the sensor."""
+    y = way()
+    assert not len(small_jumps(T, np.insert(y, at, y[at])[: len(T)]))
+
+
 @pytest.mark.parametrize("at", [1250, 2000, 3100])
 @pytest.mark.parametrize("length", [1, 2, 3])
 def test_a_small_spike_is_found_in_motion_and_in_reversals(at: int, length: int) -> None:

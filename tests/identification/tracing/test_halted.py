@@ -11,7 +11,7 @@ from identification.effects._library import built_in
 from identification.log import Log
 from identification.progress import KeepGoing, without_end
 from identification.tracing.result import Trace
-from identification.tracing.trace import trace
+from identification.tracing.trace import MOVE_IT, trace
 from tests.identification.tracing.test_trace import RIG, made
 
 SPRING = {"spring": {"k": 80.0, "k_3": 0.0}}
@@ -64,6 +64,14 @@ def asks(logs: tuple[Log, Log], whole: Trace) -> int:
     assert answer(found) == answer(whole)
     assert found.not_tried == () and found.verdict == "effect"
     return asked.count
+
+
+def test_how_much_too_little_a_held_out_log_slides_is_said() -> None:
+    train, test = made(4, n=SHORT), made(5, n=SHORT)
+    standing = test.with_signals(y=np.where(test["t"] < 0.5, test["y"], 0.0))
+    found = traced((train, standing), Asked(0))
+    assert found.next_experiment.startswith(MOVE_IT)
+    assert "windows of 0.06 s of such sliding found in one, 30 needed" in found.next_experiment
 
 
 @pytest.mark.method

@@ -28,3 +28,20 @@ def test_files_of_one_name_in_two_folders_are_distinguished(tmp_path: Path) -> N
     assert [run.file for run in found] == ["run.csv", "run.csv", "other.csv"]
     with pytest.raises(BadLog, match=r"run\.csv: given twice"):
         read_sources([names[0], names[0]], str(tmp_path / "card.toml"))
+
+
+def test_a_short_log_of_several_is_left_out(tmp_path: Path) -> None:
+    names = files(tmp_path, "long.csv", "short.csv", "holes.csv")
+    for name, kept in (("short.csv", range(95)), ("holes.csv", [*range(60), *range(160, 220)])):
+        lines = (tmp_path / name).read_text("utf-8").splitlines()
+        (tmp_path / name).write_text("\n".join([lines[0], *(lines[1 + k] for k in kept)]), "utf-8")
+    found = read_sources(names, str(tmp_path / "card.toml"))
+    assert [run.log.name for run in found.runs] == ["long.csv"]
+    assert found.remarks[:2] == (
+        "short.csv: 95 samples, at least 100 needed: left out",
+        "holes.csv: 1 gap leaves no run of 100 samples at 0.01 s: left out",
+    )
+    with pytest.raises(BadLog, match=r"1 gap leaves no run of 100 samples at 0\.01 s; log without"):
+        read_sources(names[1:], str(tmp_path / "card.toml"))
+    with pytest.raises(BadLog, match="95 samples, at least 100 needed; give a longer run"):
+        read_sources(names[1:2], str(tmp_path / "card.toml"))

@@ -102,3 +102,18 @@ def test_a_run_in_windows_says_so_in_its_line_and_under_its_pictures() -> None:
     (section,) = residual(windowed, [source], [run], None, replace(EMPS, F_sp=1.5 * EMPS.F_sp))
     assert isinstance(section.content, Chart)
     assert "The run has its own stick limits, 37.5 N and -19 N" in section.content.caption
+
+
+def test_intervals_of_a_law_that_lacks_something_are_said_to_be_its_own() -> None:
+    for left, said in ((1.0, False), (22.0, True)):
+        lines = " ".join(fit_lines(by_equation(left)))
+        assert ("the 95 % intervals hold for this law only" in lines) == said
+
+
+def test_without_a_mass_no_noise_of_the_acceleration_is_in_the_force() -> None:
+    model = by_equation(22.0)
+    model = replace(model, fit=replace(model.fit, force_relative=0.3))
+    blank = replace(model.friction["m"], value=None, sd=None, assumed=1.0, reason="too slow")
+    without = replace(model, friction={**model.friction, "m": blank})
+    assert "the noise of the acceleration in it" in " ".join(fit_lines(model))
+    assert "the noise of the acceleration in it" not in " ".join(fit_lines(without))

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from workbench.report.prediction import csv_text
+from design.machine.readable import Display
+from design.measured.predicted_logs import Predicted
+from workbench.report.prediction import csv_text, error_lines
 
 
 @pytest.mark.parametrize("begin", [0.0, 12.0, 1_695_000_000.0])
@@ -19,3 +21,16 @@ def test_times_stay_apart_however_far_from_zero(begin: float, step: float) -> No
     np.testing.assert_allclose(np.diff(found["t"]), step, rtol=0.01)
     np.testing.assert_allclose(found["t"], t, rtol=0.0, atol=0.01 * step)
     assert found["y"].isna().all()
+
+
+def test_a_prediction_that_is_worse_than_none_is_said_so() -> None:
+    summary = {"drive": "force", "window": None, "position_rms": None, "run_refused": None,
+               "force_predicted_rms": 167.0, "force_simulated_rms": None}  # fmt: skip
+    for applied, worse in (
+        (60.0, ": worse than none, whose error is the force, 60 N rms"),
+        (200.0, ""),
+    ):
+        for inertia, noise in ((True, ", the acceleration's noise in it"), (False, "")):
+            found = Predicted((), {**summary, "force_applied_rms": applied}, inertia)
+            said = f"force, inverse model: error 167 N rms while sliding{noise}{worse}"
+            assert error_lines(found, Display()) == [said]

@@ -231,6 +231,19 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     assert card.recipe is not None
 
 
+def test_a_prediction_beyond_the_speeds_of_its_logs_is_said_so() -> None:
+    log = identified().sources[0].log
+    (said,) = predict(identified().model, log.with_signals(y=1.3 * log["y"])).remarks
+    assert said.startswith("faster than the logs of the model (")
+    assert predict(identified().model, log).remarks == ()
+
+
+def test_the_error_of_predicting_no_force_is_that_of_the_same_samples() -> None:
+    found = predict(identified().model, identified().sources[0].log)
+    squares = found.force_applied[found.sliding] ** 2
+    assert found.force_applied_rms == pytest.approx(float(np.sqrt(np.mean(squares))))
+
+
 @pytest.mark.slow
 def test_a_prediction_by_force_drifts_less_in_windows() -> None:
     log = identified().sources[0].log

@@ -10,6 +10,7 @@ from design.identified.examined import Examined, doctor_document
 from design.identified.identify_logs import identify_logs
 from design.simulated.record import record
 from identification.arrays import Array
+from identification.errors import NotIdentifiable
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import Kind
 from tests.bad_inputs.shop import CARDS
@@ -283,3 +284,17 @@ def test_times_that_are_no_numbers_are_refused_and_no_fault(motor: tuple[Card, T
     card, table = motor
     table["t"][::50] = np.inf
     assert examined_log(card, table).verdict == "refused"
+
+
+def test_a_refusal_of_what_is_left_names_what_was_left_out(motor: tuple[Card, Table]) -> None:
+    """Of five steps in one log, four too short: the one that is left is constant."""
+    card, _ = motor
+    rows = np.repeat(np.arange(5), [80, 120, 80, 80, 80])
+    t = H * np.arange(len(rows)) + 2.0 * rows
+    u = np.array([3.0, -2.0, 2.0, -3.0, 2.5])[rows]
+    found = examined_log(card, {"t": t, "y": np.cumsum(0.01 * H * u), "u": u})
+    left = "run.csv: in 1 run; 8.64 s in gaps and 4 runs of under 100 rows or at rest left out"
+    assert "the applied force is constant" in found.refused
+    assert left in found.refused
+    with pytest.raises(NotIdentifiable, match="4 runs of under 100 rows or at rest left out"):
+        identify_logs(read_sources([str(card.path.parent / "run.csv")], str(card.path)).logs)

@@ -186,3 +186,27 @@ def test_a_supply_is_no_chamber(joint: dict[str, Array], tmp_path: Path) -> None
     table = (T, 250.0 + joint["y"], supply, cap + 0.05 * noise[1], rod + 0.05 * noise[2])
     found = propose(tmp_path, headers, *table)
     assert {roles(found)["p_p"], roles(found)["p_n"]} == {"Cap End [bar]", "Rod End [bar]"}
+
+
+def test_a_target_in_steps_to_whose_ends_the_position_goes_drives_nothing(tmp_path: Path) -> None:
+    """Behind a slow loop, beside a current of the other sign."""
+    h, x, v = 2e-3, 0.0, 0.0
+    target = np.sign(np.sin(0.5 * np.pi * T + 0.3))
+    y, u = np.zeros(len(T)), np.zeros(len(T))
+    for k in range(len(T)):
+        y[k], u[k] = x, np.clip(12.0 * (target[k] - x) - 4.0 * v, -4.0, 4.0)
+        for _ in range(4):
+            v += 0.25 * h * (u[k] - 0.8 * np.tanh(100.0 * v) - 0.2 * v) / 0.3
+            x += 0.25 * h * v
+    noise = np.random.default_rng(0).standard_normal((2, len(T)))
+    table = (30.0 * target, 30.0 * y + 1e-3 * noise[0], -u + 0.05 * noise[1])
+    found = propose(tmp_path, "a,b,c,d", T, *table)
+    assert roles(found) == {"t": "a", "r": "b", "y": "c", "u": "d"}
+    kind = next(one for one in found.rig if one.key == "kind")
+    assert "a rig of kind force would be driven by 'd'" in kind.why
+
+
+def test_a_position_that_goes_up_as_a_clock_does_is_named_as_one(tmp_path: Path) -> None:
+    up = np.cumsum(1.0 + 0.1 * np.sin(T) ** 2)
+    with pytest.raises(BadLog, match="'y' is taken for the clock as it goes up: is it one"):
+        propose(tmp_path, "y,w,s", up, np.gradient(up), np.random.default_rng(0).normal(size=5000))
