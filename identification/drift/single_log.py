@@ -19,7 +19,7 @@ from identification.thresholds import NEARLY_ALL
 
 WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looked for
 # Deviations beyond its limit at which a test alarms with the chance NEARLY_ALL
-SURELY = float(norm.ppf(NEARLY_ALL))
+SURE_TO_FIND = float(norm.ppf(NEARLY_ALL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +72,8 @@ class LogChange:
         log and the model: the parameter lies by so much from the model's on the day of the log.
         """
         limit, (measured, usual) = np.sqrt(square), self._deviations
-        beyond = self.margin + (limit + SURELY) * measured
-        return np.asarray(np.maximum(beyond, limit * usual + SURELY * measured))
+        beyond = self.margin + (limit + SURE_TO_FIND) * measured
+        return np.asarray(np.maximum(beyond, limit * usual + SURE_TO_FIND * measured))
 
     @property
     def _deviations(self) -> tuple[Array, Array]:
@@ -89,7 +89,7 @@ def detectable_together(found: Change, square: float) -> Array:
     square: its threshold. By how far the change lies from the margin's box without errors: errors
     bring it nearer by more than a normal deviation once in 1 / (1 - NEARLY_ALL) at most.
     """
-    needed = (float(np.sqrt(square)) + SURELY) ** 2
+    needed = (float(np.sqrt(square)) + SURE_TO_FIND) ** 2
 
     def smallest(one: Array) -> float:
         def missing(size: float) -> float:

@@ -10,13 +10,14 @@ from identification.effects._base import Effect
 from identification.errors import UserError
 from identification.estimation.recorded_logs import RecordedLogs, is_prescribed
 from identification.estimation.regressed_plant import (
+    RegressedPlant,
     first_plant,
     inertia_is_lost,
     regressed_plant,
 )
 from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.intersample_command import is_faster_loop
 from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.windowed_run.parameters import even, is_unanchored, on_bristle
@@ -35,7 +36,8 @@ from identification.estimation.windowed_run.stick_search import (
     widest_band,
     without_band,
 )
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import Drive, KarnoppFit
+from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.progress import Halted
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HOPELESS, WORSE
@@ -67,11 +69,12 @@ class FittedStructure:
 
 def fitted_structure(
     stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
-    recorded: RecordedLogs, rng: np.random.Generator,
+    recorded: RecordedLogs, rng: np.random.Generator, *, near: Karnopp | None = None,
 ) -> FittedStructure:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
-    rng: of the search where nothing holds the run to the log's position. Halted, it gives the best
+    rng: of the search where nothing holds the run to the log's position; near: band and stick
+    limits to begin from too, where those of the regression lead nowhere. Halted, it gives the best
     so far, with the deviations that the regression gives. Sources: of the equations, Messenger,
     Bortz (2021); of the run, Bock (1983), Levenberg (1944), Marquardt (1963).
     """
@@ -108,10 +111,7 @@ def fitted_structure(
                 done = again if gains else done
             if done.misfit <= followed:
                 return model.refined(done)
-        effort: Effort = "rough" if hopeless else "whole"
-        slow = max(regressed.slow, 1e-4)
-        again = refit(plant, logs, drive, band=slow, prior=prior, effort=effort)
-        done = again if done is None or again.misfit <= done.misfit else done
+        done = _refined(regressed, logs, drive, near, "rough" if hopeless else "whole", done)
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
         if smooth and not hopeless:
             done = _from_far_off(done, [] if effects else [plant], recorded)
@@ -152,6 +152,26 @@ def _best_so_far(
     with recorded.halt.closing():
         found += [(one, misfit(one, recorded.logs, recorded.drive)) for one in begun]
     return min(found, key=lambda one: one[1])
+
+
+def _refined(
+    regressed: RegressedPlant, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
+    effort: Effort, before: Refit | None,
+) -> Refit:  # fmt: skip
+    """The regression's plant refined on the free run, from another band too where that leaves more
+    than noise; or one of before, if that is better."""
+    plant, prior = regressed.plant, dict(regressed.prior)
+    done = refit(plant, logs, drive, band=max(regressed.slow, 1e-4), prior=prior, effort=effort)
+    done = done if before is None or done.misfit <= before.misfit else before
+    if near is None or is_unanchored(plant, drive) or done.misfit <= COMPLETE:
+        return done
+    same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
+    beside = replace(plant, friction=replace(plant.friction, **same))
+    with suppress(Halted):  # which the next ask halts
+        widest = max(near.dv_p, -near.dv_n)
+        other = refit(beside, logs, drive, band=widest, prior=prior, effort=effort)
+        done = other if other.misfit < done.misfit else done
+    return done
 
 
 def band(model: FittedStructure) -> float:

@@ -19,7 +19,7 @@ ESTIMATION = (
 )  # fmt: skip
 # Names of equations, parameters, signals and remarks, and bounds of what a parameter can be.
 NO_NUMBERS = {
-    "ABSORBED", "ACTUATOR", "AT_REST", "BREAKAWAY", "DELAY", "END_PLACES", "FIVE", "FORCES",
+    "ABSORBED", "ACTUATOR", "AT_REST", "BREAKAWAY", "DELAY", "END_PLACES", "FIVE",
     "GRAVITY", "MECHANICAL", "NAMES", "NEGATIVE", "NO_INFORMATION", "NOT_SIGNALS", "OF_AN_ANGLE",
     "OF_SPEED", "REST", "STUCK", "TURNS", "VISCOUS_NAMES",
 }  # fmt: skip

@@ -72,7 +72,11 @@ def fitted(choice: Choice, setting: Setting) -> FittedStructure:
 
 
 def _model(choice: Choice, setting: Setting) -> FittedStructure:
-    model = fitted_structure(choice.end, choice.base, choice.effects, setting.recorded, setting.rng)
+    plain = setting.plain.model
+    near = None if plain.prescribed else plain.plant.friction
+    model = fitted_structure(
+        choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near
+    )
     if setting.halt.reached() and not model.prescribed:
         keys = ", ".join(step.candidate.effect.key for step in choice.steps)
         setting.halt.left_out(f"the refinement of {keys} on the free run, to its end")

@@ -380,8 +380,8 @@ def test_a_value_that_a_logger_repeats_is_no_limit() -> None:
 
 def test_a_short_log_of_a_held_command_has_no_limit_either() -> None:
     """Of a few held values, the largest is no limit for being repeated."""
-    t = 0.01 * np.arange(180)
-    u = np.repeat(np.round(np.sin(0.4 * np.arange(23)), 2), 8)[:180]
+    t = np.asarray(0.01 * np.arange(180), dtype=np.float64)
+    u: Array = np.repeat(np.round(np.sin(0.4 * np.arange(23)), 2), 8)[:180].astype(np.float64)
     assert limits(Log("short", {"t": t, "u": u}), "u") == []
     assert limits(Log("short", {"t": t, "u": np.clip(u, -0.8, 0.8)}), "u") != []
 
