@@ -107,10 +107,11 @@ def answered(
     quick: not over whole runs, and not in windows where the equation is surer. Source: as
     `on_the_floor`, Stone (1974).
     """
-    if recorded.drive == "force" and (found.prescribed or is_no_run(found.misfit)):
-        why = LOST_WHY if found.prescribed else "no free run follows these logs"
-        if recorded.steps:
-            raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
+    lost = found.prescribed or is_no_run(found.misfit)
+    why = LOST_WHY if found.prescribed else "no free run follows these logs"
+    if lost and recorded.steps:
+        raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
+    if lost and recorded.drive == "force":
         return as_sliding_shows(fit_prescribed(recorded, why), recorded)
     if quick and not is_adequate(found.misfit):
         fit = by_equation_if_surer(found.plant.friction, recorded)

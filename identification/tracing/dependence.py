@@ -58,17 +58,14 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 
 def dependence(
-    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray,
-    least: float | None = None,
-) -> Dependence:  # fmt: skip
+    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray
+) -> Dependence:
     """Signals on which a whitened residual (n,) depends, most of all first.
 
     signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time, left
-    out in turn; least: share of the residual from which a signal is named, None: the usual. Each
-    signal may act otherwise in the two directions. Source: cross-validation, Stone (1974);
-    `README.md`, (10).
+    out in turn. Each signal may act otherwise in the two directions. Source: cross-validation,
+    Stone (1974); `README.md`, (10).
     """
-    least = OF_ACCOUNT if least is None else least
     best = {name: smooth_share(r, x, up, block) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
@@ -80,13 +77,13 @@ def dependence(
         else:
             rate = 0.0
     order = sorted(best, key=lambda name: -best[name][0])
-    if not order or best[order[0]][0] < least:
+    if not order or best[order[0]][0] < OF_ACCOUNT:
         return Dependence((), max(0.0, best[order[0]][0]) if order else 0.0)
     left = r - best[order[0]][1]
     named = [order[0]]
     for name in order[1:]:
         again = smooth_share(left, signals[name], up, block)
-        if best[name][0] > least / 2 and again[0] > SECOND_SIGNAL:
+        if best[name][0] > OF_ACCOUNT / 2 and again[0] > SECOND_SIGNAL:
             named.append(name)
     return Dependence(
         tuple(named[:MOST_SIGNALS]), best[order[0]][0], rate if named[0] == "t" else 0.0

@@ -40,10 +40,12 @@ def judgement(held_out: HeldOut) -> Trace:
     on_test = held_out.shows_more_than_training
     lacking = held_out.lacking or held_out.lacks_force or on_test
     left = NOTHING
-    if on_test:
-        left = strongest(held_out.choice_on_test, after, held_out.seen, held_out.drive)
-    elif lacking:
-        left = strongest(choice, after, held_out.logs, held_out.drive)
+    if lacking:
+        logs, judged = (held_out.logs, choice)
+        if on_test:
+            logs, judged = held_out.seen, held_out.choice_on_test
+        missing = None if held_out.missing is None else held_out.missing.sliding
+        left = strongest(judged, after, logs, held_out.drive, missing)
     doubts = [*_doubts(held_out)]
     known = not doubts and (bool(choice.steps) or not lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"

@@ -25,12 +25,12 @@ from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.dependence import MOST_SIGNALS, dependence
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.residuals import joined, signals_at, signals_of
-from identification.tracing.result import Dependence
+from identification.tracing.result import Dependence, Residual
 
 FEWEST_ROWS = 30
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are estimated
+APART = 0.02  # s between samples of the missing force that are judged
 THINNED = 10  # samples of a free run of which one is judged
-SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples not by chance
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
 
 
@@ -77,13 +77,18 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
         r = np.clip(r, -limit, limit)
         # Those far off draw on the mean, on which no signal has a part.
         r = r - np.where(way, _mean(r[way]), _mean(r[~way]))
-    n = len(r)  # fine stretches in turn, or no function of time could be judged
-    found = dependence(r, signals, way, np.arange(n) * LEFT_OUT_STRETCHES // n % BLOCKS)
+    found = dependence(r, signals, way, _stretches(len(r)))
     names = found.depends_on
     if equation == REST and names:  # it is left since the body stands still, and not before
         names = (*names, "reversal")
     named = replace(found, depends_on=_with_command(names, motor))
     return named, found.explained * float(np.mean(r**2))
+
+
+def _stretches(n: int) -> IntArray:
+    """Block of each of n rows, (n,): fine stretches in turn, or no function of time could be
+    judged."""
+    return np.asarray(np.arange(n) * LEFT_OUT_STRETCHES // n % BLOCKS)
 
 
 def upward(stage: EffectRows, equation: str, signals: Mapping[str, Array]) -> BoolArray:
@@ -116,29 +121,39 @@ def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
 
 
 def strongest(
-    choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
-) -> Dependence:
-    """The strongest of the structures left in the equations and in the free run,
-    however little it is, as something surely is missing."""
-    found = remaining_structure(choice, after)
-    if after.prescribed:
-        return found
-
-    def share(one: Dependence) -> float:
-        return one.explained if one.depends_on else 0.0
-
-    found = max(found, in_run(after, logs, drive), key=share)
-    return found if found.depends_on else in_run(after, logs, drive, least=SLIGHT_SHARE)
-
-
-def in_run(
-    after: FittedStructure, logs: Sequence[MotionLog], drive: Drive, least: float | None = None
+    choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive,
+    missing: Residual | None = None,
 ) -> Dependence:  # fmt: skip
-    """Signals on which the free run's position error depends, or its rate, or its curvature (the
-    force that is missing); or else how large they are, where their sign is a matter of chance.
+    """The strongest of the structures left in the equations, in the free run and in the force that
+    is missing while the body slides."""
+    found = [remaining_structure(choice, after)]
+    if missing is not None:
+        found.append(in_force(missing, motor=all(one.by_motor for one in logs)))
+    if not after.prescribed:
+        found.append(in_run(after, logs, drive))
+    return max(found, key=lambda one: one.explained if one.depends_on else 0.0)
 
-    least: share of the rate or curvature that a signal explains where it is named; None: as usual.
-    """
+
+def in_force(missing: Residual, *, motor: bool) -> Dependence:
+    """Signals on which the force depends that is missing while the body slides, sample by sample;
+    motor: it is driven by its command."""
+    h = float(np.median(np.abs(np.diff(missing.t)))) if len(missing.t) > 1 else 1.0
+    at = np.arange(0, len(missing.t), max(1, round(APART / h)))
+    signals = {name: x[at] for name, x in missing.signals.items()}
+    if len(at) < FEWEST_ROWS or "v" not in signals:
+        return Dependence((), 0.0)
+    left, way = missing.after[at], np.asarray(signals["v"] >= 0)
+    if "F" in signals:  # of which the force that is missing is itself a part
+        signals["F"] = signals["F"] - left
+    left = left - np.where(way, _mean(left[way]), _mean(left[~way]))
+    scale = 3.0 * float(np.median(np.abs(left))) or 1.0
+    found = dependence(np.clip(left, -scale, scale), signals, way, _stretches(len(at)))
+    return replace(found, depends_on=_with_command(found.depends_on, motor))
+
+
+def in_run(after: FittedStructure, logs: Sequence[MotionLog], drive: Drive) -> Dependence:
+    """Signals on which the free run's position error depends, or its rate, or its curvature (the
+    force that is missing); or else how large they are, where their sign is a matter of chance."""
     errors, rates, bends = list[Array](), list[Array](), list[Array]()
     windows, each = list[IntArray](), list[dict[str, Array]]()
     count = 0
@@ -167,10 +182,8 @@ def in_run(
     whole, rate, bend = (soft(np.concatenate(x)) for x in (errors, rates, bends))
     sizes = [x**2 - np.mean(x**2) for x in (rate, bend)]
     of = partial(dependence, signals=signals, up=way, block=block)
-    structures = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
-    structures = [one for one in structures if one.depends_on] or [
-        of(x, least=least) for x in sizes
-    ]
+    structures = [of(x) for x in (whole, rate, bend)]
+    structures = [one for one in structures if one.depends_on] or [of(x) for x in sizes]
     structures = sorted(
         (one for one in structures if one.depends_on), key=lambda one: -one.explained
     )

@@ -11,7 +11,7 @@ from benchmarks.drives_rig import make
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import recorded_logs
-from identification.log import Log, Rig
+from identification.log import Log, Rig, RigKind
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
@@ -102,13 +102,16 @@ def test_runs_by_steps_are_fitted_by_their_runs_alone() -> None:
         assert one.low < getattr(SMALL, name) < one.high < 1.1 * getattr(SMALL, name)
 
 
-def test_steps_that_no_run_follows_identify_nothing() -> None:
-    logs = [replace(log, signals={k: log[k] for k in "tyF"})
+@pytest.mark.parametrize("kind", ["force", "motor"])
+def test_steps_that_no_run_follows_identify_nothing(kind: RigKind) -> None:
+    """A motor whose run was 2.7 rad off had "F_cn 59.88 to 60.12"."""
+    logs = [replace(log, signals={k: log[k] for k in ("tyF" if kind == "force" else "tyuF")})
             for log in steps((1.0, -1.0, 0.6, -0.6), follows=False)]  # fmt: skip
+    rig = Rig(kind, motion="rotary", force_per_command=1.0 if kind == "motor" else None)
     with pytest.raises(
         NotIdentifiable, match="nothing is identifiable from the equation of motion of steps"
     ):
-        fit_plant(logs, np.random.default_rng(0), rig=Rig("force", motion="rotary"))
+        fit_plant(logs, np.random.default_rng(0), rig=rig)
 
 
 @pytest.mark.slow

@@ -11,17 +11,20 @@ from scipy.signal import butter, lfilter
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import BREAKAWAY, REST
+from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL, REST
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.log import Rig
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import (
+    in_force,
     in_run,
     remaining_structure,
     strongest,
     upward,
 )
+from identification.tracing.residuals import missing_force
+from identification.tracing.result import Residual
 from tests.identification.motor_logs import K_A, H, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -136,7 +139,7 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
     ("missing", "signals"),
     [
         ({"rising_stiction": {"F_r": 6.0, "tau": 0.3}}, {"rest"}),
-        ({"backlash": {"width": 3e-4}}, {"u", "F", "v"}),
+        ({"backlash": {"width": 3e-4}}, {"reversal", "u", "F"}),
         ({}, set[str]()),
     ],
 )
@@ -144,7 +147,9 @@ def test_the_strongest_of_equations_breakaways_and_run_is_named(
     missing: dict[str, dict[str, float]], signals: set[str]
 ) -> None:
     choice, after = lacking(missing, seeds=(5, 6, 7))
-    found = strongest(choice, after, after.stage.logs, "command")
+    logs = after.stage.logs
+    missing = missing_force(after, after, logs, choice.base[MECHANICAL].slowest)
+    found = strongest(choice, after, logs, "command", None if missing is None else missing.sliding)
     assert set(found.depends_on) == signals
 
 
@@ -166,3 +171,20 @@ def test_rows_that_all_go_one_way_tell_of_it_without_a_signal() -> None:
     assert same.shape == (5,) and np.all(same)
     pushed = upward(stage, REST, {"F": np.array([1.0, -1.0, 2.0])})
     assert pushed.tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(("h", "many"), [(0.01, 300), (0.002, 1500)])
+def test_the_missing_force_of_a_short_log_tells_on_what_it_depends(h: float, many: int) -> None:
+    """Windows of sliding were 45 in a slow log of 6 s, fewer than any function of a signal needs:
+    "it depends on no signal" was said of a force that goes with the speed."""
+    t = h * np.arange(many, dtype=np.float64)
+    v = 0.05 * np.sin(2.0 * np.pi * (0.4 + 0.1 * t) * t)
+    rng = np.random.default_rng(4)
+    left = np.sign(v) * (900.0 - 6e5 * v**2) + 60.0 * rng.standard_normal(many)
+    none = np.zeros(many)
+    signals = {"v": v, "t": t, "y": np.cumsum(v) * h, "F": 3e3 * np.sign(v) + left}
+    one = Residual(MECHANICAL, t, none, left, left, none + 60.0, signals)
+    assert in_force(one, motor=False).depends_on[0] == "v"
+    noise = 60.0 * rng.standard_normal(many)
+    signals = {**signals, "F": 3e3 * np.sign(v) + noise}
+    assert in_force(replace(one, after=noise, signals=signals), motor=False).depends_on == ()
