@@ -39,13 +39,7 @@ def judgement(held_out: HeldOut) -> Trace:
     before, rows, terms = plain.model, plain.rows, held_out.evidence
     on_test = held_out.shows_more_than_training
     lacking = held_out.lacking or held_out.lacks_force or on_test
-    left = NOTHING
-    if lacking:
-        logs, judged = (held_out.logs, choice)
-        if on_test:
-            logs, judged = held_out.seen, held_out.choice_on_test
-        missing = None if held_out.missing is None else held_out.missing.sliding
-        left = strongest(judged, after, logs, held_out.drive, missing)
+    left = _left(held_out, on_test=on_test) if lacking else NOTHING
     doubts = [*_doubts(held_out)]
     known = not doubts and (bool(choice.steps) or not lacking)
     verdict = verdict_of(choice, changed) if known else "unknown"
@@ -88,6 +82,15 @@ def judgement(held_out: HeldOut) -> Trace:
         missing_force=held_out.missing,
         evidence=terms if choice.steps else (),
     )
+
+
+def _left(held_out: HeldOut, *, on_test: bool) -> Dependence:
+    """On what the rest depends; on_test: the test logs lack more than those of the fit."""
+    logs, judged = (held_out.logs, held_out.choice)
+    if on_test:
+        logs, judged = held_out.seen, held_out.choice_on_test
+    missing = None if held_out.missing is None else held_out.missing.sliding
+    return strongest(judged, held_out.model, logs, held_out.drive, missing)
 
 
 def _doubts(held_out: HeldOut) -> Iterator[str]:

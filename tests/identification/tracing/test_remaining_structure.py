@@ -148,8 +148,8 @@ def test_the_strongest_of_equations_breakaways_and_run_is_named(
 ) -> None:
     choice, after = lacking(missing, seeds=(5, 6, 7))
     logs = after.stage.logs
-    missing = missing_force(after, after, logs, choice.base[MECHANICAL].slowest)
-    found = strongest(choice, after, logs, "command", None if missing is None else missing.sliding)
+    lacks = missing_force(after, after, logs, choice.base[MECHANICAL].slowest)
+    found = strongest(choice, after, logs, "command", None if lacks is None else lacks.sliding)
     assert set(found.depends_on) == signals
 
 
