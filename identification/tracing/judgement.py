@@ -86,7 +86,7 @@ def judgement(held_out: HeldOut) -> Trace:
 
 def _left(held_out: HeldOut, *, on_test: bool) -> Dependence:
     """On what the rest depends; on_test: the test logs lack more than those of the fit."""
-    logs, judged = (held_out.logs, held_out.choice)
+    logs, judged = held_out.logs, held_out.choice
     if on_test:
         logs, judged = held_out.seen, held_out.choice_on_test
     missing = None if held_out.missing is None else held_out.missing.sliding

@@ -20,7 +20,7 @@ from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.windowed_run.run_errors import soft
 from identification.estimation.windowed_run.windows import left_in_windows, starts, window_of
 from identification.model.estimates import Drive
-from identification.signals.sampling import samples
+from identification.signals.sampling import USUAL_PERIOD, samples
 from identification.thresholds import ADEQUATE, ASTRAY
 from identification.tracing.dependence import MOST_SIGNALS, dependence
 from identification.tracing.regression.stepwise import Choice
@@ -29,8 +29,7 @@ from identification.tracing.result import Dependence, Residual
 
 FEWEST_ROWS = 30
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are estimated
-APART = 0.02  # s between samples of the missing force that are judged
-THINNED = 10  # samples of a free run of which one is judged
+THINNED = 10  # samples of 2 ms, of a free run or of the missing force, of which one is judged
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
 
 
@@ -122,7 +121,7 @@ def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
 
 def strongest(
     choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive,
-    missing: Residual | None = None,
+    missing: Residual | None,
 ) -> Dependence:  # fmt: skip
     """The strongest of the structures left in the equations, in the free run and in the force that
     is missing while the body slides."""
@@ -137,11 +136,13 @@ def strongest(
 def in_force(missing: Residual, *, motor: bool) -> Dependence:
     """Signals on which the force depends that is missing while the body slides, sample by sample;
     motor: it is driven by its command."""
-    h = float(np.median(np.abs(np.diff(missing.t)))) if len(missing.t) > 1 else 1.0
-    at = np.arange(0, len(missing.t), max(1, round(APART / h)))
-    signals = {name: x[at] for name, x in missing.signals.items()}
-    if len(at) < FEWEST_ROWS or "v" not in signals:
+    if len(missing.t) < FEWEST_ROWS or "v" not in missing.signals:
         return Dependence((), 0.0)
+    h = float(np.median(np.abs(np.diff(missing.t))))
+    at = np.arange(0, len(missing.t), max(1, round(THINNED * USUAL_PERIOD / h)))
+    if len(at) < FEWEST_ROWS:
+        return Dependence((), 0.0)
+    signals = {name: x[at] for name, x in missing.signals.items()}
     left, way = missing.after[at], np.asarray(signals["v"] >= 0)
     if "F" in signals:  # of which the force that is missing is itself a part
         signals["F"] = signals["F"] - left

@@ -9,9 +9,7 @@ from identification.estimation.latent_force import latent_forces
 from identification.estimation.prediction_error import significant
 from identification.estimation.regressed_plant import regressed_plant
 from identification.estimation.regression.equation_rows import FIVE
-from identification.estimation.run_or_equation import (
-    by_equation_if_surer,
-)
+from identification.estimation.run_or_equation import by_equation_if_surer
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import plant_with, values_of
 from identification.estimation.windowed_run.run_errors import misfit

@@ -85,16 +85,10 @@ def _model(choice: Choice, setting: Setting) -> FittedStructure:
 
 def suffices(choice: Choice, setting: Setting) -> bool:
     """Whether neither the equations nor the run call for another effect beside those chosen."""
-    model = _of_explained(choice, setting)
-    if model is None:
+    if not (choice.steps and equations_explained(choice.base)):
         return False
+    model = fitted(choice, setting)
     return model.prescribed or model.misfit <= followed_up_to(choice, setting, False)
-
-
-def _of_explained(choice: Choice, setting: Setting) -> FittedStructure | None:
-    """The model of effects that explain the equations; None of others."""
-    explained = choice.steps and equations_explained(choice.base)
-    return fitted(choice, setting) if explained else None
 
 
 def fewest(choice: Choice, setting: Setting) -> tuple[Choice, FittedStructure]:

@@ -137,5 +137,4 @@ def _stops_searched(plant: Plant, setting: Setting) -> Plant:
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs."""
-    logs, drive = setting.logs, setting.drive
-    return refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
+    return refit(one.plant, setting.logs, setting.drive, prior=even(one.plant), effort="near")
