@@ -7,9 +7,15 @@ import pytest
 
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS
-from design.identified.hardly_identifiable import braked_by_its_voltage, hardly_identifiable
+from design.identified.hardly_identifiable import (
+    _turns_hidden,
+    braked_by_its_voltage,
+    hardly_identifiable,
+)
+from design.machine.readable import Display
 from identification.arrays import Array
 from identification.log import Log, Rig
+from identification.signals.differentiate import differentiate
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 FORCE = Rig("force", motion="rotary")
@@ -112,6 +118,21 @@ def test_a_body_that_a_step_brings_to_speed_is_driven() -> None:
 def test_runs_that_go_one_way_each_go_both_ways_together() -> None:
     assert "one direction" in " ".join(hardly_identifiable(steps(1.0, 0.8), MOTOR))
     assert "one direction" not in " ".join(hardly_identifiable(steps(1.0, -0.8), MOTOR))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "middle", "hidden"), [(2.2, 0.0, True), (1.0, 0.0, False), (2.2, 0.5, False)]
+)
+def test_a_few_turns_or_of_one_count_are_no_motion(
+    seconds: float, middle: float, hidden: bool
+) -> None:
+    """16 turns of two counts and 6; and a sensor that goes from one count to the next."""
+    t = T[T < seconds]
+    swing = np.sin(8.0 * np.pi * t) * (1.0 + 0.2 * np.sin(3.0 * t))
+    y = 0.0175 * np.round(middle + (0.4 if middle else 1.4) * swing)
+    motion = differentiate(y, float(t[1]))
+    found = list(_turns_hidden(y, motion, Display.of(MOTOR)))
+    assert len(found) == hidden
 
 
 def test_turns_that_an_encoders_step_hides_are_counted() -> None:
