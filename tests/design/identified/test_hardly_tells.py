@@ -127,7 +127,7 @@ def test_a_few_turns_or_of_one_count_are_no_motion(
     seconds: float, middle: float, hidden: bool
 ) -> None:
     """16 turns of two counts and 6; and a sensor that goes from one count to the next."""
-    t = T[T < seconds]
+    t = T[seconds > T]
     swing = np.sin(8.0 * np.pi * t) * (1.0 + 0.2 * np.sin(3.0 * t))
     y = 0.0175 * np.round(middle + (0.4 if middle else 1.4) * swing)
     motion = differentiate(y, float(t[1]))
