@@ -19,17 +19,14 @@ from identification.estimation.recorded_logs import (
     is_prescribed,
     recorded_logs,
 )
+from identification.estimation.regressed_plant import first_plant
+from identification.estimation.regression.breakaway import breakaway_limits, with_shown_band
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
-from identification.estimation.regression.standstill import (
-    MEAN,
-    breakaways,
-    rest_stretches,
-)
-from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.regression.standstill import MEAN, rest_stretches
 from identification.experiment.identifiability import identifiability, tellable_effects
 from identification.log import Log, Rig
 from identification.model.estimates import NORMAL_95, Drive, Estimate, KarnoppFit
-from identification.model.karnopp import NAMES
+from identification.model.karnopp import NAMES, Karnopp
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
@@ -77,10 +74,11 @@ class Ways:
     events: Events
 
 
-def _ways(logs: Sequence[MotionLog], m: float) -> Ways:
-    """What moved, in which direction, from the measured motion; m: mass, or its first estimate."""
+def _ways(logs: Sequence[MotionLog], friction: Karnopp) -> Ways:
+    """What moved, in which direction, from the measured motion; friction: of sliding, or its first
+    estimate."""
     h, ways = logs[0].log.h, [one.signals["d"] for one in logs]
-    events = [breakaways(one, m) for one in logs]
+    events = [breakaway_limits(one, with_shown_band(one, friction)) for one in logs]
     rests = [(one, at) for one in logs for at in rest_stretches(one, samples(MEAN, one.log.h))]
     sides = []
     for sign in (1.0, -1.0):
@@ -229,10 +227,10 @@ def identifiability_of_runs(
         around = first.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
-        m = max(float(first_estimate(one).nine[0]) for one in recorded.logs)
+        friction = first_plant(recorded).friction
     except (BadLog, NotIdentifiable) as error:
         return RunsIdentifiability(motion, reason=str(error))
-    ways = _ways(recorded.logs, m)
+    ways = _ways(recorded.logs, friction)
     seen = identifiable_by_log(recorded, ways, first.fit, open_run=first.open)
     shown = None
     if effects and not is_prescribed(recorded):

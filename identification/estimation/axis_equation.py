@@ -4,29 +4,28 @@ Mass, friction and breakaway of each direction, and friction along the travel, b
 equation that `identify` has where no run is followed; no free run, no search.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import (
-    FIVE,
-    NOTHING_KNOWN,
-    MotionLog,
-    mechanical,
+from identification.estimation.prescribed_motion import force_fit
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.breakaway import (
+    breakaway_limits,
+    usual_limits,
+    with_shown_band,
 )
-from identification.estimation.regression.force_terms import Lateness, fewest_terms
-from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.motion_rows import NOISE_ROUNDS
-from identification.estimation.regression.standstill import breakaways
-from identification.estimation.regression.weighted_rows import Rows, solve_rows
+from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.log import Log, Rig
-from identification.thresholds import EVENTS_NEEDED, MANY_OF_A_KIND
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.thresholds import MANY_OF_A_KIND
 
-SLOW_QUARTER = 4  # a quarter of the breakaways
-OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
-OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
+LEAST = 1e-9  # of a parameter that the equation has not
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,26 +56,26 @@ def axis_equation(log: Log, rig: Rig) -> AxisEquation:
     Bortz (2021); inverse dynamic model by least squares, Gautier, Khalil, CDC 1988; deviation of a
     median, Huber, Robust Statistics (1981).
     """
-    one = motion_log(log, zoh=rig.kind == "motor", by_command=False)
-    up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
+    drive: Drive = "command" if rig.kind == "motor" else "force"
+    recorded = RecordedLogs((), rig, drive).of([log])
+    fit, (made,) = force_fit(recorded)
+    up, down = int(np.count_nonzero(made.up)), int(np.count_nonzero(~made.up))
     if not slides_enough(up, down):
         raise NotIdentifiable(
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
-    rows = _converged(one)
-    fit = fewest_terms([rows], None if one.zoh else Lateness.of([one.sliding], [log]))
     names = [FIVE[k] for k in fit.used]
     values = dict(zip(names, fit.theta.tolist(), strict=True))
     levels = np.array([values.get(name, 0.0) for name in ("F_cp", "F_cn")])
     half = np.array([{"F_cp": -0.5, "F_cn": 0.5}.get(name, 0.0) for name in names])
-    limits, limit_sd, count = _breakaway(one, values.get("m", 0.0))
-    level = fit.residuals[0] + rows.X[:, (1, 2)] @ levels
+    limits, limit_sd, count = _breakaway(recorded.logs[0], values)
+    level = fit.residuals[0] + made.rows.X[:, (1, 2)] @ levels
     return AxisEquation(
         {**values, **limits}, {**fit.sd, **limit_sd},
         (0.5 * float(levels[1] - levels[0]), float(np.sqrt(half @ fit.covariance @ half))),
         count, fit.relative,
-        np.asarray(log["y"])[one.sliding.middle], level * np.where(one.up, 1.0, -1.0), one.up,
+        np.asarray(log["y"])[made.windows.middle], level * np.where(made.up, 1.0, -1.0), made.up,
     )  # fmt: skip
 
 
@@ -85,36 +84,20 @@ def slides_enough(up: int, down: int) -> bool:
     return min(up, down) >= MANY_OF_A_KIND
 
 
-def _converged(one: MotionLog) -> Rows:
-    """The rows, their noise that of the mass and damping that they show."""
-    theta = NOTHING_KNOWN
-    for _ in range(NOISE_ROUNDS):
-        theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
-    return mechanical(one, np.maximum(theta, 0.0))
-
-
 def _breakaway(
-    one: MotionLog, m: float
+    one: MotionLog, values: Mapping[str, float]
 ) -> tuple[dict[str, float], dict[str, float], tuple[int, int]]:
-    """Breakaway forces as sizes [N], their deviations, and how many there were up and down.
-
-    Of each direction the median of the quarter in which the force rose most slowly: the motion is
-    seen late, and by then a fast force has gone further. The deviation holds half of what the force
-    rises in a sample.
-    """
-    if not m > 0:
+    """Breakaway forces as sizes [N], their deviations, and how many there were up and down, by
+    sliding friction; the deviation holds half of what the force rises in a sample."""
+    if not values.get("m", 0.0) > 0:
         return {}, {}, (0, 0)
-    events = breakaways(one, m)
-    values, sd, count = dict[str, float](), dict[str, float](), list[int]()
-    for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
-        own = events.direction == way
-        count.append(int(np.count_nonzero(own)))
-        if count[-1] >= EVENTS_NEEDED:
-            order = np.argsort(np.abs(events.rate[own]), kind="stable")
-            slow = order[: max(EVENTS_NEEDED, count[-1] // SLOW_QUARTER)]
-            force, rate = np.abs(events.force[own])[slow], np.abs(events.rate[own])[slow]
-            values[name] = float(np.median(force))
-            off = float(np.median(np.abs(force - values[name])))
-            late = 0.5 * one.log.h * float(np.median(rate))
-            sd[name] = float(np.hypot(OF_MEDIAN * OF_OFF * off / len(force) ** 0.5, late))
-    return values, sd, (count[0], count[1])
+    m, F_cp, F_cn, F_vp, F_vn = (max(values.get(name, 0.0), LEAST) for name in FIVE)
+    sliding = Karnopp(m, F_cp, F_cn, F_vp, F_vn, 0.0, 0.0, F_cp, -F_cn)
+    friction = with_shown_band(one, sliding)
+    direction = breakaway_limits(one, friction).direction
+    count = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
+    limits, rise = usual_limits([one], Plant(friction))
+    known = {name: size for name, size in limits.items() if np.isfinite(size.sd)}
+    values = {name: abs(size.value) for name, size in known.items()}
+    sd = {name: float(np.hypot(size.sd, 0.5 * rise)) for name, size in known.items()}
+    return values, sd, count

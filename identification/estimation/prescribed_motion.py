@@ -31,6 +31,7 @@ from identification.estimation.regression.force_terms import (
 )
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
+    MotionRows,
     are_enough,
     converged_rows,
     usual_fastest,
@@ -77,8 +78,8 @@ def fit_prescribed(recorded: RecordedLogs, why: str) -> KarnoppFit:
     Raises NotIdentifiable where no log slides enough in both directions. Source: weak form,
     Messenger, Bortz (2021), of the inverse dynamic model, Gautier, Khalil, CDC 1988.
     """
-    fit, rows = force_fit(recorded)
-    return _made(fit, rows, recorded, why)
+    fit, made = force_fit(recorded)
+    return _made(fit, [one.rows for one in made], recorded, why)
 
 
 def _made(fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, why: str) -> KarnoppFit:
@@ -147,7 +148,7 @@ def withheld(fit: KarnoppFit, reason: str) -> KarnoppFit:
     return replace(fit, estimates={**fit.estimates, **none})
 
 
-def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
+def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[MotionRows]]:
     """Sliding friction by the force equation, and the rows that it was fitted on; of motion one way
     alone, that way's.
 
@@ -169,7 +170,7 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
         )
     rows = [one.rows for one in made]
     late = None if recorded.zoh else Lateness.of([one.windows for one in made], recorded.plain)
-    return fewest_terms(rows, late, stacked([one.rows for one in every]), way), rows
+    return fewest_terms(rows, late, stacked([one.rows for one in every]), way), made
 
 
 def way_of(logs: Sequence[Log], *, zoh: bool) -> bool | None:

@@ -12,9 +12,9 @@ from identification.estimation.regression.actuator_fit import fit_actuator
 from identification.estimation.regression.effect_columns import Values, in_columns
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
+from identification.estimation.regression.first_estimate import USUAL_STICK, first_estimate
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
-from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.regression.weighted_rows import OVERLAP, inverse_of_gram
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
@@ -22,7 +22,6 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import TWICE
 
 LEAST_OF_FIRST = 1e-9  # of a first estimate's largest value, that each has at least
-USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
 SHAPE = 0.03  # relative trust in a searched parameter
 FAR_BEYOND = 1e3  # times its size, a deviation from which a part of an effect begins as none

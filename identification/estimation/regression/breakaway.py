@@ -43,6 +43,13 @@ SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose for
 FEWEST_ON_LINE = 4
 # Of a stick limit; a body that let go later had been caught again.
 LIMITS_PER_COULOMB = (0.96, 2.8)
+USUAL_BANDS = (
+    0.0,
+    0.01,
+    0.03,
+    0.1,
+    0.3,
+)  # of the fastest speed, that are tried where none is known
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
@@ -58,10 +65,19 @@ def breakaway_limits(one: MotionLog, friction: Karnopp) -> Breakaways:
     return Breakaways.of([event for event in events if event is not None])
 
 
+def with_shown_band(one: MotionLog, friction: Karnopp) -> Karnopp:
+    """Sliding friction with that of a few bands, alike both ways, with which the breakaways of a
+    log are understood best. Source: as `breakaway_limits`."""
+    fastest = float(np.max(np.abs(one.signals["v"])))
+    tried = [replace(friction, dv_p=x * fastest, dv_n=-x * fastest) for x in USUAL_BANDS]
+    return min(tried, key=lambda x: float(np.sum(breakaway_limits(one, x).left - UNDERSTOOD)))
+
+
 def _event(
     one: MotionLog, friction: Karnopp, low: int, high: int
-) -> tuple[float, float, float, float, float] | None:
-    """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
+) -> tuple[float, float, float, float, float, float] | None:
+    """Last sample at rest, direction, time at rest, limit, rate of force and what is left of the
+    position; None: no breakaway."""
     y, F, h = one.log["y"], one.log["F"], one.log.h
     mean, of_rate = samples(MEAN, h), samples(RATE, h)
     first, last = (
@@ -94,7 +110,7 @@ def _event(
     risen = np.flatnonzero(pushed >= best)
     at = first + max(int(risen[0]) - 1, 0) if len(risen) else high
     rate = way * float(F[at + 1] - F[max(at - of_rate, 0)]) / ((of_rate + 1) * h)
-    return float(at), way, (at - low + 1) * h, way * best, rate
+    return float(at), way, (at - low + 1) * h, way * best, rate, left
 
 
 def _costs(

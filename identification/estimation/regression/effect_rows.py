@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Effect
-from identification.estimation.regression.breakaway import breakaway_limits
+from identification.estimation.regression.breakaway import breakaway_limits, with_shown_band
 from identification.estimation.regression.effect_columns import (
     LEAST_LEFT_BY_LOAD,
     Values,
@@ -34,7 +34,6 @@ from identification.estimation.regression.standstill import (
     Breakaways,
     Rest,
     breakaway_rows,
-    breakaways,
     rest_rows,
     rest_stretches,
     rests,
@@ -109,9 +108,10 @@ class EffectRows:
     @cached_property
     def events(self) -> tuple[Breakaways, ...]:
         """Breakaways of each log."""
-        if self.sliding is not None:
-            return tuple(breakaway_limits(one, self.sliding) for one in self.logs)
-        return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
+        return tuple(
+            breakaway_limits(one, self.sliding or with_shown_band(one, self.friction))
+            for one in self.logs
+        )
 
     @property
     def by_motor(self) -> bool:

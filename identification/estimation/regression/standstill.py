@@ -22,8 +22,6 @@ MEAN = 8  # samples in a row of rest
 BORNE_SHARE = 0.95  # of the Coulomb level, that a force may reach without moving a body at rest
 LEAST_ROWS = 4  # rows in a stretch
 ONSET = 5.0  # times the noise at which a body has moved
-ONSETS = 30  # samples before it is seen at which a motion may have begun
-RUN = 4.0  # times ONSET that it then goes on to move, or it was no breakaway
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +35,21 @@ class Rest:
 @dataclass(frozen=True, eq=False)
 class Breakaways:
     """Events of one log: last sample at rest (k,), direction, time at rest [s], force
-    [N] and its rate [N/s], positive where it rises in the direction of motion."""
+    [N] and its rate [N/s], positive where it rises in the direction of motion; left: of the
+    position about each, mean square in noise units."""
 
     at: IntArray
     direction: Array
     rested: Array
     force: Array
     rate: Array
+    left: Array
 
     @classmethod
-    def of(cls, found: Sequence[tuple[float, float, float, float, float]]) -> "Breakaways":
+    def of(cls, found: Sequence[tuple[float, float, float, float, float, float]]) -> "Breakaways":
         """Events as they were found, but for those far below the others of their direction: a body
         that is pushed on at the start of a log has not broken away."""
-        k = np.array(found).reshape(-1, 5)
+        k = np.array(found).reshape(-1, 6)
         for way in (1.0, -1.0):
             own = k[:, 1] == way
             if np.any(own):
@@ -126,67 +126,6 @@ def rest_rows(one: MotionLog, rest: Rest, moved: Array | None = None) -> Rows:
     sd = np.full(len(b), one.noise.y / np.sqrt(mean))
     block = (rest.start * BLOCKS // len(one.log)).astype(np.int64)
     return Rows(b, np.zeros((len(b), 0)), sd, block, np.full(len(b), np.inf), ())
-
-
-def breakaways(one: MotionLog, m: float) -> Breakaways:
-    """Every significant breakaway: a rest of at least 48 ms, then motion in one direction.
-
-    m: mass [kg]. The body has let go at the sample from which the rise of the force since then,
-    integrated twice, gives the motion seen; that sample's force is the limit. Source: a stuck body
-    of the paper's eq. (1) (Karnopp 1985); the estimate is ours.
-    """
-    y, F, h = one.log["y"], one.log["F"], one.log.h
-    mean, of_rate = samples(MEAN, h), samples(RATE, h)
-    found: list[tuple[float, float, float, float, float]] = []
-    for low, high in rest_stretches(one, 3 * mean):
-        if high + mean >= len(y):
-            continue
-        level = (
-            float(np.mean(y[low + mean : high - mean]))
-            if high - low > 3 * mean
-            else float(y[low + mean])
-        )
-        way = float(np.sign(one.signals["d"][high]))
-        end = min(high + mean, len(y))
-        seen = way * (y[low:end] - level)
-        moved = np.flatnonzero(seen < ONSET * one.noise.y)
-        if not len(moved) or seen[-1] < RUN * ONSET * one.noise.y:
-            continue
-        onset = _onset(seen, way * F[low:end], int(moved[-1]), h, m)
-        if onset is None or onset < 2 * mean:
-            continue
-        at = int(onset)
-        part = onset - at
-        force = float((1 - part) * F[low + at] + part * F[low + at + 1])
-        rate = (
-            way
-            * float(F[low + at + 1] - F[max(low + at - of_rate, 0)])
-            / ((min(of_rate, low + at) + 1) * h)
-        )
-        found.append((float(low + at), way, onset * h, force, rate))
-    return Breakaways.of(found)
-
-
-def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None:
-    """Sample (with its fraction) at which a body of mass m lets go, from the motion that follows.
-
-    seen: displacement [m] in the direction of motion, F: force in it [N], last: latest onset.
-    """
-    errors = []
-    stop, first = min(len(seen) - 1, last + samples(MEAN, h)), max(0, last - samples(ONSETS, h))
-    tried = range(first, last + 1)
-    for j in tried:
-        a = np.maximum(F[j : stop + 1] - F[j], 0.0) / m
-        v = h * np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]))])
-        x = h * np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]))])
-        head = seen[first:j]
-        errors.append(float(np.sum((seen[j : stop + 1] - x) ** 2) + np.sum(head**2)))
-    i = int(np.argmin(errors))
-    if i in (0, len(errors) - 1):
-        return None
-    before, here, after = errors[i - 1 : i + 2]
-    shift = 0.5 * (before - after) / max(before - 2 * here + after, 1e-300)
-    return float(tried[i] + np.clip(shift, -0.5, 0.5))
 
 
 def breakaway_rows(one: MotionLog, events: Breakaways) -> Rows:

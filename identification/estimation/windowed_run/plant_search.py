@@ -13,7 +13,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.global_search import evolved
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.regression.first_estimate import first_estimate
 from identification.estimation.windowed_run.likely_square import LikelyLog
 from identification.estimation.windowed_run.parameters import kernel_rows
 from identification.estimation.windowed_run.stick_search import SHORT_WINDOW

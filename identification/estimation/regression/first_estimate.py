@@ -1,17 +1,14 @@
-"""First estimate of the nine parameters, in three steps of our own.
+"""First estimate of the nine parameters, of a size from which a search begins.
 
-The paper names a three-step method of a companion paper without giving it; this one is ours.
-1. Sliding: least squares of the force on the motion gives m, F_cp, F_cn, F_vp, F_vn.
-2. Breakaway: the force at which each rest ends gives F_sp, F_sn.
-3. Band: the speed at which the body stops dead gives dv_p, dv_n.
-Smoothing blurs steps 2 and 3, so their outcome only centres the search that follows.
+The paper names a three-step method of a companion paper without giving it; this one is ours: least
+squares of the force on the motion gives m, F_cp, F_cn, F_vp, F_vn; stick limits and band are of
+their usual size beside these.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import NotIdentifiable
@@ -25,8 +22,8 @@ from identification.estimation.regression.weighted_rows import least_squares
 from identification.signals.differentiate import Motion, differentiate
 
 NO_MOTION = 1.5  # times the noise below which a position's own spread is no motion
-FASTER_MOVES = 5.0  # times the noise of the velocity: faster samples move
-BEFORE_STOP = 0.02  # s of motion used before a stop
+OF_FASTEST = 0.05  # of the fastest speed, a band of which nothing is known
+USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 SEARCH_FACTOR = 4.0  # the search goes this factor beyond a first estimate
 FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
 
@@ -44,12 +41,11 @@ class FirstEstimate:
 def first_estimate(one: MotionLog) -> FirstEstimate:
     """First estimate of the nine from position and force.
 
-    Raises NotIdentifiable where nothing in the log moves. Of sliding, Messenger, Bortz
-    (2021); the rest is ours: the paper names three steps of a companion paper and gives none.
+    Raises NotIdentifiable where nothing in the log moves. Of sliding, Messenger, Bortz (2021); the
+    rest is ours.
     """
     log = one.log
     motion = differentiate(log["y"], log.h)
-    moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
     fastest = float(np.quantile(np.abs(motion.v), FASTEST_QUANTILE))
     if float(np.std(log["y"])) < NO_MOTION * motion.noise:
         raise NotIdentifiable(
@@ -60,12 +56,8 @@ def first_estimate(one: MotionLog) -> FirstEstimate:
     level = float(np.quantile(force, 0.9))
     sliding = _sliding(one)
     m, coulomb_p, coulomb_n, viscous_p, viscous_n = _magnitudes(sliding, motion, level, fastest)
-    rest = ~moving
-    stick_p, stick_n = _breakaways(log["F"], rest, motion.v, (coulomb_p, coulomb_n))
-    edge_p, edge_n = _stops(log.h, rest, motion.v, 0.05 * fastest)
-    nine = np.array(
-        [m, coulomb_p, coulomb_n, viscous_p, viscous_n, edge_p, -edge_n, stick_p, -stick_n]
-    )
+    stick_p, stick_n, edge = USUAL_STICK * coulomb_p, USUAL_STICK * coulomb_n, OF_FASTEST * fastest
+    nine = np.array([m, coulomb_p, coulomb_n, viscous_p, viscous_n, edge, -edge, stick_p, -stick_n])
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
     # A motor's force has no ramps that would show a narrow band: do not search one.
     narrow = fastest / (500 if one.zoh else 3000)
@@ -93,7 +85,7 @@ def _sliding(one: MotionLog) -> dict[str, float] | None:
 def _magnitudes(
     sliding: Mapping[str, float] | None, motion: Motion, level: float, fastest: float
 ) -> tuple[float, float, float, float, float]:
-    """Step 1, bounded to be positive: mass and friction that could explain forces of this level."""
+    """Bounded to be positive: mass and friction that could explain forces of this level."""
     peak = float(np.quantile(np.abs(motion.a), FASTEST_QUANTILE))
     mass = level / max(peak, 1e-12)
     if sliding is None:
@@ -107,27 +99,3 @@ def _magnitudes(
         max(sliding["F_vp"], 0.0),
         max(sliding["F_vn"], 0.0),
     )
-
-
-def _breakaways(
-    force: Array, rest: NDArray[np.bool_], v: Array, otherwise: tuple[float, float]
-) -> tuple[float, float]:
-    """Step 2: median magnitude of the force at which a rest ends, by direction of the motion."""
-    ends = np.flatnonzero(rest[:-1] & ~rest[1:])
-    up = ends[(v[ends + 1] > 0) & (force[ends] > 0)]
-    down = ends[(v[ends + 1] < 0) & (force[ends] < 0)]
-    stick_p = float(np.median(force[up])) if len(up) else otherwise[0]
-    stick_n = float(-np.median(force[down])) if len(down) else otherwise[1]
-    return max(stick_p, 0.1 * otherwise[0]), max(stick_n, 0.1 * otherwise[1])
-
-
-def _stops(h: float, rest: NDArray[np.bool_], v: Array, otherwise: float) -> tuple[float, float]:
-    """Step 3: median speed shortly before the body comes to rest, by direction."""
-    back = max(2, round(BEFORE_STOP / h))
-    begins = np.flatnonzero(~rest[:-1] & rest[1:])
-    begins = begins[begins >= back]
-    before = v[begins - back // 2]
-    up, down = before[before > 0], before[before < 0]
-    edge_p = float(np.median(up)) if len(up) else otherwise
-    edge_n = float(-np.median(down)) if len(down) else otherwise
-    return edge_p, edge_n

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from identification.errors import NotIdentifiable
+from identification.estimation.regression.first_estimate import first_estimate
 from identification.estimation.regression.motion_log import motion_log
-from identification.estimation.regression.three_step import first_estimate
 from tests.identification.plants import made_log, table
 
 
