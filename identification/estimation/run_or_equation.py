@@ -45,7 +45,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
 from identification.progress import Halted, Progress
 from identification.remarks import MinorRemark
-from identification.thresholds import HOPELESS, MATERIAL, WORSE
+from identification.thresholds import HOPELESS, MATERIAL, OF_ACCOUNT, WORSE
 
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 STEPS_WHY = (
@@ -142,9 +142,10 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     if surer or _identified(reported) < len(FIVE):
         other = _by_equation(recorded, LESS_ERROR_WHY if fit.adequate else FLOOR_WHY)
         other = None if other is None else as_sliding_shows(other, recorded)
-        if left is None and other is not None and is_no_run(other.chi_square):
+        if left is None and other is not None and not _explains(other):
             # Of few rows, or beside a band that takes the sliding, it leaves far more than noise.
-            if not (fit.adequate or _identified(reported)):
+            lost = not fit.adequate and is_no_run(fit.chi_square)
+            if lost or not (fit.adequate or _identified(reported)):
                 return withheld(other, PREDICTS_WHY)
             other = None
         if other is not None and (surer or _identified(other) > _identified(reported)):
@@ -257,6 +258,12 @@ def is_no_run(misfit: float) -> bool:
 def _unless_unexplained(fit: KarnoppFit, left: LeftOfEquation) -> KarnoppFit:
     """The fit, nothing reported where it and the equation leave most of the force."""
     return without_estimates(fit, left.share) if is_unexplained(left.share) else fit
+
+
+def _explains(fit: KarnoppFit) -> bool:
+    """Whether the equation of motion leaves hardly more than noise, or little of the force."""
+    share = 1.0 if fit.left is None else fit.left[0]
+    return share <= OF_ACCOUNT or not is_no_run(fit.chi_square)
 
 
 def _identified(fit: KarnoppFit) -> int:

@@ -12,6 +12,7 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.karnopp_step import kernel_parameters
 
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
+STICK_ABOVE = {"F_sp": NAMES.index("F_cp"), "F_sn": NAMES.index("F_cn")}  # limit: its Coulomb level
 NARROW = 0.3  # of its value, that the mass keeps at least in a search
 SHAPE_REACH, PERIOD_REACH = 2.0, 1.2  # how far a search moves what an effect is not linear in
 
@@ -61,6 +62,8 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
         size = abs(getattr(plant.friction, name))
         # A mass next to nothing would take a run next to for ever.
         least = max(1e-9, NARROW * size) if name == "m" else 1e-9
+        # No body lets go below the friction with which it then slides.
+        least = nine[STICK_ABOVE[name]] if name in STICK_ABOVE else least
         nine[i] = min(nine[i], -least) if name in NEGATIVE else max(nine[i], least)
     actuator: Actuator | Motor | None = plant.actuator
     if isinstance(actuator, Actuator) and "k1" in every:
