@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.effects._base import AT_REST, Effect
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.actuator_fit import fit_actuator
-from identification.estimation.regression.effect_columns import Values, in_columns
+from identification.estimation.regression.effect_columns import Values
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
 from identification.estimation.regression.first_estimate import USUAL_STICK, first_estimate
@@ -25,7 +25,6 @@ LEAST_OF_FIRST = 1e-9  # of a first estimate's largest value, that each has at l
 MOST_STICK = 3.0  # times the Coulomb level, that a stick limit begins with at most
 SHAPE = 0.03  # relative trust in a searched parameter
 FAR_BEYOND = 1e3  # times its size, a deviation from which a part of an effect begins as none
-SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 
 
@@ -98,7 +97,7 @@ def _of_effect(
     key.name) that they do not identify."""
     values = inside(effect, with_sizes(effect, shape, outcomes))
     spreads = effect_sd(effect, values, outcomes)
-    none, unidentified = slight(effect, values, spreads), []
+    unidentified: list[str] = []
     for p in effect.params:  # a signal that is not there identifies no parameter
         if p.name in AT_REST:  # nor do the equations identify a stick limit
             unidentified.append(f"{effect.key}.{p.name}")
@@ -106,7 +105,7 @@ def _of_effect(
         elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
             unidentified.append(f"{effect.key}.{p.name}")
             values[p.name] = float(np.clip(0.0, p.low, p.high))
-        elif far_beyond(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
+        elif far_beyond(spreads.get(p.name), values[p.name], p.typical):
             values[p.name] = float(np.clip(0.0, p.low, p.high))
     return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unidentified
 
@@ -136,18 +135,6 @@ def inertia_is_lost(o: RowFit) -> bool:
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
     return inertia < TWICE * left
-
-
-def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:
-    """Names of sizes that are no more than chance makes of none, where another one is more.
-
-    A search would follow them to wherever they happen to help.
-    """
-    if not in_columns(effect):
-        return set()
-    small = {name for name in effect.linear if abs(values[name]) < SLIGHT * sd.get(name, 0.0)}
-    spare = {p.name for p in effect.params if p.spare}
-    return small & spare if small < set(effect.linear) else set()
 
 
 def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:

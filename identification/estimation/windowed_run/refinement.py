@@ -14,7 +14,6 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.estimation.gauss_newton import (
-    FINE_STEP,
     ROUGH_STEP,
     Minimum,
     gauss_newton,
@@ -259,18 +258,12 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
     plant, logs, drive = unknowns.plant, unknowns.logs, unknowns.drive
     quick = effort == "quick"
     at = _approached(unknowns, effort)
-    # Free of the regression, and over a whole run, in which no window's start errs: where the model
-    # follows. Elsewhere what it lacks would bias what the equations give.
-    hopeless = effort == "rough" and at.mean > HOPELESS
-    rounds = [] if quick or hopeless else [RUN_WINDOW]
-    longest = longest_window(plant, logs, drive)
-    if longest > RUN_WINDOW and rounds and effort != "long":
-        rounds.append(longest)
-    for seconds in rounds:
-        again = unknowns.refined(at.x, seconds, False)
-        if again.followed:
-            at = again
-    at, found = _ended(unknowns, at, quick)
+    # Free of the regression where the model follows: elsewhere what it lacks would bias what the
+    # equations give.
+    if not (quick or (effort == "rough" and at.mean > HOPELESS)):
+        again = unknowns.refined(at.x, RUN_WINDOW, False)
+        at = again if again.followed else at
+    found, longest = unknowns.misfit(at.x), longest_window(plant, logs, drive)
     if effort == "long" and longest > RUN_WINDOW and found <= ADEQUATE:
         return _over_long_runs(unknowns, at, found, longest)
     return at, found, False
@@ -302,16 +295,6 @@ def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
     if effort in ("rough", "whole"):
         x = unknowns.refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
     return unknowns.refined(x, RUN_WINDOW, True, HALF_SHARE)
-
-
-def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, float]:
-    """The minimum itself and its misfit."""
-    found = unknowns.misfit(at.x)
-    if quick or not at.followed:
-        return at, found
-    finer = gauss_newton(at.fun, at.x, unknowns.steps, FINE_STEP)
-    left_by = unknowns.misfit(finer.x)
-    return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
 
 
 def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
