@@ -137,7 +137,7 @@ def estimates(
     units = units_of(rig.motion, rig.command_unit)
     found = {}
     for name, value in values.items():
-        reason = silent_reason(name, events, log) or _no_stick(name, values, sd)
+        reason = silent_reason(name, events, log) or _no_stick(name, values, sd, events)
         if reason:
             found[name] = Estimate(None, units[name], reason=reason, assumed=value)
         else:
@@ -145,7 +145,7 @@ def estimates(
             bounds = (-np.inf, -low) if name in NEGATIVE else (low, np.inf)
             found[name] = reported_estimate(
                 value, units[name], sd[name], bounds=bounds, beside=_beside(name, values, events),
-                at_bound=max(AT_ZERO, AS_GOOD_AS_NONE * _scale(name, events)),
+                at_bound=_slight(name, events),
             )  # fmt: skip
         if found[name].value is None and (unmoved := _unmoved(name, events, log)):
             found[name] = Estimate(None, units[name], reason=unmoved, assumed=value)
@@ -160,20 +160,20 @@ def _least_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]
     return max(values.get(level, 0.0) - NORMAL_95 * (sd.get(level) or 0.0), 0.0)
 
 
-def _no_stick(name: str, values: Mapping[str, float], sd: Mapping[str, float]) -> str | None:
-    """Reason why a stick limit, and the band in which it acts, are none that a body can have."""
-    if not name.startswith(("F_s", "dv")):
-        return None
+def _no_stick(
+    name: str, values: Mapping[str, float], sd: Mapping[str, float], events: Events
+) -> str | None:
+    """Reason why a stick limit, and the band in which it acts, do not show: the limit is hardly
+    more than it is at least, with which every rest would end."""
     limit = "F_sn" if name.endswith("n") else "F_sp"
-    least = _least_stick(name, values, sd)
-    if limit not in values or abs(values[limit]) >= least:
+    if not name.startswith(("F_s", "dv")) or limit not in values:
         return None
-    found = abs(values[limit])
-    none = found <= AS_GOOD_AS_NONE * least
-    shown = "no stick limit found" if none else f"found {limit} = {values[limit]:.3g}"
+    least = _least_stick(name, values, sd)
+    if abs(values[limit]) > least + _slight(limit, events):
+        return None
     return (
-        f"{shown}, below the Coulomb level ({least:.3g} at least), which none is: not identifiable"
-        f" from these logs; {EXCITE}"
+        f"no {limit} above the Coulomb level ({least:.3g} at least) shows: not identifiable from"
+        f" these logs; {EXCITE}"
     )
 
 
@@ -220,14 +220,17 @@ def _unmoved(name: str, events: Events, log: str) -> str | None:
     return _too_little(0, ("positive", "negative")[side], log)
 
 
-def _scale(name: str, events: Events) -> float:
-    """Size that a parameter of friction would have if it took all of the log's force, or speed."""
-    fastest = max(events.fastest)
+def _slight(name: str, events: Events) -> float:
+    """Size of next to nothing: beside what a parameter of friction would have if it took all of the
+    log's force, or speed."""
+    fastest, size = max(events.fastest), 0.0
     if name.startswith("dv"):
-        return fastest
-    if name.startswith("F_v"):
-        return events.force / fastest if fastest > 0.0 else 0.0
-    return events.force if name in NAMES and name != "m" else 0.0
+        size = fastest
+    elif name.startswith("F_v"):
+        size = events.force / fastest if fastest > 0.0 else 0.0
+    elif name in NAMES and name != "m":
+        size = events.force
+    return max(AT_ZERO, AS_GOOD_AS_NONE * size)
 
 
 def _beside(name: str, value_of: Mapping[str, float], events: Events) -> float:

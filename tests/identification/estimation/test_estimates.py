@@ -117,12 +117,12 @@ def test_next_to_nothing_is_no_friction_however_narrow_its_interval() -> None:
     assert found["F_cn"].value == tiny["F_cn"]
 
 
-def test_a_stick_limit_below_the_coulomb_level_is_none_nor_is_its_band() -> None:
+def test_a_stick_limit_no_higher_than_the_coulomb_level_is_none_nor_is_its_band() -> None:
     values = {**VALUES, "F_sn": -0.9 * VALUES["F_cn"]}
     found = estimates(values, spread(0.01), PLENTY, Rig("force"), "log")
     for name in ("F_sn", "dv_n"):
         assert found[name].value is None
-        assert "below the Coulomb level" in (found[name].reason or "")
+        assert "no F_sn above the Coulomb level" in (found[name].reason or "")
     assert found["F_sp"].value is not None
     assert found["dv_p"].value is not None
 
