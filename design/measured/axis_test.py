@@ -27,6 +27,7 @@ from identification.thresholds import HALF
 LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
 ALONG_PLACES = 24  # along the travel
 FEWEST_THERE = 3  # windows of sliding at a place
+BESIDE_COULOMB = "less sure than Coulomb friction is large; add slow motion in both directions"
 NO_BACKLASH = "the active model has no play; `workbench trace` finds one in this log"
 
 WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
@@ -194,8 +195,10 @@ def estimates_of(
     value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
     half = float(norm.ppf(0.975)) * sd
     constant = Estimate(value, units["constant_force"], sd, value - half, value + half)
-    if found.relative > HALF or not half < max(map(abs, coulomb)):
+    if found.relative > HALF:
         constant = Estimate(None, units["constant_force"], reason=unheld)
+    elif not half < max(map(abs, coulomb)):
+        constant = Estimate(None, units["constant_force"], reason=BESIDE_COULOMB)
     out["constant_force"] = constant
     out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)
     out["explained"] = Estimate(1.0 - found.relative, "1")

@@ -19,6 +19,7 @@ from identification.estimation.regression.breakaway import (
     with_shown_band,
 )
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
+from identification.estimation.regression.force_terms import LEVEL_COLUMNS
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
@@ -65,15 +66,18 @@ def axis_equation(log: Log, rig: Rig) -> AxisEquation:
             f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
             f" least {MANY_OF_A_KIND} of each needed; log strokes in both directions"
         )
-    names = [FIVE[k] for k in fit.used]
-    values = dict(zip(names, fit.theta.tolist(), strict=True))
+    # Friction that falls with speed has the level of the speeds logged, as of `identify`.
+    logged, names = fit.at_logged_speeds(made.rows), [FIVE[k] for k in fit.used]
+    values = dict(zip(names, logged.theta.tolist(), strict=True))
     levels = np.array([values.get(name, 0.0) for name in ("F_cp", "F_cn")])
     half = np.array([{"F_cp": -0.5, "F_cn": 0.5}.get(name, 0.0) for name in names])
     limits, limit_sd, count = _breakaway(recorded.logs[0], values)
-    level = fit.residuals[0] + made.rows.X[:, (1, 2)] @ levels
+    falling = {slope for _, slope in fit.falling}
+    beside = [i for i, k in enumerate(fit.used) if k not in (*LEVEL_COLUMNS, *falling)]
+    level = made.rows.b - made.rows.X[:, np.array(fit.used)[beside]] @ fit.theta[beside]
     return AxisEquation(
-        {**values, **limits}, {**fit.sd, **limit_sd},
-        (0.5 * float(levels[1] - levels[0]), float(np.sqrt(half @ fit.covariance @ half))),
+        {**values, **limits}, {**logged.sd, **limit_sd},
+        (0.5 * float(levels[1] - levels[0]), float(np.sqrt(half @ logged.covariance @ half))),
         count, fit.relative,
         np.asarray(log["y"])[made.windows.middle], level * np.where(made.up, 1.0, -1.0), made.up,
     )  # fmt: skip
