@@ -140,7 +140,7 @@ def _of_two_masses(
 
 
 def _actuator_lacks(traced: Trace) -> bool:
-    """Whether a linear actuator leaves more than noise of the rate of the training logs' force: only
+    """Whether a linear actuator leaves more than noise of the training logs' rate of force: only
     then is it the actuator for which a run by the command fails."""
     left, noise = traced.before["train"].actuator_rms, traced.noise_actuator
     return left is not None and noise is not None and left**2 > COMPLETE * noise**2

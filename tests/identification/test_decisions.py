@@ -33,7 +33,7 @@ ENOUGH = {
 # Where a search begins, what it tries and when it ends.
 STEER = {
     "FAR_BEYOND", "LAG", "LASTING_SHARE", "LASTING_STEP", "LONG_TIME",
-    "SLIGHT", "SLOW_LOG", "WIDEST_SEEN",
+    "SLOW_LOG", "WIDEST_SEEN",
 }  # fmt: skip
 # What still decides outside of `thresholds`.
 ELSEWHERE = {

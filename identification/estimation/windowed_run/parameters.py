@@ -1,6 +1,7 @@
 """A plant's parameters by name: their values, units and bounds, and what kind of plant it is."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.karnopp_step import kernel_parameters
 
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
-STICK_ABOVE = {"F_sp": NAMES.index("F_cp"), "F_sn": NAMES.index("F_cn")}  # limit: its Coulomb level
 NARROW = 0.3  # of its value, that the mass keeps at least in a search
 SHAPE_REACH, PERIOD_REACH = 2.0, 1.2  # how far a search moves what an effect is not linear in
 
@@ -62,8 +62,6 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
         size = abs(getattr(plant.friction, name))
         # A mass next to nothing would take a run next to for ever.
         least = max(1e-9, NARROW * size) if name == "m" else 1e-9
-        # No body lets go below the friction with which it then slides.
-        least = nine[STICK_ABOVE[name]] if name in STICK_ABOVE else least
         nine[i] = min(nine[i], -least) if name in NEGATIVE else max(nine[i], least)
     actuator: Actuator | Motor | None = plant.actuator
     if isinstance(actuator, Actuator) and "k1" in every:
@@ -79,6 +77,15 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
             own[p.name] = float(np.clip(every.get(f"{acting.key}.{p.name}", here), low, high))
         effects.append(acting.effect.acting(own))
     return Plant(Karnopp(*nine), actuator, tuple(effects))
+
+
+def that_sticks(plant: Plant) -> Plant:
+    """The plant with stick limits that a body can have: none lets go below the friction with which
+    it then slides (Karnopp 1985)."""
+    p = plant.friction
+    if p.F_sp >= p.F_cp and -p.F_sn >= p.F_cn:
+        return plant
+    return replace(plant, friction=replace(p, F_sp=max(p.F_sp, p.F_cp), F_sn=min(p.F_sn, -p.F_cn)))
 
 
 def kernel_rows(plant: Plant, names: Sequence[str], drive: Drive, x: Array) -> Array:

@@ -6,7 +6,7 @@ drives) in windows, with the regression's estimates as a prior. No global search
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -26,6 +26,7 @@ from identification.estimation.windowed_run.parameters import (
     names_of,
     on_bristle,
     plant_with,
+    that_sticks,
     units_in,
     values_of,
 )
@@ -110,7 +111,7 @@ class _Unknowns:
 
     names, x0, unit (k,): all of them; at (d,): those that are free; trust (k,): the regression's
     deviations; steps: at most, of one minimum; little: share of the cost below which a step is the
-    last; reached: the last minimum (d,), if any.
+    last; sticks: stick limits are no less than a body can have; reached: the last minimum (d,).
     """
 
     plant: Plant
@@ -123,6 +124,7 @@ class _Unknowns:
     trust: Array
     steps: int
     little: float
+    sticks: bool = True
     reached: list[Array] = field(default_factory=list)
 
     @classmethod
@@ -151,7 +153,8 @@ class _Unknowns:
 
     def plant_at(self, x: Array) -> Plant:
         """The plant of the unknowns (d,)."""
-        return plant_with(self.plant, self.names, self.full(x))
+        found = plant_with(self.plant, self.names, self.full(x))
+        return that_sticks(found) if self.sticks else found
 
     def off_bounds(self, found: Minimum) -> tuple[Minimum, Array]:
         """A minimum with each term of sliding friction that lies at its bound 0 moved off it, by
@@ -222,7 +225,7 @@ def refit(
     (1963); Cauchy's weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`,
     (5), (8) to (10).
     """
-    quick = effort == "quick"
+    quick, plant = effort == "quick", that_sticks(plant)
     if effort in ("rough", "whole"):
         plant = start_band(plant, logs, drive, band)
     slow = on_bristle(plant)  # its sub-steps are ten times shorter
@@ -302,7 +305,7 @@ def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     unequal. Ours: `README.md`, (7)."""
     fixed = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     part = [shortened(one, PIECE) for one in logs]
-    unknowns = _Unknowns.of(plant, part, drive, fixed, REFIT_STEPS, PASSING)
+    unknowns = replace(_Unknowns.of(plant, part, drive, fixed, REFIT_STEPS, PASSING), sticks=False)
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:

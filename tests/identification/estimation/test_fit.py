@@ -291,14 +291,17 @@ def test_a_run_of_which_sliding_shows_less_than_it_states_leaves_the_equation(
     assert compared == [run.friction]  # its own, which the run has been followed with
 
 
-def equation_beside_a_lost_run(identified: int, monkeypatch: pytest.MonkeyPatch) -> KarnoppFit:
-    """What answers for a motor whose run is lost with so many of the five known, in a band that
-    takes the sliding; its equation of motion leaves far more than noise too."""
+def equation_beside_a_lost_run(
+    identified: int, monkeypatch: pytest.MonkeyPatch, *, share: float = 0.3, left: float = 10.0
+) -> KarnoppFit:
+    """What answers for a motor whose run leaves so much, with so many of the five known, in a band
+    that takes the sliding; its equation of motion leaves far more than noise too, and this share of
+    the force."""
     recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
-    equation = replace(fit_prescribed(recorded, "lost"), chi_square=1e3)
+    equation = replace(fit_prescribed(recorded, "lost"), chi_square=1e3, left=(share, 1.0))
     none = Estimate(None, "N", reason="found 1, but the interval is wider")
     run = replace(
-        equation, friction=replace(NINE, dv_p=10.0, dv_n=-10.0),
+        equation, friction=replace(NINE, dv_p=10.0, dv_n=-10.0), chi_square=left,
         estimates={n: equation.estimates[n] if n in FIVE[:identified] else none for n in NAMES},
     )  # fmt: skip
     monkeypatch.setattr(run_or_equation, "_by_equation", lambda *_: equation)
@@ -314,6 +317,17 @@ def test_an_equation_beside_a_lost_run_predicts_and_reports_nothing(
     assert all(found.estimates[name].value is None for name in NAMES)
     assert "neither the run nor the equation" in str(found.estimates["m"].reason)
     assert equation_beside_a_lost_run(2, monkeypatch).friction.dv_p == 10.0
+    # A run that is none has no number, however narrow its interval.
+    lost = equation_beside_a_lost_run(2, monkeypatch, left=1e2)
+    assert all(lost.estimates[name].value is None for name in NAMES)
+
+
+def test_an_equation_that_explains_nearly_all_of_the_force_answers_for_a_lost_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = equation_beside_a_lost_run(1, monkeypatch, share=0.05, left=1e2)
+    assert found.friction.dv_p < 10.0
+    assert found.estimates["F_cp"].value is not None
 
 
 def test_a_band_that_takes_the_sliding_does_not_hide_what_a_plant_leaves() -> None:

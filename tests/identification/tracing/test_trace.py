@@ -157,26 +157,29 @@ def test_what_an_actuator_lacks_is_not_laid_to_friction() -> None:
 
 
 @pytest.mark.parametrize(
-    ("verdict", "complete", "effects", "error", "asked"),
+    ("verdict", "complete", "effects", "error", "actuator_noise", "asked"),
     [
-        ("none", False, (), 5e-5, True),
-        ("none", False, (), 1e-5, False),  # which is noise
-        ("drift", False, (), 1e-5, True),
-        ("unknown", False, ("spring",), 5e-5, True),
-        ("none", True, (), 5e-5, False),
-        ("effect", False, ("spring",), 5e-5, False),  # which the force alone might not have
+        ("none", False, (), 5e-5, 1.0, True),
+        ("none", False, (), 5e-5, 1.15, False),  # a linear actuator leaves noise alone
+        ("none", False, (), 1e-5, 1.0, False),  # which is noise
+        ("drift", False, (), 1e-5, 1.0, True),
+        ("unknown", False, ("spring",), 5e-5, 1.0, True),
+        ("none", True, (), 5e-5, 1.0, False),
+        ("effect", False, ("spring",), 5e-5, 1.0, False),  # which the force alone might not have
     ],
 )
 def test_the_measured_force_is_asked_where_the_command_leaves_something_and_nothing_is_found(
-    verdict: str, complete: bool, effects: tuple[str, ...], error: float, asked: bool,
-    monkeypatch: pytest.MonkeyPatch,
+    verdict: str, complete: bool, effects: tuple[str, ...], error: float, actuator_noise: float,
+    asked: bool, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     by_command = SimpleNamespace(
         verdict=verdict,
         complete=complete,
         effects=effects,
+        before={"train": SimpleNamespace(actuator_rms=1.2)},
         after={"test": SimpleNamespace(position_rms=error)},
         noise_y=1e-5,
+        noise_actuator=actuator_noise,
         plant=SimpleNamespace(actuator=ACTUATOR),
     )
     by_force = SimpleNamespace(verdict="none", complete=True, effects=())

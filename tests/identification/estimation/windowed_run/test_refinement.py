@@ -88,6 +88,16 @@ def test_a_motor_far_off_comes_to_its_parameters_through_windows_that_grow(
     assert np.allclose(found.plant.friction.array, NINE.array, rtol=0.02)
 
 
+def test_no_refined_body_lets_go_below_the_friction_with_which_it_slides() -> None:
+    """Without a stick limit above it the run of such a log ends its rests too early or at once."""
+    one = seen(made(3, friction=replace(NINE, F_sp=NINE.F_cp, F_sn=-NINE.F_cn)))
+    begun = replace(plant(), friction=replace(NINE, F_sp=0.8 * NINE.F_cp, F_sn=-0.7 * NINE.F_cn))
+    found = refit(begun, [one], "command", prior={}, effort="near").plant.friction
+    assert found.F_sp >= found.F_cp and -found.F_sn >= found.F_cn
+    assert found.F_sp == pytest.approx(NINE.F_cp, rel=0.02)
+    assert found.F_sn == pytest.approx(-NINE.F_cn, rel=0.02)
+
+
 def test_a_descent_that_is_halted_gives_what_it_has_come_to() -> None:
     one, asked = seen(made(2)), iter([True] * 200)
     halted = replace(one, halt=Halt(lambda: next(asked, False)))
