@@ -1,4 +1,6 @@
-"""Remarks of two kinds: those that change how a result is read or used, and asides."""
+"""Remarks: those that change how a result is read or used, asides, and what was left out."""
+
+from collections.abc import Iterable
 
 
 class MinorRemark(str):
@@ -8,3 +10,14 @@ class MinorRemark(str):
     """
 
     __slots__ = ()
+
+
+class LeftOut(str):
+    """A remark on a log, or runs of one, that are left out, which a refusal of the rest names."""
+
+    __slots__ = ()
+
+
+def left_out(remarks: Iterable[str]) -> list[str]:
+    """The remarks on runs and logs that are left out."""
+    return [one for one in remarks if isinstance(one, LeftOut)]

@@ -97,11 +97,13 @@ class Refused(NotIdentifiable):
 
 @contextmanager
 def refused_with(then: Callable[[str], Step]) -> Iterator[None]:
-    """Within the block a refusal becomes one that says `then(its reason)` as the next step."""
+    """Within the block a refusal becomes one that says `then(its reason)` as the next step; its
+    reason: without what was added to it, as of logs that are left out."""
     try:
         yield
     except NotIdentifiable as error:
-        raise Refused(str(error), then(str(error))) from error
+        own = error.__cause__ if isinstance(error.__cause__, NotIdentifiable) else error
+        raise Refused(str(error), then(str(own))) from error
 
 
 class Bar:

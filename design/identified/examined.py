@@ -14,8 +14,9 @@ from design.identified.identifiable_by_log import RunsIdentifiability, identifia
 from design.machine.model import Identifiable
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
+from identification.remarks import left_out
 from identification.signals.bad_samples import BadSamples
-from identification.signals.clean import left_out, limits
+from identification.signals.clean import limits
 from identification.signals.delays import Delay, delays_of, exchanged_columns
 from identification.signals.sensor_state import Clock, SensorState, sensor_state
 

@@ -19,7 +19,7 @@ from design.machine.surrounding_lines import surrounding_lines, unequal_friction
 from identification.errors import NotIdentifiable
 from identification.model.estimates import KarnoppFit
 from identification.progress import KeepGoing, Progress, quiet, without_end
-from identification.signals.clean import left_out
+from identification.remarks import left_out
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior

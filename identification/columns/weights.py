@@ -222,7 +222,9 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     score += float(np.clip(A_DECADE_OF_FRICTION * decades, LEAST_OF_FRICTION, A_DECADE_OF_FRICTION))
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
-    if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
+    # A velocity that is filtered, and so late, is a damping beside a mass below 0: no force is.
+    late = law.m * law.way < 0.0 and min(law.share, abs(law.work)) > ALL_VELOCITY
+    if law.friction < LITTLE_FRICTION and (late or v_share > ALL_VELOCITY):
         score += A_VELOCITY
     elif law.friction < NO_FRICTION:
         score -= 3.0

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.stats import t
 
 from identification.arrays import Array
 from identification.errors import NotIdentifiable
@@ -28,6 +30,7 @@ from identification.estimation.regression.force_terms import (
     ForceFit,
     Lateness,
     fewest_terms,
+    of_one_speed,
 )
 from identification.estimation.regression.motion_log import motion_log
 from identification.estimation.regression.motion_rows import (
@@ -37,17 +40,22 @@ from identification.estimation.regression.motion_rows import (
     usual_fastest,
     without_reversals,
 )
+from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.weighted_rows import (
     Rows,
+    inverse_of_gram,
+    solve_rows,
     stacked,
+    with_model_error,
 )
 from identification.log import Log, Rig
-from identification.model.estimates import Estimate, KarnoppFit, LogFit
+from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
-from identification.thresholds import HALF
+from identification.signals.steady_speed import steady_speed
+from identification.thresholds import HALF, WORSE
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
@@ -65,6 +73,10 @@ WHY_NOT = {
     "stick": "no free run gives it (see the notes), and it is not in the force equation;"
     " log the body driven by a force, from rest",
 }
+COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
+LEVELS_MORE = "log other constant forces that way"
+STRAIGHT_WHY = "as many steady speeds as parameters: that friction is linear in speed is assumed"
+UNSETTLED = "left out, since its speed does not settle"
 FALLS_WHY = (
     "found {:.3g} {}: friction falls with speed, which viscous friction does not, so the Coulomb"
     " level is that at the speeds logged; 'workbench trace' searches for the cause"
@@ -146,6 +158,79 @@ def withheld(fit: KarnoppFit, reason: str) -> KarnoppFit:
     values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
     none = {name: fit.estimates[name].withheld(reason, x) for name, x in values.items()}
     return replace(fit, estimates={**fit.estimates, **none})
+
+
+def together_alone(steady: Rows, way: tuple[int, int], rig: Rig, add: str) -> dict[str, str]:
+    """Why neither of the two of a direction is given, by name; steady: rows of sliding in it; add:
+    what to log."""
+    level, slope = (FIVE[k] for k in way)
+    factor, unit = (1.0, "rad/s") if rig.motion == "rotary" else (1e3, "mm/s")
+    v = factor * float(np.median(np.abs(steady.X[:, way[1]])))
+    force = solve_rows(replace(steady, X=steady.X[:, (0, way[0])])).theta[1]
+    why = (
+        f"sliding of one speed, {v:.3g} {unit}, shows {level} and {slope} together alone,"
+        f" {force:.3g} {units_of(rig.motion)[level]} there; {add}"
+    )
+    return {level: why, slope: why}
+
+
+def fit_by_steady_speeds(recorded: RecordedLogs, why: str) -> KarnoppFit | None:
+    """Sliding friction from the steady speeds of logs of one constant force each, F = F_c + F_v v,
+    and the mass from how long they take to settle, m = F_v tau; None where no direction has two.
+
+    why: as of `fit_prescribed`. The intervals have the errors of the speeds and, of more logs than
+    parameters, the scatter between them (Student's t). Source: Aitken, Proc. R. Soc. Edinburgh 55
+    (1936) 42; the order of steps is ours.
+    """
+    tried = [(one, steady_speed(one.log["t"], one.log["y"], one.noise.y)) for one in recorded.logs]
+    settled = [(one, steady) for one, steady in tried if steady is not None]
+    recorded = replace(recorded, logs=tuple(one for one, _ in settled))
+    v, v_sd, tau, tau_sd, left = np.array([steady for _, steady in settled]).reshape(-1, 5).T
+    force, up = np.array([one.log["F"][0] for one, _ in settled]), v > 0.0
+    X, order = np.column_stack([0.0 * v, up, -1.0 * ~up, v * up, v * ~up]), np.arange(len(v))
+    rows = Rows(force, X, v_sd, order, np.abs(v), FIVE)
+    ways = [way for way in COLUMNS_OF_WAYS if np.any(X[:, way[0]])]
+    alike = [way for way in ways if of_one_speed(rows, way[1], WORSE)]
+    if len(alike) == len(ways):
+        return None
+    used = (*(way[0] for way in ways), *(way[1] for way in ways if way not in alike))
+    slopes = np.zeros(len(FIVE))
+    slopes[list(used)] = solve_rows(replace(rows, X=X[:, used])).theta
+    slope = np.abs(np.where(up, slopes[3], slopes[4]))
+    shows = slope > 0.0  # of one speed, the slope of the other direction stands for its error
+    rows = replace(rows, sd=v_sd * np.where(shows, slope, np.max(slope)))
+    theta, spread = _with_scatter(replace(rows, X=X[:, used]))
+    masses = replace(rows, b=slope * tau, X=np.ones((len(v), 1)), sd=slope * tau_sd).at(shows)
+    mass, mass_spread = _with_scatter(masses)
+    unsure = np.diag(spread) / theta**2  # a mass is as unsure as the slopes, too
+    mass_spread += np.max(unsure[len(ways) :]) * mass**2
+    missing = force - X[:, used] @ theta
+    fit = ForceFit(
+        used=(0, *used), theta=np.append(mass, theta), covariance=block_diag(mass_spread, spread),
+        residuals=tuple(missing[:, np.newaxis]), rms=rms(missing), share=1.0,
+        relative=rms(missing) / rms(force),
+    )  # fmt: skip
+    made = _made(fit, [rows.at(order == i) for i in order], recorded, why)
+    found = dict(made.estimates)
+    for way in alike:
+        here = rows.at(X[:, way[0]] != 0.0)
+        for name, reason in together_alone(here, way, recorded.rig, LEVELS_MORE).items():
+            found[name] = found[name].withheld(reason, getattr(made.friction, name))
+    said = [f"{why}: friction is that of {len(v)} steady speeds"]
+    said += [] if len(v) > len(used) else [STRAIGHT_WHY]
+    said += [f"{one.log.name}: {UNSETTLED}" for one, steady in tried if steady is None]
+    off = float(np.mean((left / [one.noise.y for one, _ in settled]) ** 2))
+    return replace(made, estimates=found, remarks=tuple(said), left=None, chi_square=off)
+
+
+def _with_scatter(rows: Rows) -> tuple[Array, Array]:
+    """Parameters (k,) of a few rows, and their covariance, by which 1.96 deviations are the 95 %
+    interval of Student's t. Source: Student, Biometrika 6 (1908) 1."""
+    rows = with_model_error(rows)
+    free = len(rows.b) - rows.X.shape[1]
+    times = t.ppf(0.975, free) / NORMAL_95 if free > 0 else 1.0
+    covariance = times**2 * inverse_of_gram(rows.X / rows.sd[:, np.newaxis])
+    return solve_rows(rows).theta, covariance
 
 
 def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[MotionRows]]:

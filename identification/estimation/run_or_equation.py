@@ -27,6 +27,7 @@ from identification.estimation.estimates import effect_estimates
 from identification.estimation.prediction_error import prediction_error_fit
 from identification.estimation.prescribed_motion import (
     FEWEST_COMPARED,
+    fit_by_steady_speeds,
     fit_prescribed,
     is_unexplained,
     withheld,
@@ -110,7 +111,10 @@ def answered(
     lost = found.prescribed or is_no_run(found.misfit)
     why = LOST_WHY if found.prescribed else "no free run follows these logs"
     if lost and recorded.steps:
-        raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
+        steady = fit_by_steady_speeds(recorded, why)
+        if steady is None:
+            raise NotIdentifiable(f"{recorded.name}: {why}, and {STEPS_WHY}")
+        return steady
     if lost and recorded.drive == "force":
         return as_sliding_shows(fit_prescribed(recorded, why), recorded)
     if quick and not is_adequate(found.misfit):

@@ -13,7 +13,11 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.estimates import widened
-from identification.estimation.prescribed_motion import WHY_NOT
+from identification.estimation.prescribed_motion import (
+    COLUMNS_OF_WAYS,
+    WHY_NOT,
+    together_alone,
+)
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import FIVE
 from identification.estimation.regression.force_terms import of_one_speed
@@ -25,17 +29,16 @@ from identification.estimation.regression.weighted_rows import (
     solve_rows,
     stacked,
 )
-from identification.log import Rig
 from identification.model.estimates import NORMAL_95, KarnoppFit
 from identification.model.plant import units_of
 from identification.signals.steps import MEDIAN_OF_NOISE
 from identification.thresholds import FOURFOLD, HALF, MATERIAL, OF_ACCOUNT
 
-COLUMNS_OF_WAYS = ((1, 3), (2, 4))  # columns of Coulomb and viscous friction of each direction
 TURNING_WHY = (
     "inertia shows where the body turns back alone, in which friction is not that of sliding: the"
     " mass is not identifiable; log gentler changes of speed"
 )
+SPEEDS_MORE = f"add strokes at other speeds, at least {FOURFOLD:g} times apart"
 SPRING_WHY = (
     "the acceleration goes with the position, as in motion of one frequency: {:.3g} {} is the mass"
     " less what any spring takes off it (k/w^2); log motion of several frequencies"
@@ -75,7 +78,7 @@ def as_sliding_shows(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
         stated = by_rig and fit.estimates[FIVE[way[1]]].known and _is_mostly(every, kept, way[1])
         together = stated or _by_turning(every, kept, way[1])
         if together and of_one_speed(every.at(kept), way[1]):
-            reasons |= _together(every.at(kept), way, recorded.rig)
+            reasons |= together_alone(every.at(kept), way, recorded.rig, SPEEDS_MORE)
     fit = _without(fit, {key: f"{recorded.name}: {why}" for key, why in reasons.items()})
     if recorded.by_command or (fit.prescribed and not recorded.zoh):
         return fit  # the equation of a measured force has an unknown instant beside it
@@ -147,20 +150,6 @@ def _information(rows: Rows, column: int) -> float:
     A = rows.X / rows.sd[:, np.newaxis]
     others = np.delete(A, column, axis=1)
     return float(np.sum((A[:, column] - others @ least_squares(others, A[:, column])) ** 2))
-
-
-def _together(steady: Rows, way: tuple[int, int], rig: Rig) -> dict[str, str]:
-    """Why neither of the two of a direction is given, by name; steady: rows of sliding in it."""
-    level, slope = (FIVE[k] for k in way)
-    factor, unit = (1.0, "rad/s") if rig.motion == "rotary" else (1e3, "mm/s")
-    v = factor * float(np.median(np.abs(steady.X[:, way[1]])))
-    force = solve_rows(replace(steady, X=steady.X[:, (0, way[0])])).theta[1]
-    why = (
-        f"sliding of one speed, {v:.3g} {unit}, shows {level} and {slope} together alone,"
-        f" {force:.3g} {units_of(rig.motion)[level]} there; add strokes at other speeds, at least"
-        f" {FOURFOLD:g} times apart"
-    )
-    return {level: why, slope: why}
 
 
 def _without(fit: KarnoppFit, reasons: Mapping[str, str]) -> KarnoppFit:

@@ -4,7 +4,6 @@
 A longer run of missing values is never invented: the log is cut there.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
+from identification.remarks import LeftOut
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
@@ -33,8 +33,7 @@ LONGEST_REPAIR = 3
 """Missing samples in a row that are put back, by interpolation or as lost rows; at a longer run
 the log is cut."""
 
-SHORT_OR_STILL = f"of under {SHORTEST_LOG} rows or at rest left out"  # of runs
-LOG_LEFT_OUT = ": left out"  # of a log
+_SHORT_OR_STILL = f"of under {SHORTEST_LOG} rows or at rest left out"  # of runs
 
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
 _TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
@@ -93,9 +92,10 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     if len(runs) > 1 or lost > LONGEST_GAP * runs[0].h:
         hours = hours_in_words(gaps_in(log["t"], log.h), log.h)
         away = len(gaps_in(log["t"], runs[0].h)) + 1 - len(runs)
-        short = f" and {away} run{'s' * (away > 1)} {SHORT_OR_STILL}" if away else " left out"
+        short = f" and {away} run{'s' * (away > 1)} {_SHORT_OR_STILL}" if away else " left out"
         kept = f"in {len(runs)} run{'s' * (len(runs) > 1)}"
-        said.append(f"{log.name}: {kept}; {lost:.4g} s in gaps{short}{hours}")
+        line = f"{log.name}: {kept}; {lost:.4g} s in gaps{short}{hours}"
+        said.append(LeftOut(line) if away else line)
     return Prepared(runs, (*remarks, *said), bad)
 
 
@@ -106,11 +106,6 @@ def _moving(runs: tuple[Log, ...]) -> tuple[Log, ...]:
         if "y" not in run or np.ptp(run["y"]) > _MOVED * white_noise(run["y"])
     )  # fmt: skip
     return found or runs
-
-
-def left_out(remarks: Sequence[str]) -> list[str]:
-    """The remarks on runs and logs that are left out, which a refusal of the rest names."""
-    return [one for one in remarks if SHORT_OR_STILL in one or one.endswith(LOG_LEFT_OUT)]
 
 
 def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:

@@ -12,8 +12,8 @@ from design.machine.nearest import nearest
 from design.machine.source import MachineLogs, Source
 from identification.errors import BadCard, BadLog, ShortLog
 from identification.log import Rig
+from identification.remarks import LeftOut
 from identification.signals.bad_samples import BadSamples
-from identification.signals.clean import LOG_LEFT_OUT
 from workbench.cards.card import Card, load_card, present_of_card
 from workbench.cards.card_tables import FileEntry
 from workbench.cards.headers import log_remarks
@@ -89,7 +89,7 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
         except ShortLog as short:
             if len(logs) == len(rigs) and not found:
                 raise
-            remarks.append(str(short).partition("; ")[0] + LOG_LEFT_OUT)
+            remarks.append(LeftOut(f"{str(short).partition('; ')[0]}: left out"))
             continue
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)

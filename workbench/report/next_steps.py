@@ -39,6 +39,8 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
     parameters is identified, so that too little slides to test, or where it carries no design."""
     from workbench.report.model_tables import to_the_noise_by_equation
 
+    fitted = {Path(one.file).name for one in model.log}  # of several logs one may be left out
+    logs = [log for log in logs if Path(log).name in fitted] or logs
     if model.fit.adequate:
         return _design_or_run(model, logs, card, folder)
     if not model.identifies_friction:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from identification.errors import BadLog
+from identification.remarks import left_out
 from tests.workbench.log_files import CARD, signals
 from workbench.logs.sources import read_sources
 
@@ -41,6 +42,7 @@ def test_a_short_log_of_several_is_left_out(tmp_path: Path) -> None:
         "short.csv: 95 samples, at least 100 needed: left out",
         "holes.csv: 1 gap leaves no run of 100 samples at 0.01 s: left out",
     )
+    assert left_out(found.remarks) == list(found.remarks[:2])
     with pytest.raises(BadLog, match=r"1 gap leaves no run of 100 samples at 0\.01 s; log without"):
         read_sources(names[1:], str(tmp_path / "card.toml"))
     with pytest.raises(BadLog, match="95 samples, at least 100 needed; give a longer run"):

@@ -14,15 +14,16 @@ from design.asked import Limits
 from design.controllers.validate import validate
 from design.machine.arx_plant import ArxPlant
 from design.machine.design import Design
-from design.machine.model import Model, used
+from design.machine.model import LogEntry, Model, used
 from design.tune import Asked
+from identification.errors import NotIdentifiable
 from identification.model.plant import Actuator
 from tests.chain import TABLES, designed, model_of
 from workbench import cli
 from workbench.commands.axis_test import after_axis_test
 from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
-from workbench.output import Step, step
+from workbench.output import Refused, Step, refused_with, step
 from workbench.report.next_steps import (
     after_demo,
     after_design,
@@ -84,10 +85,40 @@ def test_a_refusal_of_logs_looks_over_the_one_it_names() -> None:
 def test_after_identify(model: Model) -> None:
     then = after_identify(model, ["a.csv"], "emps", Path("out"))
     assert taken(then) == "workbench design out/model.json"
-    lacking = replace(model, fit=replace(model.fit, adequate=False))
+    lacking = replace(
+        model, fit=replace(model.fit, adequate=False), log=(*model.log, other_log(model, "b.csv"))
+    )
     then = after_identify(lacking, ["a.csv", "b.csv"], "emps", Path("out"))
     assert taken(then) == "workbench trace a.csv b.csv --card emps"
     assert then.why == "an effect is missing"
+
+
+def other_log(model: Model, name: str) -> LogEntry:
+    """The model's first log under another name."""
+    return replace(model.log[0], file=name)
+
+
+def test_a_log_that_was_left_out_of_the_fit_is_not_named(model: Model) -> None:
+    """Of a motor's six logs two are too short, and `trace` of all of them was proposed."""
+    one = replace(model, log=(other_log(model, "b.csv"),))
+    lacking = replace(one, fit=replace(one.fit, adequate=False))
+    logs = ["short.csv", "logs/b.csv"]
+    assert taken(after_identify(lacking, logs, "emps", OUT)) == (
+        "workbench trace logs/b.csv --card emps"
+    )
+    nothing = withheld(one, *model.friction)
+    assert taken(after_identify(nothing, logs, "emps", OUT)) == (
+        "workbench doctor logs/b.csv --card emps"
+    )
+
+
+def test_a_refusal_looks_over_no_log_that_was_left_out() -> None:
+    then = check_of_refused(["logs/a.csv", "logs/short.csv"], "card.toml")
+    added = "2 logs: no run follows; short.csv: 94 samples, at least 100 needed: left out"
+    with pytest.raises(Refused) as refused, refused_with(then):
+        raise NotIdentifiable(added) from NotIdentifiable("2 logs: no run follows")
+    assert str(refused.value) == added
+    assert refused.value.then.command == "workbench doctor logs/a.csv --card card.toml"
 
 
 def test_no_design_is_proposed_of_a_model_that_carries_none(model: Model) -> None:

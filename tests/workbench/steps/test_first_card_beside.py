@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS as TABLES
@@ -138,3 +139,21 @@ def test_a_logger_may_begin_each_row_with_its_name(joint: dict[str, Array], tmp_
     assert roles(found) == {"t": "t_us", "r": "ref_deg", "y": "pos_deg", "u": "duty"}
     t = found.signal("t")
     assert t is not None and t.unit == "us"
+
+
+@pytest.mark.parametrize("drive", ["b", "u"])
+def test_a_late_speed_that_is_called_a_force_is_none(tmp_path: Path, drive: str) -> None:
+    """Filtered over 50 ms it is a damping beside a mass below 0, and had been "99 % inertia and
+    friction" by its letter."""
+    rng, n, h = np.random.default_rng(0), 6000, 2e-3
+    t = h * np.arange(n, dtype=np.float64)
+    force = 30.0 * np.sin(3.8 * t) + 15.0 * np.sin(10.7 * t + 1.0)
+    force += 8.0 * np.sign(np.sin(1.4 * t))
+    v = np.zeros(n)
+    for k in range(n - 1):
+        held = 5.0 * np.sign(v[k]) if abs(v[k]) > 1e-3 else np.clip(force[k], -5.0, 5.0)
+        v[k + 1] = v[k] + h / 2.0 * (force[k] - held - 20.0 * v[k])
+    late = lfilter([1.0 / 26.0], [1.0, -25.0 / 26.0], v + 1e-3 * rng.standard_normal(n))
+    y = h * np.cumsum(v) + 1e-5 * rng.standard_normal(n)
+    found = propose(tmp_path, f"t,y,F,{drive}", t, y, late, force + 5.0 * rng.standard_normal(n))
+    assert drive in roles(found).values() and "F" not in roles(found).values()
