@@ -14,6 +14,7 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.estimation.gauss_newton import (
+    FINE_STEP,
     ROUGH_STEP,
     Minimum,
     gauss_newton,
@@ -225,7 +226,7 @@ def refit(
     (1963); Cauchy's weights, Holland, Welsch (1977); covariance, Liang, Zeger (1986): `README.md`,
     (5), (8) to (10).
     """
-    quick, plant = effort == "quick", that_sticks(plant)
+    quick = effort == "quick"
     if effort in ("rough", "whole"):
         plant = start_band(plant, logs, drive, band)
     slow = on_bristle(plant)  # its sub-steps are ten times shorter
@@ -266,7 +267,8 @@ def _minimum(unknowns: _Unknowns, effort: Effort) -> tuple[Minimum, float, bool]
     if not (quick or (effort == "rough" and at.mean > HOPELESS)):
         again = unknowns.refined(at.x, RUN_WINDOW, False)
         at = again if again.followed else at
-    found, longest = unknowns.misfit(at.x), longest_window(plant, logs, drive)
+    at, found = _ended(unknowns, at, quick)
+    longest = longest_window(plant, logs, drive)
     if effort == "long" and longest > RUN_WINDOW and found <= ADEQUATE:
         return _over_long_runs(unknowns, at, found, longest)
     return at, found, False
@@ -300,12 +302,24 @@ def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
     return unknowns.refined(x, RUN_WINDOW, True, HALF_SHARE)
 
 
+def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, float]:
+    """The minimum itself and its misfit."""
+    found = unknowns.misfit(at.x)
+    if quick or not at.followed:
+        return at, found
+    finer = gauss_newton(at.fun, at.x, unknowns.steps, FINE_STEP)
+    left_by = unknowns.misfit(finer.x)
+    return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
+
+
 def descended(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     """The plant refined from far off, through windows that grow, with directions that may be
     unequal. Ours: `README.md`, (7)."""
     fixed = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     part = [shortened(one, PIECE) for one in logs]
-    unknowns = replace(_Unknowns.of(plant, part, drive, fixed, REFIT_STEPS, PASSING), sticks=False)
+    unknowns = replace(
+        _Unknowns.of(plant, part, drive, fixed, REFIT_STEPS, PASSING), sticks=on_bristle(plant)
+    )
     x, shortest = unknowns.start, FEWEST_IN_WINDOW * max(one.log.h for one in logs)
     try:
         for seconds in GROWING_WINDOWS:

@@ -84,6 +84,8 @@ def contender(one: Entrant, setting: Setting) -> RunContender:
             break
         again = _near(other, effect, setting)
         found = min(found, again, key=lambda each: each.misfit)
+    if found.misfit > one.begun.misfit:  # the search has led astray
+        return one.begun
     return replace(one.begun, plant=found.plant, misfit=found.misfit)
 
 
