@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from design.first_card.proposal import Proposal
+from identification.columns.clock import counts_thousandths
 from identification.errors import BadLog
 from workbench.steps.first_card.proposal import proposed
 
@@ -141,3 +142,29 @@ def test_a_time_that_goes_back_is_named_and_is_no_signal(tmp_path: Path) -> None
     found = propose(tmp_path, "timestamp,ms,pwm,theta", stamp, 1e3 * t, pwm, angle)
     assert {one.name: one.column for one in found.signals} == {"t": "ms", "y": "theta", "u": "pwm"}
     assert found.unused["'timestamp'"] == "is called a time, but goes back in data row 14"
+
+
+def steady_speeds(seed: int) -> tuple[Floats, Floats, Floats]:
+    """Times [s] of rows about a second apart, in whole ms, and a wheel's command and steady speed
+    [rpm] from row to row."""
+    rng = np.random.default_rng(seed)
+    step = 1.0 + 0.001 * rng.integers(0, 4, 120)
+    t = np.round(17.251 + np.cumsum(step), 3)
+    u = np.linspace(-240.0, 240.0, 120)
+    rpm = np.sign(u) * np.clip(2.4 * np.abs(u) - 35.0, 0.0, None)
+    return t, u, rpm + 4.0 * rng.standard_normal(120)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_clock_to_the_thousandth_that_jitters_is_one_of_seconds(
+    tmp_path: Path, seed: int
+) -> None:
+    found = propose(tmp_path, "time,motorCommand,wheelSpeedRpm", *steady_speeds(seed))
+    (clock,) = (one for one in found.signals if one.name == "t")
+    assert (clock.unit, clock.sure, clock.rival) == ("s", False, "ms")
+    assert "its decimals" in clock.why
+
+
+@pytest.mark.parametrize("step", [0.125, 1.0 / 3.0, 0.5])
+def test_an_even_clock_to_the_thousandth_may_be_one_of_milliseconds(step: float) -> None:
+    assert not counts_thousandths(np.round(step * np.arange(400), 3))
