@@ -71,7 +71,7 @@ def _(found: Predicted, display: Display, log: str) -> View:
         {"prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10)},
         sections,
         lambda: prediction_chart(found, display),
-        step=after_predict("LOG", "CARD"),
+        step=after_predict("LOG", "CARD", one_way=found.one_way),
         has_page=False,
         lead=first.rstrip(".") + ".",
         content=lambda: found.summary,

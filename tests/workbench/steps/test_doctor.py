@@ -170,7 +170,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
     card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
     found = examined_log(load_card(card.path), table)
     text = doctor_screen(found, None).text().splitlines()
-    assert after_doctor(found, "run.csv", "card.toml", None) is None
+    assert after_doctor(found, "run.csv", "card.toml") is None
     assert text[1].split(maxsplit=1) == [
         "next", "check the units in the card (see note), then ask again"
     ]  # fmt: skip
@@ -179,7 +179,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
 
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml", None)
+    then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml")
     assert then and then.command == "workbench identify logs/run.csv --card 'my card.toml'"
     found = examined_log(card, {**table, "u": -table["u"]})
     shown = " ".join(doctor_screen(found, None).text().split())
