@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from design.identified.hardly_identifiable import hardly_identifiable
+from design.identified.hardly_identifiable import hardly_identifiable, without_direction
 from design.identified.identifiable_by_log import RunsIdentifiability, identifiability_of_runs
 from design.machine.model import Identifiable
 from identification.columns.clock import counts_thousandths
@@ -103,7 +103,7 @@ def examined(found: CheckedLog, units: Sequence[str], *, effects: bool = False) 
     remarks = list(found.remarks)
     late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else None
     if log is not None and not found.refused:
-        remarks += hardly_identifiable(runs, found.rig)
+        remarks += without_direction(runs, found.rig) + hardly_identifiable(runs, found.rig)
     sensors = tuple(sensor_state(name, x) for name, x in found.raw.signals.items() if name != "t")
     delays = delays_of(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else exchanged_columns(delays, sensors, log.h)
