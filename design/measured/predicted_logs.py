@@ -46,7 +46,10 @@ def predict_logs(
     found = tuple(predict(model, s.log, drive=drive, window=window) for s in logs.runs)
     of_runs = dict.fromkeys(line for one in found for line in one.remarks)
     refused = dict.fromkeys(one.refused for one in found if one.refused is not None)
-    names = ("position_rms", "force_predicted_rms", "force_applied_rms", "force_simulated_rms")
+    names = (
+        "position_rms", "force_predicted_rms", "force_steady_rms", "force_applied_rms",
+        "force_simulated_rms",
+    )  # fmt: skip
     other = []
     if model.card != logs.card:
         other = [f"the model is of {model.card}, the log of {logs.card}"]
