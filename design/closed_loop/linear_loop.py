@@ -45,9 +45,17 @@ def linear_of(
 
     period [s]: of the position loop, by default the first of `periods`. The physical plant where
     the mass is identified: it holds the force loop and no noise. Raises NotIdentifiable where
-    neither it nor an ARX plant that follows the logs is there.
+    neither it nor an ARX plant that follows the logs is there, and of motion one way, unless an ARX
+    plant is asked for: no log then shows what a loop meets about standstill.
     """
     known = model.friction["m"].value is not None
+    if source is None and not known and model.identifies_one_way:
+        found = ", ".join(name for name, one in model.friction.items() if one.known)
+        raise NotIdentifiable(
+            f"{model.log[0].file}: {found} alone identified, of motion in one direction; a design"
+            " needs the mass, or a linear plant of motion in both; log motion both ways, with"
+            " reversals, and identify again"
+        )
     if source == "arx" or (source is None and not known):
         plant = _arx(model, period, known)
         return plant, _force_loop(model, plant.h)

@@ -7,6 +7,7 @@ from itertools import permutations
 
 import numpy as np
 
+from design.identified.hardly_identifiable import said_without_sign
 from identification.columns.column import Column
 from identification.columns.comparable import NEARLY_ALIKE
 from identification.columns.header import is_position, words_of
@@ -135,6 +136,7 @@ def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
 
 FOLLOWED = 0.95  # likeness of a position and its reference in a log without a drive
 NO_DRIVE = 0.0  # log-odds of a force by its header, of what may be a reference at most
+BESIDE_ZERO = 0.05  # of its range, that a signal of both ways goes below zero and above at least
 SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
 
 
@@ -178,12 +180,18 @@ def no_body(columns: Columns) -> BadLog:
 def without_sign(signals: Sequence[Column]) -> str:
     """What is said of a command without a sign beside a column that goes back and forth."""
     for one, y in permutations(signals, 2):
-        if said(one, "u") >= SAID_SO and np.min(one.x) >= 0.0 and y.way_gone > TWICE:
-            return (
-                f"{one.shown} is never negative, though {y.shown} goes both ways: where the motor"
-                " pushes both ways its direction is missing, so log the command with its sign"
-            )
+        other = bool(one.axis and y.axis) and one.axis != y.axis
+        if said(one, "u") >= SAID_SO and np.min(one.x) >= 0.0 and not other and _both_ways(y):
+            return said_without_sign(one.shown, y.shown)
     return ""
+
+
+def _both_ways(one: Column) -> bool:
+    """Whether a column goes both ways: a position there and back, all else below zero and above."""
+    if one.way_gone <= TWICE:
+        return False
+    least = BESIDE_ZERO * float(np.ptp(one.x))
+    return said(one, "y") >= SAID_SO or bool(np.min(one.x) < -least and np.max(one.x) > least)
 
 
 def _followed(signals: Sequence[Column]) -> tuple[Column, Column] | None:

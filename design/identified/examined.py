@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from design.identified.hardly_identifiable import hardly_identifiable
+from design.identified.hardly_identifiable import hardly_identifiable, without_direction
 from design.identified.identifiable_by_log import RunsIdentifiability, identifiability_of_runs
 from design.machine.model import Identifiable
+from identification.columns.clock import counts_thousandths
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.remarks import left_out
@@ -21,6 +22,8 @@ from identification.signals.delays import Delay, delays_of, exchanged_columns
 from identification.signals.sensor_state import Clock, SensorState, sensor_state
 
 DOCTOR_SCHEMA = "doctor/1"
+READ_IN_SECONDS = "signals.t, read in 's'"
+DECIMALS_OF_SECONDS = ", though decimals to the thousandth are mostly those of s"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
 
 
@@ -101,11 +104,14 @@ def examined(found: CheckedLog, units: Sequence[str], *, effects: bool = False) 
     remarks = list(found.remarks)
     late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else None
     if log is not None and not found.refused:
-        remarks += hardly_identifiable(runs, found.rig)
+        remarks += without_direction(runs, found.rig) + hardly_identifiable(runs, found.rig)
     sensors = tuple(sensor_state(name, x) for name, x in found.raw.signals.items() if name != "t")
     delays = delays_of(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else exchanged_columns(delays, sensors, log.h)
-    remarks = [*([exchanged] if exchanged else []), *units, *remarks]
+    in_s = "t" in found.raw and counts_thousandths(found.raw["t"])
+    by_decimals = [one for one in units if in_s and one.startswith(READ_IN_SECONDS)]
+    said = [f"{one}{DECIMALS_OF_SECONDS}" if one in by_decimals else one for one in units]
+    remarks = [*([exchanged] if exchanged else []), *said, *remarks]
     reason = "; ".join([seen.reason, *left_out(remarks)]) if seen.reason else ""
     known = {
         **vars(seen),
@@ -118,7 +124,7 @@ def examined(found: CheckedLog, units: Sequence[str], *, effects: bool = False) 
         sensors=sensors,
         delays=delays,
         exchanged=bool(exchanged),
-        other_units=bool(units),
+        other_units=len(units) > len(by_decimals),
     )
 
 

@@ -142,6 +142,29 @@ def _against_stops(
             )
 
 
+def without_direction(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
+    """A line where a motor's command is never negative, though the body moves both ways."""
+    commands = [one["u"] for one in runs if "u" in one] if rig.kind == "motor" else []
+    if not commands or min(map(np.min, commands)) < 0.0:
+        return ()
+    try:
+        motions = [differentiate(one["y"], one.h) for one in runs]
+    except BadLog:
+        return ()
+    v = np.concatenate([one.v[moving(one)] for one in motions])
+    back = float(np.mean(v < 0.0)) if len(v) >= FEWEST_MOVING else 0.0
+    both = NEARLY_ONE_WAY < back < 1.0 - NEARLY_ONE_WAY
+    return (said_without_sign("the command u", "the motion"),) if both else ()
+
+
+def said_without_sign(command: str, motion: str) -> str:
+    """What is said of a command without a sign beside a motion that goes both ways."""
+    return (
+        f"{command} is never negative, though {motion} goes both ways: where the motor pushes both"
+        " ways its direction is missing, so log the command with its sign"
+    )
+
+
 def braked_by_its_voltage(logs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
     """A line where a motor's command is a voltage that mostly is the velocity, as that which the
     motor makes itself is."""

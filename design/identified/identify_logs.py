@@ -7,7 +7,7 @@ import numpy as np
 
 from design.asked import Options
 from design.identified.broken_promises import broken_promises
-from design.identified.hardly_identifiable import braked_by_its_voltage
+from design.identified.hardly_identifiable import braked_by_its_voltage, without_direction
 from design.identified.identifiable_by_log import identifiability_of_runs
 from design.identified.identify import identify
 from design.identified.sampled_posterior import posterior_document, posterior_of
@@ -65,7 +65,7 @@ def identify_logs(
             keep_going=keep_going,
         )
     except NotIdentifiable as error:
-        said = looks_like_velocity(runs, rig)
+        said = (*without_direction(runs, rig), *looks_like_velocity(runs, rig))
         raise NotIdentifiable("; ".join([str(error), *said, *left_out(logs.remarks)])) from error
     gate = identifiability_of_runs(runs, rig, options.drive, fit=fit)
     now = logs.present(model.period)
@@ -76,6 +76,7 @@ def identify_logs(
     if posterior_samples is not None:
         model = replace(model, posterior=posterior_document(posterior_samples, fit))
     remarks = (
+        *without_direction(runs, rig),
         *looks_like_velocity(runs, rig, model), *braked_by_its_voltage(runs, rig),
         *surrounding_lines(fit.surroundings, rig),
         *unequal_friction(model.friction, model.effects),

@@ -317,6 +317,13 @@ class Model:
         return any(value.known for value in self.friction.values())
 
     @property
+    def identifies_one_way(self) -> bool:
+        """Whether it identifies sliding in one direction alone, as of logs that move one way."""
+        ways = (("F_cp", "F_vp"), ("F_cn", "F_vn"))
+        up, down = (any(self.friction[name].known for name in way) for way in ways)
+        return up != down
+
+    @property
     def by_equation(self) -> bool:
         """Whether the parameters are those of the equation of motion, not of a free run."""
         return all(entry.position_rms is None for entry in self.log)

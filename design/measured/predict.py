@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
 
 from design.machine.model import FAST, Model, used
 from identification.arrays import Array, IntArray
@@ -40,7 +41,8 @@ class Prediction:
     motor, whose applied force is that of its command.
 
     sliding: True outside the stick band, where the inverse model predicts the force; inside it
-    repeats the applied one. drive: what drove the position; the errors are root mean squares [N],
+    repeats the applied one. steady: of these the samples whose smoothed motion holds no start and
+    no stop. drive: what drove the position; the errors are root mean squares [N],
     [m], None where empty. refused: why there is no free run, so that position_simulated is NaN;
     None where there is one. remarks: a line each on what the numbers rest on.
     """
@@ -52,6 +54,7 @@ class Prediction:
     position_measured: Array
     position_simulated: Array
     sliding: NDArray[np.bool_]
+    steady: NDArray[np.bool_]
     drive: Drive
     refused: str | None = None
     remarks: tuple[str, ...] = ()
@@ -67,6 +70,11 @@ class Prediction:
     def force_predicted_rms(self) -> float | None:
         """Root mean square of applied less predicted force on sliding samples; None without any."""
         return _rms_where((self.force_applied - self.force_predicted)[self.sliding])
+
+    @property
+    def force_steady_rms(self) -> float | None:
+        """The same without starts and stops, in which a smoothed motion is not the body's."""
+        return _rms_where((self.force_applied - self.force_predicted)[self.steady])
 
     @property
     def force_applied_rms(self) -> float | None:
@@ -111,6 +119,8 @@ def predict(
     # The velocity as the inverse model takes it, and where it is significant.
     motion = differentiate(body["y"], body.h, how.cutoff, how.method)
     p, sure = seen_moving(model, body).friction, np.abs(motion.v) > SURE_SLIDING * motion.v_noise
+    up, down = (motion.v > p.dv_p) & sure, (motion.v < p.dv_n) & sure
+    reach = 2 * max(1, round(1.0 / (motion.cutoff * body.h))) + 1
     return Prediction(
         t=log["t"],
         force_applied=applied,
@@ -118,7 +128,8 @@ def predict(
         force_simulated=blank if simulated is None else simulated.F,
         position_measured=log["y"],
         position_simulated=blank if run is None else run.shown,
-        sliding=((motion.v > p.dv_p) | (motion.v < p.dv_n)) & sure,
+        sliding=up | down,
+        steady=_throughout(up, reach) | _throughout(down, reach),
         drive=chosen,
         refused=refused,
         remarks=(
@@ -151,9 +162,11 @@ def why_no_run(model: Model, drive: Drive) -> str | None:
         return None
     name, first = next(iter(unidentified.items()))
     by = "the command" if drive == "command" else "the force"
+    fitted = any(entry.position_rms is not None for entry in model.log)
+    own = "; the run of identify is of the fit's own values, which hold for its logs alone"
     return (
         f"no free run: {', '.join(unidentified)} not identified, which a run by {by} needs"
-        f" ({name}: {first.reason})"
+        f" ({name}: {first.reason}){own if fitted else ''}"
     )
 
 
@@ -170,6 +183,11 @@ def _run(
     except BadModel as error:  # the force is predicted all the same
         return None, f"no free run: {error}"
     return run, None
+
+
+def _throughout(slides: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Samples (n,) about which so many all slide one way, as far as the smoothing reaches."""
+    return np.asarray(minimum_filter1d(slides.astype(np.int8), reach) > 0)
 
 
 def _assumed(model: Model, ran: bool) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from identification.thresholds import TWICE
 OFTEN_REPEATED = 0.1  # share of the steps of a clock, that do not move it
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
+THOUSANDTHS, OFF_WHOLE = 1000.0, 1e-3  # of a clock's unit; off a whole one by binary fractions
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 
 
@@ -65,6 +66,19 @@ def is_second(one: Column, clock: Column) -> bool:
     off = float(np.max(np.abs(one.values - np.polyval(line, clock.values))))
     most = LONGEST_GAP * float(np.median(np.diff(one.values))) if counts else 0.0
     return off < max(most, SECOND_CLOCK * float(np.ptp(one.values)))
+
+
+def counts_thousandths(t: Array) -> bool:
+    """Whether the times (n,) of a clock are whole thousandths of its unit, and more uneven than
+    rounding makes them: a counter of milliseconds in s. Those of a clock in ms would be whole."""
+    if not np.all(np.isfinite(t)):
+        return False
+    fine = THOUSANDTHS * t
+    whole = np.all(np.abs(fine - np.round(fine)) < OFF_WHOLE)
+    if not whole or np.all(np.round(fine) % 10.0 == 0.0):
+        return False
+    rows = np.arange(len(t))
+    return bool(np.max(np.abs(fine - np.polyval(np.polyfit(rows, fine, 1), rows))) > 1.0)
 
 
 def gone_back(one: Column) -> str:

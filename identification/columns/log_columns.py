@@ -53,7 +53,8 @@ class Columns:
     """A log's clock, the columns that may be signals, and why each of the others is not.
 
     step: the median step of the clock in its own unit; grid: samples of the file in one of `x`;
-    notation: by which headers and units were read.
+    notation: by which headers and units were read; axes: those that the headers name, where there
+    are several, be the signals of one of them alone.
     """
 
     notation: Notation
@@ -64,11 +65,7 @@ class Columns:
     signals: tuple[Column, ...]
     left_out: Mapping[int, str]
     read: tuple[Column, ...]
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes that the headers name, where there are several."""
-        return tuple(sorted({one.axis for one in self.signals if one.axis}))
+    axes: tuple[str, ...]
 
 
 def columns_of(log: UnknownLog, notation: Notation) -> Columns:
@@ -110,7 +107,8 @@ def columns_of(log: UnknownLog, notation: Notation) -> Columns:
     left_out |= {one.raw.number: PHASE_CURRENT for one in phases}
     distinct, twice = without_doubles([one for one in signals if one not in phases])
     own = tuple(_with_axes(_of_a_scope(distinct), notation))
-    return Columns(notation, log, clock, step, grid, own, left_out | twice, tuple(read))
+    axes = tuple(sorted({one.axis for one in own if one.axis}))
+    return Columns(notation, log, clock, step, grid, own, left_out | twice, tuple(read), axes)
 
 
 def _periods(log: UnknownLog, usable: Sequence[Column], notation: Notation) -> list[Column]:

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from identification.columns.clock import counts_thousandths
 from identification.columns.column import Column
 from identification.columns.header import NUMBER, says_period
 from identification.columns.log_columns import Columns
@@ -150,6 +151,7 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         usual[name] = USUAL[f"{name}{turns}"] if name in roles.columns else {"": 0.0}
     open_of = {k: {given[k].unit: 0.0} if k in given else of for k, of in usual.items()}
     slope = slope_of(columns, roles)
+    in_thousandths = "t" not in given and counts_thousandths(columns.clock.values)
     scored = []
     for units in product(*(of.items() for of in open_of.values())):
         names = dict(zip(open_of, (unit for unit, _ in units), strict=True))
@@ -157,6 +159,7 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         likely += _plausible(columns, roles, motion.machine, names, given)
         off = _off(names, given, slope, columns.notation.factor)
         likely -= 0.0 if off is None else min(0.5 * (off / AGREES) ** 2, MOST_LOST)
+        likely -= MOST_LOST if in_thousandths and names["t"] != "s" else 0.0
         scored.append((likely, names))
     scored.sort(key=lambda one: -one[0])
     _, names = scored[0]
@@ -167,6 +170,8 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         others = [(score, other[name]) for score, other in scored if other[name] != unit]
         related = _by_relation(name, names, given, slope, columns.notation.factor)
         why = "by the velocity and the position" if related else "by its size, the header says none"
+        if name == "t" and in_thousandths and not related:
+            why = "by its size and its decimals, which end at the thousandth, the header says none"
         out[name] = UnitGuess(unit, None, related, why, others[0][1] if others else "")
     return out
 

@@ -16,6 +16,7 @@ from identification.remarks import LeftOut
 from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
+from identification.signals.clock_jitter import beside_their_time
 from identification.signals.differentiate import resolution
 from identification.signals.even_clock import (
     LONGEST_GAP,
@@ -117,8 +118,8 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     still, the log is cut; a position that jumps or wraps goes on from where it was.
 
     first_row: the file's row of the first sample, for the messages; rotary: positions are angles.
-    Raises BadLog where a tenth of the log would have to be left out, or a column has spikes in more
-    than 1 %.
+    Raises BadLog where a tenth of the log would have to be left out, or a column has large spikes
+    in more than 1 %, or any in more than 5 %.
     """
     check_time(log, first_row)
     (log, said, bad_ones), lost, away = _without_missing(log, first_row)
@@ -309,35 +310,41 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     while np.any(new := spikes(log, name, rotary) & ~spiking):  # one may hide another beside it
         spiking |= new
         log = log.with_signals(**{name: _bridged(t, raw, spiking)})
+    clearly, of_clock = spiking, list[str]()
     sound = ~beside_gaps(t)  # over a gap of the clock any motion is a step
     for _ in range(_ROUNDS if name in _SMALL else 0):
         new = small_spikes(log[name]) & sound & ~spiking
         if not np.any(new):
             break
-        spiking |= new
+        spiking = spiking | new
         log = log.with_signals(**{name: _bridged(t, raw, spiking)})
+    many = float(spiking.mean()) > _TAILS
+    if many and name == "y" and (said := beside_their_time(t, raw, spiking & ~clearly)):
+        spiking, of_clock = clearly, [f"{log.name}: {said}"]
+        log = log.with_signals(y=_bridged(t, raw, spiking))
     if not np.any(spiking):
-        return Repaired(log, ())
+        return Repaired(log, tuple(of_clock))
     rows, height = np.flatnonzero(spiking), np.abs(raw - log[name])
     factor, unit = _shown(name, rotary)
     found = (
         f"{first_row + int(rows[0])}, the largest of {factor * np.max(height):.3g}"
         f" {unit} in row {first_row + int(np.argmax(height))}"
     )
-    if np.mean(height > _LARGE * np.ptp(log[name])) > _MANY or spiking.mean() > _TAILS:
-        raise BadLog(
-            f"{log.name}: signal {name!r} has spikes in {spiking.mean():.1%} of the rows, first in"
-            f" row {found}; at most {_MANY:.0%} are interpolated; check the sensor and its cable"
-        )
+    large: Mask = height > _LARGE * np.ptp(log[name])
+    for which, those, most in (("large ", large, _MANY), ("", spiking, _TAILS)):
+        if those.mean() > most:
+            raise BadLog(
+                f"{log.name}: signal {name!r} has {which}spikes in {those.mean():.1%} of the rows,"
+                f" first in row {found}; at most {most:.0%} are interpolated; check the sensor and"
+                " its cable"
+            )
     said = f"{log.name}: isolated spikes of {name!r} in {len(rows)} samples interpolated"
-    return Repaired(
-        log,
-        (
-            f"{said} (at most {LONGEST_SPIKE} in a row), first in row {found},"
-            f" t = {t[int(np.argmax(height))]:.6g} s",
-        ),
-        tuple(_found(log, name, "spike", spiking, "interpolated", float(np.max(height)))),
+    remark = (
+        f"{said} (at most {LONGEST_SPIKE} in a row), first in row {found},"
+        f" t = {t[int(np.argmax(height))]:.6g} s"
     )
+    bad = _found(log, name, "spike", spiking, "interpolated", float(np.max(height)))
+    return Repaired(log, (*of_clock, remark), tuple(bad))
 
 
 def _bridged(t: Array, values: Array, bad: Mask) -> Array:

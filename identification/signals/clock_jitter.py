@@ -8,6 +8,7 @@ the speed is a line: the sensor's at rest, and tau's as its slope.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.signals.differentiate import resolution
@@ -22,6 +23,7 @@ QUICK_GROUP = 2  # groups from the fastest, whose speed decides whether the jitt
 WEIGHINGS = 4  # in which the weights of the line converge
 LEAST_OF_SQUARE = 0.05  # of a group's square, as which the line counts there at least
 OF_HALF_A_COUNT = 64.0 / 21.0  # of white noise, what counting leaves at half a count a sample
+BY_CLOCK = 0.95  # share of the samples off their place, which the clock is to explain
 
 
 class PositionNoise(NamedTuple):
@@ -61,6 +63,24 @@ def position_noise(y: Array, v: Array) -> PositionNoise | None:
     jitter = float(np.sqrt(max(slope, 0.0) / max(float(x[-1]), 1e-300)))
     found = PositionNoise(float(np.sqrt(rest)), jitter)
     return found if jitters(jitter * float(np.sqrt(x[-QUICK_GROUP])) / found.at_rest) else None
+
+
+def beside_their_time(t: Array, y: Array, off: NDArray[np.bool_]) -> str | None:
+    """What is said of samples of a position off their place, where these are as small as the way of
+    the body in half a period: the clock jitters, the sensor is sound. None where they are not.
+
+    t [s], y and off: (n,). A sensor's spikes come in slow motion and at rest too.
+    """
+    place = np.interp(t, t[~off], y[~off])
+    way = np.gradient(place)[off]  # of a sample
+    beside = np.abs(y - place)[off] / np.maximum(np.abs(way), 1e-300)
+    if np.mean(beside < HALF) < BY_CLOCK:
+        return None
+    late = 1e3 * float(np.median(beside)) * float(np.median(np.diff(t)))
+    return (
+        f"{off.mean():.1%} of the samples of 'y' are beside their place by what the body moves in"
+        f" some {late:.2g} ms: a clock that jitters; kept, as noise"
+    )
 
 
 def jitters(ratio: float) -> bool:

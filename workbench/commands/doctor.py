@@ -68,7 +68,7 @@ def _log(name: str, card_name: str, effects: bool, out: Path | None) -> int:
         with results("doctor", out) as folder:
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
-    then = after_doctor(found, name, card_name, out)
+    then = after_doctor(found, name, card_name)
     emit({**document, "out": out}, lambda: doctor_screen(found, out), then)
     return 1 if found.verdict in ("refused", "nothing") else 0
 

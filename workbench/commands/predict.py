@@ -39,15 +39,17 @@ def command(
     from workbench.interface.models import load_model
     from workbench.report.next_steps import after_predict
 
+    one_way = False
     with results("predict", out) as folder:
         if is_velocity_model(model_file):
             options.refuse_for_velocity("drive", "effects")
             shown = _of_velocity(model_file, log, card, window)
         else:
             model = load_model(model_file, effects)
-            shown = predict(model, log, card, drive=drive, window=window).view
+            found = predict(model, log, card, drive=drive, window=window)
+            shown, one_way = found.view, found.found.one_way
         shown.write(folder)
-    shown.show(folder.final, after_predict(log, card))
+    shown.show(folder.final, after_predict(log, card, one_way=one_way))
 
 
 def _of_velocity(model_file: Path, log: str, card: str, window: float | None) -> "View":

@@ -109,7 +109,7 @@ def advice(found: Examined) -> str:
     if found.other_units:
         return "check the units in the card (see note), then ask again"
     if found.verdict == "nothing":
-        return "log again, with the motion that 'add' names"
+        return "log again, with the motion that 'add' names (--out FOLDER draws this log)"
     if found.rig.kind == "motor" and found.rig.force_per_command is None:
         return "write force_per_command under the card's [rig], then ask again"
     return ""

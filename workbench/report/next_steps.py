@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0
-CHECK_FOLDER = "check"  # where a picture of a log is proposed
 
 
 def check_of_refused(logs: Sequence[str], card: str) -> Callable[[str], Step]:
@@ -43,7 +42,7 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
     logs = [log for log in logs if Path(log).name in fitted] or logs
     if model.fit.adequate:
         return _design_or_run(model, logs, card, folder)
-    if not model.identifies_friction:
+    if not model.identifies_friction or model.identifies_one_way:  # which no trace takes
         return check_of_refused(logs, card)("")
     why = "whether an" if to_the_noise_by_equation(model) else "an"
     return step(f"{why} effect is missing", "trace", *logs, "--card", card)
@@ -81,8 +80,10 @@ def _design_or_run(
     return check_of_refused(logs, card)("")
 
 
-def after_predict(log: str, card: str) -> Step:
-    """What a model lacks on a log."""
+def after_predict(log: str, card: str, *, one_way: bool = False) -> Step:
+    """What a model lacks on a log; of motion one way, which no trace takes, which run to add."""
+    if one_way:
+        return check_of_refused([log], card)("")
     return step("what is missing, where that is more than noise", "trace", log, "--card", card)
 
 
@@ -203,17 +204,16 @@ def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None
     return step("which run to add", "doctor", named[0], "--card", card)
 
 
-def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
-    """Another card where the log is refused, a picture where nothing is identifiable from it."""
+def after_doctor(found: "Examined", log: str, card: str) -> Step | None:
+    """Another card where the log is refused; None where nothing is identifiable from it: no command
+    makes more of it."""
     from workbench.report.doctor import advice
 
     if found.verdict not in ("refused", "nothing"):
         ready = not advice(found)
         return step("what can be known of it", "identify", log, "--card", card) if ready else None
-    if found.verdict == "nothing" and out is None:
-        return step("see the log", "doctor", log, "--card", card, "--out", CHECK_FOLDER)
     if found.verdict == "nothing":
-        return step("once a run is added as above", "doctor", log, "--card", card)
+        return None
     path = Path(card)
     place = path.with_name(f"{path.stem}-new.toml") if path.suffix else Path(CARD_FILE)
     return step("what the columns seem to be", "init", log, "--out", place)

@@ -7,6 +7,7 @@ import numpy as np
 
 from design.machine.readable import Display
 from design.measured.predicted_logs import Predicted
+from identification.thresholds import FAR_LESS
 from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel
 from workbench.report.next_steps import after_predict
 from workbench.report.view import Section, View, notes, view
@@ -42,6 +43,9 @@ def error_lines(found: Predicted, display: Display) -> list[str]:
     off, none = summary["force_predicted_rms"], summary["force_applied_rms"]
     if off is not None:
         noise = ", the acceleration's noise in it" if found.inertia else ""
+        steady = summary.get("force_steady_rms")
+        if steady is not None and steady < FAR_LESS * off:
+            noise = f", {display.force_text(steady)} off starts and stops{noise}"
         worse = f": worse than none, whose error is the force, {display.force_text(none)} rms"
         lines.append(
             f"force, inverse model: error {display.force_text(off)} rms while sliding{noise}"
@@ -71,7 +75,7 @@ def _(found: Predicted, display: Display, log: str) -> View:
         {"prediction.csv": lambda: csv_text(prediction_frame(found.runs), 10)},
         sections,
         lambda: prediction_chart(found, display),
-        step=after_predict("LOG", "CARD"),
+        step=after_predict("LOG", "CARD", one_way=found.one_way),
         has_page=False,
         lead=first.rstrip(".") + ".",
         content=lambda: found.summary,

@@ -147,8 +147,9 @@ def sliding_sd(one: MotionLog, w: WeakWindows, up: BoolArray, theta: Array) -> A
     by_position = [noise_gain(theta[0] * second + viscous * first) for viscous in theta[3:5]]
     square = one.position_sd[w.middle] ** 2 * np.where(up, *by_position)
     # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
-    force = one.log["F"]  # of steps, whose spread is none, all of it
-    least = OF_FORCE * float(np.std(force) or np.max(np.abs(force)))
+    force = one.log["F"]
+    spread = np.std(force) if np.ptp(force) > 0.0 else np.max(np.abs(force))
+    least = OF_FORCE * float(spread)
     return np.maximum(np.sqrt(one.noise.F**2 * noise_gain(mean) + square), least)
 
 

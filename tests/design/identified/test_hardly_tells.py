@@ -11,6 +11,7 @@ from design.identified.hardly_identifiable import (
     _turns_hidden,
     braked_by_its_voltage,
     hardly_identifiable,
+    without_direction,
 )
 from design.machine.readable import Display
 from identification.arrays import Array
@@ -142,3 +143,16 @@ def test_turns_that_an_encoders_step_hides_are_counted() -> None:
         y = 0.0175 * count * np.round(size * swing / count)
         text = said(MOTOR, T, y, np.cos(8.0 * np.pi * T))
         assert ("so much counts as rest" in text) == hidden, text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_command_without_its_sign_is_said_so_of_motion_both_ways(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rate, size = rng.uniform(1.0, 3.0), rng.uniform(10.0, 90.0)
+    v, y = np.cos(rate * T), np.sin(rate * T) / rate + noise(1e-5)
+    magnitude = Log("run", {"t": T, "y": y, "u": size * np.abs(v)})
+    (line,) = without_direction([magnitude], MOTOR)
+    assert "the command u is never negative" in line and "log the command with its sign" in line
+    assert without_direction([magnitude.with_signals(u=size * v)], MOTOR) == ()
+    onwards = np.cumsum(np.abs(v)) * 2e-3 + noise(1e-5)
+    assert without_direction([magnitude.with_signals(y=onwards)], MOTOR) == ()

@@ -10,7 +10,7 @@ from design.machine.source import Source
 from design.measured import drift_of_logs
 from design.measured import predict as predict_step
 from design.measured.friction_curve import friction_samples
-from design.measured.predict import force_by_model, of_one_instant, seen_moving
+from design.measured.predict import force_by_model, of_one_instant, predict, seen_moving
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog
@@ -148,3 +148,17 @@ def test_a_log_is_tested_for_drift_at_the_lag_of_the_model(monkeypatch: pytest.M
     with pytest.raises(BadLog, match="enough"):
         drift_of_logs.drift_of(model, "key", sources.logs)
     assert seen[0]["F"][100] == pytest.approx(97.0)
+
+
+def test_the_error_off_starts_and_stops_is_that_of_steady_rows() -> None:
+    """Strokes at one speed by a force switched on and off, in rows too few to show it speed up."""
+    p = Karnopp(0.05, 12.0, 12.0, 30.0, 30.0, 1e-3, -1e-3, 12.5, -12.5)
+    t = 0.1 * np.arange(300, dtype=np.float64)
+    on = np.repeat([1.0, 0.0, -1.0, 0.0] * 5, 15)
+    v, noise = 0.2 * on, np.random.default_rng(5).standard_normal(300)
+    y = np.concatenate([[0.0], np.cumsum(0.1 * v[:-1])]) + 1e-5 * noise
+    found = predict(model_of(p), Log("strokes", {"t": t, "y": y, "F": 18.0 * on}))
+    steady, whole = found.force_steady_rms, found.force_predicted_rms
+    assert 0 < np.sum(found.steady) < np.sum(found.sliding)
+    assert not np.any(found.steady & ~found.sliding) and not np.any(found.steady & (on == 0.0))
+    assert steady is not None and whole is not None and steady < 1.0 < 0.3 * whole

@@ -6,7 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.signals.clock_jitter import OF_HALF_A_COUNT, position_noise
+from identification.signals.clock_jitter import (
+    OF_HALF_A_COUNT,
+    beside_their_time,
+    position_noise,
+)
 
 NOISE = 2e-7  # m
 
@@ -69,3 +73,27 @@ def test_a_short_log_and_one_without_noise_tell_none() -> None:
     y, v = swinging(1e-3, 1e-4, 0)
     assert position_noise(y[:500], v[:500]) is None
     assert position_noise(np.zeros(20_000), np.zeros(20_000)) is None
+
+
+def in_part_moving(tau: float, every: int) -> tuple[Array, Array, Array]:
+    """Instants [s], a position that rests, moves and rests [rad], where each so many samples were
+    taken early by tau [s], and where it was."""
+    t = 0.01 * np.arange(400)
+
+    def place(at: Array) -> Array:
+        return np.asarray(1.0 - np.cos(2.0 * np.clip(at - 1.0, 0.0, 2.5)))
+
+    early = np.arange(len(t)) % every == 5
+    return t, place(t - tau * early), place(t)
+
+
+def test_samples_taken_early_are_of_the_clock() -> None:
+    t, y, place = in_part_moving(0.002, 10)
+    said = beside_their_time(t, y, y != place)
+    assert said is not None and "some 2 ms: a clock that jitters" in said
+
+
+def test_what_is_off_its_place_at_rest_too_is_not() -> None:
+    t, _, place = in_part_moving(0.0, 10)
+    off = np.arange(len(t)) % 10 == 5
+    assert beside_their_time(t, place + 0.002 * off, off) is None

@@ -70,8 +70,34 @@ def test_a_sensor_that_spikes_all_the_time_is_refused() -> None:
     def spike(x: Array) -> None:
         x[50:11_950:50] += 0.3
 
-    with pytest.raises(BadLog, match=r"'y' has spikes in 2.0% of the rows, first in row 51, the"):
+    with pytest.raises(BadLog, match=r"'y' has large spikes in 2.0% .* row 51, .* at most 1%"):
         repair(changed(moving(), "y", spike))
+
+
+def early(tau: float, seed: int) -> Log:
+    """A body that swings less and less and comes to rest; each eleventh sample is early [s]."""
+    rng = np.random.default_rng(seed)
+    t = 0.01 * np.arange(500)
+    at = t - tau * (np.arange(len(t)) % 11 == 3)
+    y = np.cos(4.0 * at) * np.clip(1.0 - at / 4.0, 0.0, None) ** 2
+    return Log("run", {"t": t, "y": y + 1e-6 * rng.standard_normal(len(t)), "F": np.sin(t)})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_samples_taken_early_are_noise_and_no_fault_of_the_sensor(seed: int) -> None:
+    log = early(0.002, seed)
+    found, remarks, bad = repair(log, rotary=True)
+    assert np.array_equal(found["y"], log["y"]) and not bad
+    assert len(remarks) == 1 and "a clock that jitters; kept, as noise" in remarks[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_small_spikes_of_a_sensor_are_refused_by_the_limit_that_is_said(seed: int) -> None:
+    def spike(x: Array) -> None:
+        x[180:490:9] += 2e-3
+
+    with pytest.raises(BadLog, match=r"'y' has spikes in .* at most 5% are interpolated"):
+        repair(changed(early(0.0, seed), "y", spike), rotary=True)
 
 
 @pytest.mark.parametrize("size", [0.5, -0.01, 0.002, 3e-4])

@@ -30,6 +30,7 @@ from workbench.report.next_steps import (
     after_doctor,
     after_drift,
     after_identify,
+    after_predict,
     after_trace,
     after_validate,
     check_of_refused,
@@ -119,6 +120,19 @@ def test_a_refusal_looks_over_no_log_that_was_left_out() -> None:
         raise NotIdentifiable(added) from NotIdentifiable("2 logs: no run follows")
     assert str(refused.value) == added
     assert refused.value.then.command == "workbench doctor logs/a.csv --card card.toml"
+
+
+def test_motion_one_way_goes_to_no_trace_which_refuses_it(model: Model) -> None:
+    up = withheld(model, "F_cp", "F_cn", "F_vn")
+    assert up.identifies_one_way and not model.identifies_one_way
+    lacking = replace(up, fit=replace(up.fit, adequate=False))
+    for then in (
+        after_identify(lacking, ["a.csv"], "emps", OUT),
+        after_predict("a.csv", "emps", one_way=True),
+    ):
+        assert taken(then) == "workbench doctor a.csv --card emps"
+        assert then.why == "which run to add"
+    assert taken(after_predict("a.csv", "emps")) == "workbench trace a.csv --card emps"
 
 
 def test_no_design_is_proposed_of_a_model_that_carries_none(model: Model) -> None:
@@ -255,22 +269,17 @@ def test_no_alarm_asks_for_nothing() -> None:
     assert after_drift(drifted("not_judged", {"a.csv": "not_judged"}), ["a.csv"], "emps") is None
 
 
-@pytest.mark.parametrize(
-    ("verdict", "out", "words"),
-    [
-        ("nothing", None, "doctor a.csv --card c/card.toml --out check"),
-        ("nothing", Path("check"), "doctor a.csv --card c/card.toml"),
-        ("refused", None, "init a.csv --out c/card-new.toml"),
-    ],
-)
-def test_a_log_that_tells_nothing(verdict: str, out: Path | None, words: str) -> None:
-    found: Any = SimpleNamespace(verdict=verdict)
-    assert taken(after_doctor(found, "a.csv", "c/card.toml", out)) == f"workbench {words}"
+def test_a_log_that_tells_nothing_leads_to_no_command_on_it() -> None:
+    nothing: Any = SimpleNamespace(verdict="nothing")
+    assert after_doctor(nothing, "a.csv", "c/card.toml") is None
+    refused: Any = SimpleNamespace(verdict="refused")
+    then = taken(after_doctor(refused, "a.csv", "c/card.toml"))
+    assert then == "workbench init a.csv --out c/card-new.toml"
 
 
 def test_another_card_goes_beside_the_one_at_hand() -> None:
     refused: Any = SimpleNamespace(verdict="refused")
-    assert taken(after_doctor(refused, "a.csv", "emps", None)).endswith("--out card.toml")
+    assert taken(after_doctor(refused, "a.csv", "emps")).endswith("--out card.toml")
 
 
 def test_a_demo_that_finds_another_effect(model: Model, found: Design) -> None:

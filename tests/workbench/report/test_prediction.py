@@ -34,3 +34,14 @@ def test_a_prediction_that_is_worse_than_none_is_said_so() -> None:
             found = Predicted((), {**summary, "force_applied_rms": applied}, inertia)
             said = f"force, inverse model: error 167 N rms while sliding{noise}{worse}"
             assert error_lines(found, Display()) == [said]
+
+
+@pytest.mark.parametrize(("steady", "said"), [(3.0, ", 3 N off starts and stops"), (30.0, "")])
+def test_starts_and_stops_that_make_most_of_the_error_are_told_apart(
+    steady: float, said: str
+) -> None:
+    summary = {"drive": "force", "window": None, "position_rms": None, "run_refused": None,
+               "force_predicted_rms": 40.0, "force_steady_rms": steady, "force_applied_rms": 90.0,
+               "force_simulated_rms": None}  # fmt: skip
+    (line,) = error_lines(Predicted((), summary, inertia=False), Display())
+    assert line == f"force, inverse model: error 40 N rms while sliding{said}"

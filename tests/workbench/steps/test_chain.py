@@ -285,6 +285,7 @@ def test_without_what_a_run_needs_the_force_alone_is_predicted(name: str) -> Non
     assert found.refused is not None
     assert f"{name} not identified, which a run by the command needs" in found.refused
     assert f"({name}: too slow)" in found.refused
+    assert "the run of identify is of the fit's own values" in found.refused
     assert found.position_rms is None and found.force_simulated_rms is None
     assert found.force_predicted_rms == predict(model, log).force_predicted_rms
     assert found.remarks == (f"force by assumed values of what is not identifiable: {name}",)

@@ -170,7 +170,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
     card.path.write_text(MOTOR.replace('"y", unit = "m"', '"y", unit = "parsec"'), "utf-8")
     found = examined_log(load_card(card.path), table)
     text = doctor_screen(found, None).text().splitlines()
-    assert after_doctor(found, "run.csv", "card.toml", None) is None
+    assert after_doctor(found, "run.csv", "card.toml") is None
     assert text[1].split(maxsplit=1) == [
         "next", "check the units in the card (see note), then ask again"
     ]  # fmt: skip
@@ -179,7 +179,7 @@ def test_a_unit_that_makes_a_travel_of_no_machine_is_said_first(motor: tuple[Car
 
 def test_a_refusal_is_shown_to_its_end_and_the_card_is_named(motor: tuple[Card, Table]) -> None:
     card, table = motor
-    then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml", None)
+    then = after_doctor(examined_log(card, table), "logs/run.csv", "my card.toml")
     assert then and then.command == "workbench identify logs/run.csv --card 'my card.toml'"
     found = examined_log(card, {**table, "u": -table["u"]})
     shown = " ".join(doctor_screen(found, None).text().split())
@@ -298,3 +298,17 @@ def test_a_refusal_of_what_is_left_names_what_was_left_out(motor: tuple[Card, Ta
     assert left in found.refused
     with pytest.raises(NotIdentifiable, match="4 runs of under 100 rows or at rest left out"):
         identify_logs(read_sources([str(card.path.parent / "run.csv")], str(card.path)).logs)
+
+
+@pytest.mark.parametrize(("ticks", "led"), [(1.0, False), (10.0, True)])
+def test_a_slow_clock_to_the_thousandth_of_a_second_leads_to_no_other_unit(
+    motor: tuple[Card, Table], ticks: float, led: bool
+) -> None:
+    """ticks: thousandths in which the rows' times are whole."""
+    card, table = motor
+    rows = len(table["t"])
+    beside = np.random.default_rng(4).integers(-3, 4, rows)
+    table["t"] = np.round(1.0 * np.arange(rows) + ticks * 1e-3 * beside, 3)
+    found = examined_log(card, table)
+    assert any("ms in place of s" in one for one in found.remarks)
+    assert found.other_units == led

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from design.first_card.proposal import Proposal
+from identification.columns.clock import counts_thousandths
 from identification.errors import BadLog
 from workbench.steps.first_card.proposal import proposed
 
@@ -14,11 +15,11 @@ Floats = np.ndarray[Any, np.dtype[np.floating[Any]]]
 H = 0.005
 
 
-def propose(folder: Path, headers: str, *columns: Floats) -> Proposal:
+def propose(folder: Path, headers: str, *columns: Floats, axis: str | None = None) -> Proposal:
     path = folder / "run.csv"
     rows = (",".join(f"{one:.9g}" for one in row) for row in np.column_stack(columns).tolist())
     path.write_text("\n".join([headers, *rows]), "utf-8")
-    return proposed(path)
+    return proposed(path, axis=axis)
 
 
 def driven(u: Floats, m: float, F_c: float, F_v: float) -> tuple[Floats, Floats]:
@@ -141,3 +142,54 @@ def test_a_time_that_goes_back_is_named_and_is_no_signal(tmp_path: Path) -> None
     found = propose(tmp_path, "timestamp,ms,pwm,theta", stamp, 1e3 * t, pwm, angle)
     assert {one.name: one.column for one in found.signals} == {"t": "ms", "y": "theta", "u": "pwm"}
     assert found.unused["'timestamp'"] == "is called a time, but goes back in data row 14"
+
+
+def steady_speeds(seed: int) -> tuple[Floats, Floats, Floats]:
+    """Times [s] of rows about a second apart, in whole ms, and a wheel's command and steady speed
+    [rpm] from row to row."""
+    rng = np.random.default_rng(seed)
+    step = 1.0 + 0.001 * rng.integers(0, 4, 120)
+    t = np.round(17.251 + np.cumsum(step), 3)
+    u = np.linspace(-240.0, 240.0, 120)
+    rpm = np.sign(u) * np.clip(2.4 * np.abs(u) - 35.0, 0.0, None)
+    return t, u, rpm + 4.0 * rng.standard_normal(120)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_clock_to_the_thousandth_that_jitters_is_one_of_seconds(
+    tmp_path: Path, seed: int
+) -> None:
+    found = propose(tmp_path, "time,motorCommand,wheelSpeedRpm", *steady_speeds(seed))
+    (clock,) = (one for one in found.signals if one.name == "t")
+    assert (clock.unit, clock.sure, clock.rival) == ("s", False, "ms")
+    assert "its decimals" in clock.why
+
+
+@pytest.mark.parametrize("step", [0.125, 1.0 / 3.0, 0.5])
+def test_an_even_clock_to_the_thousandth_may_be_one_of_milliseconds(step: float) -> None:
+    assert not counts_thousandths(np.round(step * np.arange(400), 3))
+
+
+def test_a_speed_that_stays_above_zero_does_not_go_both_ways(tmp_path: Path) -> None:
+    """Of four wheels, two of which turn backwards: no command lacks its sign."""
+    rng, t = np.random.default_rng(6), 0.02 * np.arange(300)
+    up = 30.0 * (1.0 - np.exp(-2.0 * t)) * (1.0 + 0.3 * np.sin(3.0 * t))
+    ways = (1.0, 1.0, -1.0, -1.0)
+    names = ",".join(f"CURRENT_M{k}" for k in (1, 2, 3, 4))
+    drives = ",".join(f"PWM_M{k}" for k in (1, 2, 3, 4))
+    seen = [way * up + 0.7 * rng.standard_normal(300).round() for way in ways]
+    pwm = [way * (20.0 + rng.uniform(0.0, 30.0, 300)) for way in ways]
+    with pytest.raises(BadLog, match="no column moves as a body") as refused:
+        propose(tmp_path, f"{names},{drives},time", *seen, *pwm, t)
+    assert "never negative" not in str(refused.value)
+
+
+def test_all_axes_are_said_of_the_card_of_one(tmp_path: Path) -> None:
+    t = H * np.arange(2000)
+    columns, names = [t], ["time"]
+    for k in (1, 2, 3):
+        u = 3.0 * np.sin((1.0 + 0.4 * k) * t) + np.sin(7.0 * t + k)
+        _, v = driven(u, 0.05, 0.3, 0.2)
+        columns, names = [*columns, v, u], [*names, f"SPEED_M{k}", f"PWM_M{k}"]
+    found = propose(tmp_path, ",".join(names), *columns, axis="1")
+    assert any("3 axes in this log: 1, 2, 3; this card is of 1" in one for one in found.remarks)
