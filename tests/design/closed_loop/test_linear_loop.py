@@ -16,7 +16,7 @@ def knowing(*names: str) -> Model:
     """A model with a linear plant that follows its logs, of whose nine these alone are known."""
     model = model_of(TABLES["paper_table1"], Actuator(19530.0, 10405.0))
     plant = ArxPlant(
-        1, 1, 1, (1.0, -0.9), (0.0, 1.0), 0.01, "F", 0.0, (0.1,), (0.1,), 0.1, 0.1, 0.1, 0.1
+        1, 1, 1, (1.0, -0.9), (0.0, 1.0), 0.01, "F", 0.0, (0.1,), (0.1,), 0.1, 0.1, 0.1, None
     )
     found = {
         name: one if name in names else one.withheld("why; what to do", used(one))

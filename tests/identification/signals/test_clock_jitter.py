@@ -78,7 +78,7 @@ def test_a_short_log_and_one_without_noise_tell_none() -> None:
 def in_part_moving(tau: float, every: int) -> tuple[Array, Array, Array]:
     """Instants [s], a position that rests, moves and rests [rad], where each so many samples were
     taken early by tau [s], and where it was."""
-    t = 0.01 * np.arange(400)
+    t = 0.01 * np.arange(400, dtype=np.float64)
 
     def place(at: Array) -> Array:
         return np.asarray(1.0 - np.cos(2.0 * np.clip(at - 1.0, 0.0, 2.5)))

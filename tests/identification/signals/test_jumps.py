@@ -77,7 +77,7 @@ def test_a_sensor_that_spikes_all_the_time_is_refused() -> None:
 def early(tau: float, seed: int) -> Log:
     """A body that swings less and less and comes to rest; each eleventh sample is early [s]."""
     rng = np.random.default_rng(seed)
-    t = 0.01 * np.arange(500)
+    t = 0.01 * np.arange(500, dtype=np.float64)
     at = t - tau * (np.arange(len(t)) % 11 == 3)
     y = np.cos(4.0 * at) * np.clip(1.0 - at / 4.0, 0.0, None) ** 2
     return Log("run", {"t": t, "y": y + 1e-6 * rng.standard_normal(len(t)), "F": np.sin(t)})

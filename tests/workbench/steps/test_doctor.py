@@ -308,7 +308,8 @@ def test_a_slow_clock_to_the_thousandth_of_a_second_leads_to_no_other_unit(
     card, table = motor
     rows = len(table["t"])
     beside = np.random.default_rng(4).integers(-3, 4, rows)
-    table["t"] = np.round(1.0 * np.arange(rows) + ticks * 1e-3 * beside, 3)
+    ticked = np.arange(rows) + ticks * 1e-3 * beside
+    table["t"] = np.asarray(np.round(ticked, 3), dtype=np.float64)
     found = examined_log(card, table)
     assert any("ms in place of s" in one for one in found.remarks)
     assert found.other_units == led
