@@ -139,4 +139,11 @@ def _stops_searched(plant: Plant, setting: Setting) -> Plant:
 
 def on_whole_logs(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs."""
-    return refit(one.plant, setting.logs, setting.drive, prior=even(one.plant), effort="near")
+    logs, drive = setting.logs, setting.drive
+    found = refit(one.plant, logs, drive, prior=even(one.plant), effort="near")
+    if found.misfit > COMPLETE and on_bristle(found.plant) and is_unanchored(found.plant, drive):
+        # Of the right stiffness it follows most, and may have lost a limit on its way there.
+        searched = _stops_searched(found.plant, setting)
+        again = refit(searched, logs, drive, prior=even(searched), effort="near")
+        found = again if again.misfit < found.misfit else found
+    return found

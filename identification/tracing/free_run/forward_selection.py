@@ -9,13 +9,18 @@ nothing but noise, so a term that merely helps is never taken here.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from scipy.stats import chi2
 
 from identification.estimation.regression.effect_columns import equations_of
+from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.motion_log import shortened
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import is_unanchored, on_bristle
 from identification.estimation.windowed_run.refinement import Refit
+from identification.estimation.windowed_run.windows import freed, starts, window_residual
+from identification.model.estimates import Drive
+from identification.model.plant import Plant
 from identification.thresholds import ADEQUATE, COMPLETE, HALF, HOPELESS, OF_ACCOUNT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
@@ -56,7 +61,7 @@ def judged_forward(
         return choice, model
 
     def contested() -> tuple[Choice, FittedStructure] | None:
-        cut = [shortened(one, SHORT_SECONDS) for one in setting.logs]
+        cut = [most_left(model.plant, x, setting.drive, SHORT_SECONDS) for x in setting.logs]
         return contest(choice, model, replace(setting, short=cut), report)
 
     return setting.halt.tried(RUN_ALONE, contested, None) or (choice, model)
@@ -115,6 +120,18 @@ def decisive(before: float, others: Sequence[RunContender]) -> float:
         min(ADEQUATE, 1.0 + HALF * (before - 1.0)),
         min(HOPELESS, 1.0 + OF_ACCOUNT * (least - 1.0)),
     )
+
+
+def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> MotionLog:
+    """The stretch of a log, of so many seconds, of which the plant's run leaves most."""
+    n, size = len(one.log), round(seconds / one.log.h)
+    r = window_residual(plant, one, drive, freed(plant, one, drive, starts(one, drive)))
+    if r is None or size >= n:
+        return shortened(one, seconds)
+    sums = np.concatenate([[0.0], np.cumsum(np.log1p(np.sum(r**2, axis=0)))])
+    step = max(1, size // 8)
+    begins = np.arange(0, n - size + 1, step)
+    return shortened(one, seconds, int(begins[np.argmax(sums[begins + size] - sums[begins])]))
 
 
 def _taken(

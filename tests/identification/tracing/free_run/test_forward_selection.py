@@ -10,6 +10,7 @@ import pytest
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.motion_log import shortened
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.parameters import even
@@ -18,11 +19,11 @@ from identification.tracing.free_run import contenders
 from identification.tracing.free_run.backward_elimination import Setting, equations_explained
 from identification.tracing.free_run.contenders import Entrant, RunContender, less_load
 from identification.tracing.free_run.forward_selection import (
-    SHORT_SECONDS,
     contest,
     corrected_p_value,
     decisive,
     judged_forward,
+    most_left,
 )
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, choose
@@ -72,10 +73,10 @@ def test_the_contest_is_held_on_a_stretch_of_each_log(monkeypatch: pytest.Monkey
 
     place = "identification.tracing.free_run.forward_selection"
     monkeypatch.setattr(f"{place}.contest", contest)
+    monkeypatch.setattr(f"{place}.most_left", lambda _p, one, _d, size: shortened(one, size, 2000))
     kept, model = judged_forward(none, plain, setting, lambda _s, _p: None)
     assert not kept.steps and model is plain and len(seen_short) == 1
-    (short,), (whole,) = seen_short[0], setting.logs
-    assert short.log.duration == pytest.approx(min(SHORT_SECONDS, whole.log.duration), abs=0.01)
+    assert seen_short[0][0].log["t"][0] == pytest.approx(4.0)
 
 
 @pytest.mark.method
@@ -173,6 +174,18 @@ def test_a_p_value_grows_with_what_was_tried() -> None:
     assert corrected_p_value(spring, 1) == pytest.approx(np.exp(-6.0))  # chi-square of two, at 12
     assert corrected_p_value(spring, 18) == pytest.approx(18 * corrected_p_value(spring, 1))
     assert corrected_p_value(replace(spring, gain=-3.0), 18) == 1.0
+
+
+def test_the_stretch_of_which_most_is_left_is_where_the_run_errs() -> None:
+    one = seen(made(2))
+    y = one.log["y"].copy()
+    y[6000:7000] += 1e-3 * np.sin(np.linspace(0.0, 20.0, 1000))
+    disturbed = seen(one.log.with_signals(y=y))
+    worst = most_left(plant(), disturbed, "command", 4.0)
+    t = one.log["t"]
+    assert len(worst.log) == 2000
+    assert worst.log["t"][0] <= t[6000] and worst.log["t"][-1] >= t[6999]
+    assert len(most_left(plant(), disturbed, "command", 60.0).log) == len(one.log)
 
 
 def test_friction_by_load_takes_its_share_of_the_plain() -> None:
