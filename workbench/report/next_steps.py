@@ -42,7 +42,8 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
     logs = [log for log in logs if Path(log).name in fitted] or logs
     if model.fit.adequate:
         return _design_or_run(model, logs, card, folder)
-    if not model.identifies_friction or model.identifies_one_way:  # which no trace takes
+    by_steps = model.by_equation and model.fit.force_relative is None
+    if not model.identifies_friction or model.identifies_one_way or by_steps:  # no trace takes them
         return check_of_refused(logs, card)("")
     why = "whether an" if to_the_noise_by_equation(model) else "an"
     return step(f"{why} effect is missing", "trace", *logs, "--card", card)

@@ -43,13 +43,8 @@ SHORT_REST, LINE = 6, 10  # samples at rest at least; samples of 2 ms, whose for
 FEWEST_ON_LINE = 4
 # Of a stick limit; a body that let go later had been caught again.
 LIMITS_PER_COULOMB = (0.96, 2.8)
-USUAL_BANDS = (
-    0.0,
-    0.01,
-    0.03,
-    0.1,
-    0.3,
-)  # of the fastest speed, that are tried where none is known
+# Of the fastest speed, that are tried where no band is known.
+USUAL_BANDS = (0.0, 0.01, 0.03, 0.1, 0.3)
 UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 

@@ -94,6 +94,17 @@ def test_after_identify(model: Model) -> None:
     assert then.why == "an effect is missing"
 
 
+def test_steps_go_to_no_trace_which_refuses_them(model: Model) -> None:
+    """By steady speeds no equation of motion, and no run, leaves a share of the force."""
+    by_steps = replace(
+        model, fit=replace(model.fit, adequate=False, force_relative=None),
+        log=tuple(replace(one, position_rms=None) for one in model.log),
+    )  # fmt: skip
+    assert by_steps.by_equation
+    then = after_identify(by_steps, ["a.csv"], "emps", OUT)
+    assert taken(then) == "workbench doctor a.csv --card emps"
+
+
 def other_log(model: Model, name: str) -> LogEntry:
     """The model's first log under another name."""
     return replace(model.log[0], file=name)
