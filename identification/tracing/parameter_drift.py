@@ -33,7 +33,7 @@ from identification.tracing.result import Change
 class ParameterDrift(NamedTuple):
     """Parameters that differ between training and test logs; misfit: mean square that the rows of
     the equations leave on the test logs with these, over that on the training logs or the noise,
-    whichever is more: about 1 where nothing else has changed."""
+    whichever is more: about 1 where nothing else has changed, 0 where too few rows show it."""
 
     changes: tuple[Change, ...]
     misfit: float

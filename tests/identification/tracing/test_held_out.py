@@ -18,6 +18,7 @@ from identification.tracing import held_out, judgement
 from identification.tracing.free_run.backward_elimination import only
 from identification.tracing.held_out import HeldOut
 from identification.tracing.model_errors import OnTest
+from identification.tracing.parameter_drift import ParameterDrift
 from identification.tracing.predictive_check import Worse
 from identification.tracing.regression.stepwise import choose
 from identification.tracing.result import Change, MissingForce, Residual, Trace
@@ -218,3 +219,29 @@ def test_other_levels_are_no_drift_where_a_force_of_account_is_missing(
     level = Change("F_cp", "N", 15.0, 16.0, 0.1)
     monkeypatch.setattr(judgement, "levels_refitted", lambda *_: ((level,), "how"))
     assert judgement.judgement(none).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("misfit", "missing", "shown"),
+    [
+        (1.2, 0.5, False),  # which the parameters that have changed explain
+        (4.0, 0.5, True),
+        (0.0, 0.5, True),  # too little slides fast enough to show whether they do
+        (0.0, 0.001, False),  # of the Coulomb level, which is of no account
+    ],
+)
+def test_what_the_test_logs_alone_lack_is_shown_unless_changed_parameters_explain_it(
+    misfit: float, missing: float, shown: bool
+) -> None:
+    """Slow test logs of a machine with Stribeck friction had nothing missing, 23 times the noise
+    of their force and 49 mm off."""
+    evaluated = judged()
+    choice = only(evaluated.choice, ())
+    none = replace(evaluated, model=evaluated.plain.model, choice=choice, seen=evaluated.logs)
+    force = float(np.hypot(none.noise.force_rms or 0.0, missing * none.coulomb))
+    left = replace(none.before["test"], force_rms=force)
+    vars(none).update(
+        before={**none.before, "test": left}, drift=ParameterDrift((), misfit),
+        lacks_force=False, lacking=False,
+    )  # fmt: skip
+    assert none.shows_more_than_training == shown
