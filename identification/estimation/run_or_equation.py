@@ -138,7 +138,8 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     reported = as_sliding_shows(likeliest(fit, recorded), recorded)
     if fit.effects:
         return reported
-    left = left_by(fit.friction, recorded)
+    # A run that is followed has been so with its own numbers; one that is not answers by none.
+    left = left_by((fit if fit.adequate else reported).friction, recorded)
     surer = left is not None and left.surer
     if left is not None and fit.adequate:
         surer = surer and left.is_material(max(fit.friction.F_cp, fit.friction.F_cn))
