@@ -12,6 +12,7 @@ from typing import Any
 from design.identified.hardly_identifiable import hardly_identifiable, without_direction
 from design.identified.identifiable_by_log import RunsIdentifiability, identifiability_of_runs
 from design.machine.model import Identifiable
+from design.machine.plausible import read_in
 from identification.columns.clock import counts_thousandths
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
@@ -22,7 +23,6 @@ from identification.signals.delays import Delay, delays_of, exchanged_columns
 from identification.signals.sensor_state import Clock, SensorState, sensor_state
 
 DOCTOR_SCHEMA = "doctor/1"
-READ_IN_SECONDS = "signals.t, read in 's'"
 DECIMALS_OF_SECONDS = ", though decimals to the thousandth are mostly those of s"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
 
@@ -109,7 +109,7 @@ def examined(found: CheckedLog, units: Sequence[str], *, effects: bool = False) 
     delays = delays_of(log, seen.motion, late) if log is not None and seen.motion else ()
     exchanged = "" if log is None else exchanged_columns(delays, sensors, log.h)
     in_s = "t" in found.raw and counts_thousandths(found.raw["t"])
-    by_decimals = [one for one in units if in_s and one.startswith(READ_IN_SECONDS)]
+    by_decimals = [one for one in units if in_s and one.startswith(read_in("t", "s"))]
     said = [f"{one}{DECIMALS_OF_SECONDS}" if one in by_decimals else one for one in units]
     remarks = [*([exchanged] if exchanged else []), *said, *remarks]
     reason = "; ".join([seen.reason, *left_out(remarks)]) if seen.reason else ""

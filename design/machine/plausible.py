@@ -275,6 +275,11 @@ def _only_unit(where: str, written: Estimate, unit: str, why: str) -> str:
     )
 
 
+def read_in(name: str, unit: str) -> str:
+    """How a line names a signal and the unit in which it is read."""
+    return f"signals.{name}, read in {unit!r}"
+
+
 def log_size_remarks(
     logs: Sequence[Log], rig: Rig, units: Mapping[str, str], other: Mapping[str, str]
 ) -> tuple[str, ...]:
@@ -284,7 +289,7 @@ def log_size_remarks(
     units: in which each signal is read, by its name; other: the lines on units that are not those
     of the headers.
     """
-    named = {name: f"signals.{name}, read in {unit!r}" for name, unit in units.items()}
+    named = {name: read_in(name, unit) for name, unit in units.items()}
 
     def peak(name: str, logged: str = "") -> float:
         return max(float(np.max(np.abs(log.signals.get(logged, log[name])))) for log in logs)

@@ -102,6 +102,6 @@ def _breakaway(
     count = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
     limits, rise = usual_limits([one], Plant(friction))
     known = {name: size for name, size in limits.items() if np.isfinite(size.sd)}
-    values = {name: abs(size.value) for name, size in known.items()}
+    sizes = {name: abs(size.value) for name, size in known.items()}
     sd = {name: float(np.hypot(size.sd, 0.5 * rise)) for name, size in known.items()}
-    return values, sd, count
+    return sizes, sd, count

@@ -170,6 +170,12 @@ def test_an_even_clock_to_the_thousandth_may_be_one_of_milliseconds(step: float)
     assert not counts_thousandths(np.round(step * np.arange(400), 3))
 
 
+def test_a_jittering_clock_finer_than_thousandths_may_be_one_of_milliseconds() -> None:
+    steps = np.random.default_rng(1).integers(990, 1010, 400).astype(np.float64)
+    assert counts_thousandths(1e-3 * np.cumsum(steps))
+    assert not counts_thousandths(0.5e-3 * np.cumsum(steps))
+
+
 def test_a_speed_that_stays_above_zero_does_not_go_both_ways(tmp_path: Path) -> None:
     """Of four wheels, two of which turn backwards: no command lacks its sign."""
     rng, t = np.random.default_rng(6), 0.02 * np.arange(300)

@@ -3,6 +3,7 @@
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -130,6 +131,19 @@ def test_a_contender_that_has_only_the_better_start_adds_no_effect(
     choice, model = found
     assert not choice.steps and not model.plant.effects
     assert model.misfit <= COMPLETE and model.plant.friction.F_sp == pytest.approx(16.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("searched", "taken"), [(3.0, "a lower limit"), (9.0, "as it began")])
+def test_a_contender_whose_search_leads_astray_is_as_it_began(
+    searched: float, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, _ = setting_with_play(4, 0.0)
+    plants = {"as it began": plant(), "a lower limit": plant(friction=replace(NINE, F_sp=14.0))}
+    done = SimpleNamespace(plant=plants["a lower limit"], misfit=searched)
+    monkeypatch.setattr(contenders, "_near", lambda *_: done)
+    begun = RunContender((), built_in()["presliding"], plants["as it began"], 5.0)
+    found = contenders.contender(Entrant((plant(),), begun), setting)
+    assert found.plant is plants[taken] and found.misfit == min(searched, 5.0)
 
 
 def test_those_that_follow_best_after_a_few_steps_are_searched(
